@@ -1,0 +1,2 @@
+//! Scene to SAR image.
+fn main() {}
