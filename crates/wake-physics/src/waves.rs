@@ -279,7 +279,7 @@ mod tests {
     /// Under a crest the water moves along the wave; continuity holds at the surface in deep water.
     #[test]
     fn water_under_a_crest_moves_with_the_wave() {
-        for k in [[0.3, 0.0], [-0.2, 0.1], [0.0, -0.4]] {
+        for k in [[0.3f64, 0.0], [-0.2, 0.1], [0.0, -0.4]] {
             let omega = angular_frequency(k[0].hypot(k[1]), TRANSFER.depth);
             let vx = TRANSFER.factor(Quantity::VelocityX, k, omega).re;
             let vy = TRANSFER.factor(Quantity::VelocityY, k, omega).re;
