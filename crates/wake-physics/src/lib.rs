@@ -3,6 +3,7 @@ pub mod constants;
 pub mod dispersion;
 mod error;
 pub mod fft;
+pub mod output;
 mod raster;
 pub mod scene;
 pub mod waves;
