@@ -5,6 +5,7 @@ mod error;
 pub mod fft;
 mod raster;
 pub mod scene;
+pub mod spectrum;
 pub mod waves;
 
 pub use error::{Error, Result};
