@@ -6,7 +6,9 @@ pub mod fft;
 mod raster;
 pub mod scene;
 pub mod spectrum;
+pub mod spreading;
 pub mod waves;
+pub mod wind_sea;
 
 pub use error::{Error, Result};
 pub use raster::{Field, Raster};
