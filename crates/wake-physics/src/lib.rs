@@ -6,7 +6,10 @@ pub mod fft;
 pub mod output;
 mod raster;
 pub mod scene;
+pub mod spectrum;
+pub mod spreading;
 pub mod waves;
+pub mod wind_sea;
 
 pub use error::{Error, Result};
 pub use raster::{Field, Raster};
