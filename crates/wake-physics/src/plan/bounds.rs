@@ -1,38 +1,15 @@
 //! What leaving each term out would change: bounds from the linear image.
 
 use super::choose::Effect;
-use super::linear::{LinearImage, Modulation, WaveSample, rms, smear};
+use super::linear::{Modulation, WaveSample, rms, smear};
+use super::situation::Situation;
 use crate::scene::Term;
+use crate::waves::Quantity;
 use num_complex::Complex64;
 
 /// Safety factor on root mean squares: one draw of a random sea may be rougher than its mean, bunching gathers
 /// what changes, and waves of finite height are not quite linear.
 const SAFETY: f64 = 3.0;
-
-/// What is known of a scene before it is computed.
-#[derive(Debug)]
-pub(crate) struct Situation {
-    /// Resolved waves of the sea.
-    pub(crate) sea: Vec<WaveSample>,
-    /// Resolved waves of the wake.
-    pub(crate) wake: Vec<WaveSample>,
-    /// How waves modulate the image.
-    pub(crate) image: LinearImage,
-    /// ½ ∂²ln σ⁰/∂slope² along x and y, absolute.
-    pub(crate) curvature: [f64; 2],
-    /// Azimuth resolution of the radar, and as degraded by unresolved motion [m].
-    pub(crate) resolution: [f64; 2],
-    /// Azimuth resolution with the root mean square acceleration of the resolved waves [m].
-    pub(crate) defocused: f64,
-    /// Root of the mean square of the damping of the turbulent wake over the image, 0 to 1.
-    pub(crate) damping: f64,
-    /// Relative root mean square change of σ⁰ by the tilt average, and by the specular return.
-    pub(crate) backscatter: [f64; 2],
-    /// Number of looks.
-    pub(crate) looks: f64,
-    /// Why a term is absent from the scene.
-    pub(crate) absent: Vec<(Term, &'static str)>,
-}
 
 impl Situation {
     /// One effect a term, in the order of the data flow.
@@ -84,9 +61,12 @@ impl Situation {
 
     /// The change of the smear of everything that is imaged.
     fn coherence(&self) -> f64 {
-        let [nominal, _] = self.resolution;
+        let accelerations =
+            |w: &WaveSample| self.image.transfer.factor(Quantity::RadialAcceleration, w.k, w.omega);
+        let acceleration = rms(&self.sea, accelerations).hypot(rms(&self.wake, accelerations));
+        let moving = self.resolution.at(acceleration);
         let change = |w: &WaveSample| {
-            let lost = smear(w.k[1], nominal) - smear(w.k[1], self.defocused);
+            let lost = smear(w.k[1], self.resolution.nominal) - smear(w.k[1], moving);
             self.modulation(w).total() * lost
         };
         rms(&self.sea, change).hypot(rms(&self.wake, change))
@@ -98,6 +78,6 @@ impl Situation {
 
     /// The smear without the defocus of accelerated pixels: some pixels are not accelerated.
     fn sharpest(&self, wave: &WaveSample) -> f64 {
-        smear(wave.k[1], self.resolution[1])
+        smear(wave.k[1], self.resolution.at(0.0))
     }
 }
