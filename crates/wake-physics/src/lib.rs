@@ -10,7 +10,9 @@ mod raster;
 pub mod scene;
 pub mod spectrum;
 pub mod spreading;
+mod random;
 pub mod waves;
+pub mod surface;
 pub mod wind_sea;
 
 pub use error::{Error, Result};

@@ -127,8 +127,8 @@ mod tests {
     /// The published exponents, and OCEANSAR's form of them in k.
     #[test]
     fn exponents_are_the_published_ones() {
-        let (wind, age) = (5.0, 1.17);
-        let peak = GRAVITY * (age / wind as f64).powi(2);
+        let (wind, age) = (5.0f64, 1.17);
+        let peak = GRAVITY * (age / wind).powi(2);
         let hasselmann = Cos2s::hasselmann(wind, peak);
         for (x, s) in [
             (0.8, 6.97 * 0.8f64.powf(4.06)),
