@@ -1,26 +1,21 @@
 //! From a scene to a SAR image: the only file that knows the order of the stages.
+//!
+//! `stages` calls the method of each stage, `clock` times them, `report` writes what came out.
 
 use crate::error::Result;
 use crate::labels::Labels;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
-use crate::sar::{Echo, Imaging, Sources, radial_velocity_field, speckle};
-use crate::scattering::{BackscatterTable, FacetFields};
-use crate::scene::{Scene, Term};
+use crate::scene::Scene;
 use crate::setup::Setup;
-use crate::surface::Surface;
-use crate::turbulent::TurbulentWake;
-use crate::waves::{Quantity, harmonic_fields};
-use crate::{kelvin, nufft};
+use clock::Clock;
+pub use clock::Seconds;
 use serde::Serialize;
-use std::time::Instant;
+use stages::Run;
 
-/// Share of the tolerance for the fields: their largest error is some five times its root mean square, and
-/// bunching turns an error of the velocity into a larger one of the image.
-const SHARE_OF_FIELDS: f64 = 0.1;
-
-/// Share of the tolerance for the table of σ⁰, and as much for the kernels of the imaging.
-const SHARE_OF_IMAGE: f64 = 0.2;
+mod clock;
+mod report;
+mod stages;
 
 /// How fields are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -68,34 +63,6 @@ pub struct Simulation {
     pub method: Method,
     /// The scene.
     pub scene: Scene,
-}
-
-/// Wall-clock seconds by stage.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-#[expect(missing_docs, reason = "the stages' names")]
-pub struct Seconds {
-    pub plan: f64,
-    pub sea: f64,
-    pub kelvin: f64,
-    pub turbulent: f64,
-    pub backscatter: f64,
-    pub imaging: f64,
-    pub speckle: f64,
-    pub labels: f64,
-    /// All of it, without writing files.
-    pub total: f64,
-}
-
-impl std::fmt::Display for Seconds {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let ms = |s: f64| 1e3 * s;
-        write!(
-            f,
-            "{:.1} ms: plan {:.1}, sea {:.1}, kelvin {:.1}, turbulent {:.1}, backscatter {:.1}, imaging {:.1}, speckle {:.1}, labels {:.1}",
-            ms(self.total), ms(self.plan), ms(self.sea), ms(self.kelvin), ms(self.turbulent),
-            ms(self.backscatter), ms(self.imaging), ms(self.speckle), ms(self.labels)
-        )
-    }
 }
 
 /// Simulates a scene with the fast methods.
