@@ -3,7 +3,10 @@ pub mod constants;
 pub mod dispersion;
 mod error;
 pub mod fft;
+pub mod grey;
+pub mod labels;
 mod raster;
+pub mod sar;
 pub mod scene;
 pub mod waves;
 
