@@ -95,6 +95,24 @@ impl<T: Real> Synthesis<T> {
         &self,
         spectrum: &mut [Complex<T>],
         keep: [usize; 2],
+        out: (&mut [f32], &mut [f32]),
+        finish: F,
+    ) where
+        F: Fn(usize, &mut [Complex<T>]) + Sync,
+    {
+        self.run_window(spectrum, [0, 0], keep, out, finish);
+    }
+
+    /// [`Self::run`], keeping `keep` rows and columns from the row `start[0]` and the column `start[1]` on.
+    ///
+    /// # Panics
+    ///
+    /// If a length is another, or more is kept than there is.
+    pub fn run_window<F>(
+        &self,
+        spectrum: &mut [Complex<T>],
+        start: [usize; 2],
+        keep: [usize; 2],
         (re, im): (&mut [f32], &mut [f32]),
         finish: F,
     ) where
@@ -107,7 +125,7 @@ impl<T: Real> Synthesis<T> {
             "spectrum of another size"
         );
         assert!(
-            keep_rows <= self.rows && keep_columns <= self.columns,
+            start[0] + keep_rows <= self.rows && start[1] + keep_columns <= self.columns,
             "more kept than there is"
         );
         assert!(
@@ -128,13 +146,14 @@ impl<T: Real> Synthesis<T> {
                 |(block, scratch), (b, (re, im))| {
                     let first = b * BLOCK;
                     let rows = first..(first + BLOCK).min(keep_rows);
-                    self.gather(spectrum, rows.clone(), block);
+                    self.gather(spectrum, start[0] + rows.start..start[0] + rows.end, block);
                     let lines = block.chunks_exact_mut(self.columns);
                     let out = re.chunks_mut(keep_columns).zip(im.chunks_mut(keep_columns));
                     for ((i, row), (re, im)) in rows.zip(lines).zip(out) {
                         self.along_x.process_with_scratch(row, scratch);
-                        finish(i, &mut row[..keep_columns]);
-                        split(&row[..keep_columns], re, im);
+                        let kept = &mut row[start[1]..start[1] + keep_columns];
+                        finish(i, kept);
+                        split(kept, re, im);
                     }
                 },
             );
