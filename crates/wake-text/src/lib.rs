@@ -8,6 +8,7 @@ mod wording;
 mod cleaning;
 mod vocabulary_files;
 mod vocabulary;
+mod words;
 mod tokenizer;
 
 pub use error::{Error, Result};

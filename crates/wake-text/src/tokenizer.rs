@@ -3,10 +3,10 @@
 use crate::cleaning::{Cleaned, clean};
 use crate::error::Result;
 use crate::vocabulary::{END_MARK, START_MARK, Vocabulary, to_symbols};
+use crate::words::for_words;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::LazyLock;
-use tokenizers::{Model, utils::SysRegex};
 
 /// Number of tokens the text encoder of CLIP takes, start and end mark included.
 pub const TOKENS: usize = 77;
@@ -50,11 +50,7 @@ impl Tokens {
 #[derive(Debug)]
 pub struct Tokenizer {
     vocabulary: Vocabulary,
-    words: SysRegex,
 }
-
-/// Words of a cleaned prompt: English contractions, letters, one digit, or a run of anything else.
-const WORD: &str = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+";
 
 impl Tokenizer {
     /// The tokenizer of Stable Diffusion v1: CLIP's vocabulary of 49,408 tokens, padded with the end mark.
@@ -105,7 +101,6 @@ impl Tokenizer {
     fn new(vocabulary: Vocabulary) -> Self {
         Self {
             vocabulary,
-            words: SysRegex::new(WORD).expect("a constant pattern, compiled in every test"),
         }
     }
 
@@ -144,18 +139,14 @@ impl Tokenizer {
     }
 
     fn push_words(&self, text: &str, range: std::ops::Range<usize>, row: &mut Row) {
-        for (start, end) in self.words.find_iter(&text[range.clone()]) {
-            let start = range.start + start;
-            let word = &text[start..range.start + end];
+        for_words(&text[range.clone()], |word| {
+            let start = range.start + word.start;
+            let word = &text[start..range.start + word.end];
             let symbols = to_symbols(word);
-            // Cannot fail: an unknown symbol becomes the end mark, which is in every vocabulary.
-            let tokens = self.vocabulary.bpe.tokenize(&symbols).unwrap_or_default();
-            for token in tokens {
-                row.push(token.id, || {
-                    start + symbols[..token.offsets.0].chars().count()
-                });
-            }
-        }
+            self.vocabulary.for_tokens(&symbols, |id, at| {
+                row.push(id, || start + symbols[..at].chars().count());
+            });
+        });
     }
 }
 

@@ -6,9 +6,11 @@
 
 use crate::error::{Error, Result};
 use crate::vocabulary_files::{parse_merges, parse_pad, parse_tokenizer, parse_vocab, read};
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Read;
 use std::path::Path;
+use tokenizers::Model;
 use tokenizers::models::bpe::{BPE, Merges, Vocab};
 
 /// Marks the start of every prompt.
@@ -18,12 +20,17 @@ pub(crate) const END_MARK: &str = "<|endoftext|>";
 /// Marks the last symbol of a word.
 const WORD_END: &str = "</w>";
 
+/// Words of several tokens that each thread remembers.
+const CACHED_WORDS: usize = 10_000;
+
 const CLIP_MERGES: &[u8] = include_bytes!("../assets/clip_merges.txt.gz");
 
 /// The merges and the ids of the tokens they make.
 #[derive(Debug)]
 pub(crate) struct Vocabulary {
-    pub(crate) bpe: BPE,
+    bpe: BPE,
+    /// The words that end up as one token, as symbols: most words of a prompt, found without merging.
+    whole_words: Vocab,
     pub(crate) start: u32,
     pub(crate) end: u32,
     pub(crate) pad: u32,
@@ -32,20 +39,20 @@ pub(crate) struct Vocabulary {
 impl Vocabulary {
     /// CLIP's vocabulary, unpacked from the crate.
     pub(crate) fn embedded() -> Result<Self> {
-        let merges = parse_merges(Path::new("clip_merges.txt"), &embedded_merges()?, None)?;
-        let vocab = clip_vocab(&merges);
-        Self::build(Path::new("clip_merges.txt"), vocab, merges)
+        let path = Path::new("clip_merges.txt");
+        let merges = parse_merges(path, &embedded_merges()?, None)?;
+        Self::build(path, clip_vocab(&merges), merges)
     }
 
     pub(crate) fn from_files(vocab_path: &Path, merges_path: &Path) -> Result<Self> {
         let vocab = parse_vocab(vocab_path, &read(vocab_path)?)?;
         let merges = parse_merges(merges_path, &read(merges_path)?, Some(&vocab))?;
-        Self::build(vocab_path, vocab, merges)
+        Self::build(vocab_path, vocab, merges).map(Self::checked)
     }
 
     pub(crate) fn from_tokenizer_json(path: &Path) -> Result<Self> {
         let (vocab, merges) = parse_tokenizer(path, &read(path)?)?;
-        Self::build(path, vocab, merges)
+        Self::build(path, vocab, merges).map(Self::checked)
     }
 
     pub(crate) fn from_folder(folder: &Path) -> Result<Self> {
@@ -70,12 +77,13 @@ impl Vocabulary {
         if special.is_file()
             && let Some(pad) = parse_pad(&special, &read(&special)?)?
         {
-            vocabulary.pad = vocabulary.id(&special, &pad)?;
+            vocabulary.pad = id(&vocabulary.bpe, &special, &pad)?;
         }
         Ok(vocabulary)
     }
 
     fn build(path: &Path, vocab: Vocab, merges: Merges) -> Result<Self> {
+        let whole_words = word_ends(&vocab);
         let bpe = BPE::builder()
             .vocab_and_merges(vocab, merges)
             .unk_token(END_MARK.to_owned())
@@ -85,26 +93,58 @@ impl Vocabulary {
                 path: path.to_owned(),
                 message: e.to_string(),
             })?;
-        let mut vocabulary = Self {
+        let [start, end] = [START_MARK, END_MARK].map(|mark| id(&bpe, path, mark));
+        let end = end?;
+        Ok(Self {
             bpe,
-            start: 0,
-            end: 0,
-            pad: 0,
-        };
-        vocabulary.start = vocabulary.id(path, START_MARK)?;
-        vocabulary.end = vocabulary.id(path, END_MARK)?;
-        vocabulary.pad = vocabulary.end;
-        Ok(vocabulary)
-    }
-
-    /// The id of a token that must be there.
-    fn id(&self, path: &Path, token: &str) -> Result<u32> {
-        use tokenizers::Model;
-        self.bpe.token_to_id(token).ok_or_else(|| Error::File {
-            path: path.to_owned(),
-            message: format!("the vocabulary has no token '{token}'"),
+            whole_words,
+            start: start?,
+            end,
+            pad: end,
         })
     }
+
+    /// Keeps only those whole words that the merges do make: in CLIP's vocabulary all, in another perhaps not.
+    fn checked(mut self) -> Self {
+        self.bpe.resize_cache(0); // its places are for words of several tokens
+        let words: Vec<_> = self.whole_words.into_iter().collect();
+        let bpe = &self.bpe;
+        let is_made = |(word, id): &(String, u32)| match bpe.tokenize(word).as_deref() {
+            Ok([token]) => token.id == *id,
+            _ => false,
+        };
+        let made: Vec<_> = words.into_par_iter().filter(is_made).collect();
+        self.whole_words = made.into_iter().collect();
+        self.bpe.resize_cache(CACHED_WORDS);
+        self
+    }
+
+    /// The tokens of a word spelt in symbols: id, and first byte in the symbols.
+    pub(crate) fn for_tokens(&self, word: &str, mut each: impl FnMut(u32, usize)) {
+        if let Some(&id) = self.whole_words.get(word) {
+            return each(id, 0);
+        }
+        // Cannot fail: an unknown symbol becomes the end mark, which is in every vocabulary.
+        for token in self.bpe.tokenize(word).unwrap_or_default() {
+            each(token.id, token.offsets.0);
+        }
+    }
+}
+
+/// The id of a token that must be there.
+fn id(bpe: &BPE, path: &Path, token: &str) -> Result<u32> {
+    bpe.token_to_id(token).ok_or_else(|| Error::File {
+        path: path.to_owned(),
+        message: format!("the vocabulary has no token '{token}'"),
+    })
+}
+
+/// The tokens that end a word, without the mark, and their ids.
+fn word_ends(vocab: &Vocab) -> Vocab {
+    let ends = vocab
+        .iter()
+        .filter_map(|(token, &id)| Some((token.strip_suffix(WORD_END)?, id)));
+    ends.map(|(word, id)| (word.to_owned(), id)).collect()
 }
 
 fn embedded_merges() -> Result<String> {
