@@ -75,3 +75,37 @@ fn contraction(text: &[u8]) -> Option<usize> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn by_pattern(text: &str) -> Vec<Range<usize>> {
+        let matches = words_by_pattern().find_iter(text);
+        matches.map(|(start, end)| start..end).collect()
+    }
+
+    fn by_bytes(text: &str) -> Vec<Range<usize>> {
+        let mut found = Vec::new();
+        ascii_words(text.as_bytes(), |word| found.push(word));
+        found
+    }
+
+    #[test]
+    fn contractions_are_words_of_their_own() {
+        let text = "i've 's'll !'s 'x don't 12";
+        let words: Vec<&str> = by_bytes(text).into_iter().map(|word| &text[word]).collect();
+        let expected = [
+            "i", "'ve", "'s", "'ll", "!'", "s", "'", "x", "don", "'t", "1", "2",
+        ];
+        assert_eq!(words, expected);
+    }
+
+    proptest! {
+        #[test]
+        fn bytes_split_as_the_pattern_does(text in "[\\x00-\\x7f]{0,60}|['strevmld !1]{0,30}") {
+            prop_assert_eq!(by_bytes(&text), by_pattern(&text));
+        }
+    }
+}
