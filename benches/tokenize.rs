@@ -37,10 +37,18 @@ fn compare(criterion: &mut Criterion, prompts: &[String]) {
     let mut single = criterion.benchmark_group("single");
     single.throughput(Throughput::Elements(prompts.len() as u64));
     single.bench_function("wake-text", |b| {
-        b.iter(|| for p in prompts { black_box(ours(p)); });
+        b.iter(|| {
+            for p in prompts {
+                black_box(ours(p));
+            }
+        });
     });
     single.bench_function("instant-clip-tokenizer", |b| {
-        b.iter(|| for p in prompts { black_box(instant(&other, p)); });
+        b.iter(|| {
+            for p in prompts {
+                black_box(instant(&other, p));
+            }
+        });
     });
     single.finish();
     let mut batch = criterion.benchmark_group("batch on all cores");
@@ -84,22 +92,34 @@ fn report(what: &str, count: usize, [ours, instant]: [f64; 2]) {
 fn main() {
     let start = Instant::now();
     Tokenizer::clip();
-    println!("clip {:?}", start.elapsed());
+    println!("first call: {:.0} ms", 1e3 * start.elapsed().as_secs_f64());
     let prompts = prompts();
     let mut criterion = Criterion::default().configure_from_args();
     compare(&mut criterion, &prompts);
     criterion.final_summary();
-    let start = Instant::now();
-    Tokenizer::from_folder(std::path::Path::new("/work/shared/fixtures/pipeline_a")).unwrap();
-    println!("load {:?}", start.elapsed());
     let other = instant_clip_tokenizer::Tokenizer::new();
     let single = medians(
-        || for p in &prompts { black_box(ours(p)); },
-        || for p in &prompts { black_box(instant(&other, p)); },
+        || {
+            for p in &prompts {
+                black_box(ours(p));
+            }
+        },
+        || {
+            for p in &prompts {
+                black_box(instant(&other, p));
+            }
+        },
     );
     let batch = medians(
         || drop(black_box(Tokenizer::clip().encode_batch(&prompts))),
-        || drop(black_box(prompts.par_iter().map(|p| instant(&other, p)).collect::<Vec<_>>())),
+        || {
+            drop(black_box(
+                prompts
+                    .par_iter()
+                    .map(|p| instant(&other, p))
+                    .collect::<Vec<_>>(),
+            ))
+        },
     );
     report("single", prompts.len(), single);
     report("batch on all cores", prompts.len(), batch);
