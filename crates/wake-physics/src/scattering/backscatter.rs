@@ -76,10 +76,10 @@ impl Backscatter {
         ]
     }
 
-    /// How much each term of σ⁰ matters over resolved Gaussian slopes, to about two digits.
+    /// How much each term of σ⁰ matters over resolved Gaussian slopes.
     ///
-    /// The tilt average is taken away on three by three Gauss–Hermite nodes of the resolved slopes; the specular
-    /// return has a closed form.
+    /// The specular return has a closed form. The tilt average is taken away on three by three Gauss–Hermite nodes
+    /// of the resolved slopes: within 10 % at 32°, a third too low at 18°, where few facets near nadir dominate.
     #[must_use]
     pub fn sensitivity(&self, resolved: &SlopeCovariance) -> Sensitivity {
         let mean = self.mean_over(resolved);
@@ -123,6 +123,7 @@ mod tests {
     use super::*;
     use crate::constants::SPEED_OF_LIGHT;
     use crate::permittivity::sea_water;
+    use crate::scattering::slopes::gaussian_nodes;
     use crate::scattering::{Polarization, cmod5n};
     use crate::spectrum::Elfouhaily;
     use crate::spectrum::elfouhaily::{DragLaw, FULLY_DEVELOPED};
@@ -314,5 +315,61 @@ mod tests {
             let change = db(DragLaw::Fixed) - db(DragLaw::Wu);
             assert!((change - expected).abs() < 0.3, "{wind_speed}: {change}");
         }
+    }
+
+    /// A pixel that resolves part of the slopes: the mean over those of the facets' σ⁰ is the mean over all, and
+    /// the figures of the plan agree with quadrature over resolved slopes.
+    #[test]
+    fn resolved_and_unresolved_slopes_make_the_whole() {
+        for degrees in [18.0, 32.0] {
+            let mut model = Case { degrees, ..X_BAND }.scene_mean();
+            let whole = model.parts([0.0; 2]);
+            let resolved = model.tilt.times(0.3);
+            model.tilt = model.tilt.times(0.7);
+            let incidence = degrees.to_radians();
+            let permittivity = sea_water(9.6e9, 20.0, 35.0);
+            model.specular = Specular::new(permittivity, incidence, &model.tilt, 0.0);
+            let axes = resolved.principal_axes();
+            let [along, across] = axes.variance.map(|v| gaussian_nodes(v.sqrt(), 0.03));
+            let (mut mean, mut tilt, mut glint) = ([0.0; 2], 0.0, 0.0);
+            for [u, wu] in &along {
+                for [v, wv] in &across {
+                    let slope = axes.slope([*u, *v]);
+                    let weight = wu * wv;
+                    let specular = model.specular.sigma0(slope);
+                    let bragg = model.two_scale.average(slope, &model.tilt, 0.03);
+                    mean[0] += weight * bragg;
+                    mean[1] += weight * specular;
+                    tilt += weight * (bragg - model.two_scale.facet(slope)).powi(2);
+                    glint += weight * specular * specular;
+                }
+            }
+            let sensitivity = model.sensitivity(&resolved);
+            for n in 0..2 {
+                assert!(
+                    (mean[n] / whole[n] - 1.0).abs() < 0.01,
+                    "{mean:?} {whole:?}"
+                );
+                assert!((sensitivity.mean[n] / whole[n] - 1.0).abs() < 0.05);
+            }
+            let total = whole[0] + whole[1];
+            assert!((sensitivity.specular * total / glint.sqrt() - 1.0).abs() < 0.05);
+            // The stated accuracy of three nodes: 0.93 at 32°, 0.71 at 18°.
+            let ratio = sensitivity.tilt_average * total / tilt.sqrt();
+            assert!((ratio - 1.0).abs() < 0.35, "{degrees}: {ratio}");
+        }
+    }
+
+    /// Nothing is lost from nothing.
+    #[test]
+    fn calm_sea_has_no_sensitivity() {
+        let model = Case {
+            wind_speed: 0.0,
+            ..X_BAND
+        }
+        .scene_mean();
+        let sensitivity = model.sensitivity(&SlopeCovariance::NONE);
+        assert_eq!(sensitivity.mean, [0.0; 2]);
+        assert_eq!([sensitivity.tilt_average, sensitivity.specular], [0.0; 2]);
     }
 }

@@ -86,7 +86,7 @@ pub(crate) fn radius(std: f64, step: f64) -> usize {
     if std <= 0.0 {
         return 0;
     }
-    2 * (0.5 * (6.5 * std / step + 1.0)).max(2.0).ceil() as usize
+    2 * (0.5 * (6.0 * std / step + 1.0)).max(2.0).ceil() as usize
 }
 
 /// Weights of a Gaussian mean at a node and at the points that divide the step after it.
