@@ -25,7 +25,7 @@ struct Arguments {
     /// Sets a value of the scene, such as ship.speed=12; may be repeated.
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "text")]
     set: Vec<String>,
-    /// Prints {"prompt", "token_ids", "token_count", "truncated", "scene"} and nothing else.
+    /// Prints one JSON object: prompt, ids, count, whether cut off, and the scene read back (or null).
     #[arg(long)]
     json: bool,
 }
