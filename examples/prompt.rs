@@ -8,6 +8,7 @@
 use clap::Parser;
 use serde_json::{Value, json};
 use std::error::Error;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_physics::Scene;
@@ -33,7 +34,8 @@ struct Arguments {
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(output) => {
-            println!("{output}");
+            // A reader such as `head` may have left.
+            let _ = writeln!(std::io::stdout(), "{output}");
             ExitCode::SUCCESS
         }
         Err(error) => {
