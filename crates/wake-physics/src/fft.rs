@@ -198,14 +198,16 @@ impl<T: Real> Synthesis<T> {
             first.len() == keep_rows * keep_columns && second.len() == first.len(),
             "output of another size"
         );
-        half.par_chunks_mut(2 * self.rows).enumerate().for_each_init(
-            || vec![Complex::new(T::zero(), T::zero()); self.along_y.get_inplace_scratch_len()],
-            |scratch, (b, lines)| {
-                let (one, two) = lines.split_at_mut(self.rows);
-                fill(b, one, two);
-                self.along_y.process_with_scratch(lines, scratch);
-            },
-        );
+        half.par_chunks_mut(2 * self.rows)
+            .enumerate()
+            .for_each_init(
+                || vec![Complex::new(T::zero(), T::zero()); self.along_y.get_inplace_scratch_len()],
+                |scratch, (b, lines)| {
+                    let (one, two) = lines.split_at_mut(self.rows);
+                    fill(b, one, two);
+                    self.along_y.process_with_scratch(lines, scratch);
+                },
+            );
         let half = &*half;
         let block_len = BLOCK * keep_columns.max(1);
         first
@@ -220,7 +222,9 @@ impl<T: Real> Synthesis<T> {
                     self.gather_real(half, rows, block);
                     self.along_x.process_with_scratch(block, scratch);
                     let rows = block.chunks_exact(self.columns);
-                    let out = first.chunks_mut(keep_columns).zip(second.chunks_mut(keep_columns));
+                    let out = first
+                        .chunks_mut(keep_columns)
+                        .zip(second.chunks_mut(keep_columns));
                     for (row, (re, im)) in rows.zip(out) {
                         split(&row[..keep_columns], re, im);
                     }
@@ -377,7 +381,8 @@ mod tests {
             // Fewer rows and columns kept, and a workspace that is not clean.
             let keep = [rows.div_ceil(2), columns.div_ceil(2)];
             let mut half = vec![Complex::new(f64::NAN, 1.0); plan.half_len()];
-            let (mut first, mut second) = (vec![0.0; keep[0] * keep[1]], vec![0.0; keep[0] * keep[1]]);
+            let (mut first, mut second) =
+                (vec![0.0; keep[0] * keep[1]], vec![0.0; keep[0] * keep[1]]);
             plan.run_real(&mut half, keep, (&mut first, &mut second), |b, one, two| {
                 for a in 0..rows {
                     one[a] = value(b, a, 0.1);

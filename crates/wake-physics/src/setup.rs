@@ -99,7 +99,11 @@ impl Setup {
         let lobe = Specular::mirror_lobe(self.radar_wavenumber(), self.image.spacing);
         Backscatter {
             two_scale: self.two_scale.clone(),
-            tilt: if tilt_average { unresolved } else { SlopeCovariance::NONE },
+            tilt: if tilt_average {
+                unresolved
+            } else {
+                SlopeCovariance::NONE
+            },
             specular: if specular {
                 Specular::new(self.permittivity, self.incidence, &unresolved, lobe)
             } else {

@@ -128,11 +128,17 @@ impl KelvinWake {
 
 impl WakePlan {
     fn smallest_u(&self) -> f64 {
-        self.quadrature.iter().map(|n| n.0.abs()).fold(f64::INFINITY, f64::min)
+        self.quadrature
+            .iter()
+            .map(|n| n.0.abs())
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn largest_u(&self) -> f64 {
-        self.quadrature.iter().map(|n| n.0.abs()).fold(0.0, f64::max)
+        self.quadrature
+            .iter()
+            .map(|n| n.0.abs())
+            .fold(0.0, f64::max)
     }
 }
 

@@ -60,7 +60,10 @@ fn wave_resistance_of_the_standard_hull() {
         let speed = froude * GRAVITY.sqrt();
         let coefficient = 1e3 * wake(hull, speed, 0.0).wave_resistance_coefficient();
         // Half a unit of the last digit given, and the 1e-4 to which the table states itself.
-        assert!((coefficient - expected).abs() < 5e-5 + 1e-4 * expected, "{froude} {coefficient}");
+        assert!(
+            (coefficient - expected).abs() < 5e-5 + 1e-4 * expected,
+            "{froude} {coefficient}"
+        );
         if froude == 0.35 {
             assert!((coefficient / 1.2486 - 1.0).abs() < 1e-3);
         }
@@ -70,9 +73,18 @@ fn wave_resistance_of_the_standard_hull() {
 /// Newtons for the scene's ship, from the reference table with four digits (truncated at λ = 60).
 #[test]
 fn wave_resistance_of_the_scene_ship() {
-    for (speed, expected) in [(6.0, 3.527e4), (8.0, 2.016e5), (9.0, 3.354e5), (10.0, 4.546e5), (12.0, 7.648e5)] {
+    for (speed, expected) in [
+        (6.0, 3.527e4),
+        (8.0, 2.016e5),
+        (9.0, 3.354e5),
+        (10.0, 4.546e5),
+        (12.0, 7.648e5),
+    ] {
         let resistance = scene_ship(speed, 0.0).wave_resistance();
-        assert!((resistance / expected - 1.0).abs() < 2.5e-4, "{speed} {resistance:e}");
+        assert!(
+            (resistance / expected - 1.0).abs() < 2.5e-4,
+            "{speed} {resistance:e}"
+        );
     }
     assert_eq!(scene_ship(0.0, 0.0).wave_resistance(), 0.0);
 }
@@ -118,9 +130,16 @@ fn elevations_at_the_reference_points() {
         ([-500.0, 176.777], 0.0782143, 0.0842910),
     ];
     // Pixels of 0.05 m: the band ends at 63 rad/m, where exp(−k d) is below 1e-13.
-    let raster = Raster { origin_row: 4000, origin_column: 12000, ..Raster::image(8001, 12001, 0.05) };
+    let raster = Raster {
+        origin_row: 4000,
+        origin_column: 12000,
+        ..Raster::image(8001, 12001, 0.05)
+    };
     for (column, depth) in [(0, 1.0), (1, 0.5)] {
-        let ship = KelvinWake { filter_depth: depth, ..scene_ship(9.0, 90.0) };
+        let ship = KelvinWake {
+            filter_depth: depth,
+            ..scene_ship(9.0, 90.0)
+        };
         let places: Vec<[f64; 2]> = large.iter().map(|p| p.0).collect();
         for (value, row) in elevations(&ship, &raster, &places, 1e-6).iter().zip(large) {
             let expected = [row.1, row.2][column];
@@ -133,8 +152,15 @@ fn elevations_at_the_reference_points() {
         ([-30.0, 5.0], 0.02072523),
         ([-30.0, 10.0], -0.00823663),
     ];
-    let ship = KelvinWake { filter_depth: 0.05, ..wake(Hull::wigley(10.0, 1.0, 0.625), 3.0, 90.0) };
-    let raster = Raster { origin_row: 2000, origin_column: 4000, ..Raster::image(4001, 4001, 0.01) };
+    let ship = KelvinWake {
+        filter_depth: 0.05,
+        ..wake(Hull::wigley(10.0, 1.0, 0.625), 3.0, 90.0)
+    };
+    let raster = Raster {
+        origin_row: 2000,
+        origin_column: 4000,
+        ..Raster::image(4001, 4001, 0.01)
+    };
     let places: Vec<[f64; 2]> = small.iter().map(|p| p.0).collect();
     for (value, row) in elevations(&ship, &raster, &places, 1e-6).iter().zip(small) {
         // The page states that two quadratures agree to 1.1e-6 m at the last point.

@@ -78,8 +78,8 @@ impl Gridding {
             let half = (0.5 * oversampling * n as f64).ceil() as usize;
             2 * fast_length(half.max(WIDEST))
         });
-        let actual = (lattice[0] as f64 / raster.rows as f64)
-            .min(lattice[1] as f64 / raster.columns as f64);
+        let actual =
+            (lattice[0] as f64 / raster.rows as f64).min(lattice[1] as f64 / raster.columns as f64);
         Self {
             kernel: Kernel::new(error, actual.min(4.0)),
             lattice,

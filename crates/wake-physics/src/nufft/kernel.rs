@@ -33,7 +33,9 @@ impl Kernel {
     pub(crate) fn new(error: f64, oversampling: f64) -> Self {
         // One less than the known rule of thumb: the aliases are then computed, not trusted.
         let decay = PI * (1.0 - 1.0 / oversampling).sqrt();
-        let guess = ((0.25 / error).ln() / decay).floor().clamp(2.0, WIDEST as f64) as usize;
+        let guess = ((0.25 / error).ln() / decay)
+            .floor()
+            .clamp(2.0, WIDEST as f64) as usize;
         let mut kernel = Self::of_width(guess, oversampling);
         while kernel.error > error && kernel.width < WIDEST {
             kernel = Self::of_width(kernel.width + 1, oversampling);
@@ -58,7 +60,10 @@ impl Kernel {
         let aliases = (0..8).map(|i| {
             let part = edge - f64::from(i) / (8.0 * width as f64);
             let tiles = [part - 1.0, part + 1.0, part - 2.0];
-            let sum: f64 = tiles.iter().map(|&t| kernel.transform(&weights, t).abs()).sum();
+            let sum: f64 = tiles
+                .iter()
+                .map(|&t| kernel.transform(&weights, t).abs())
+                .sum();
             sum / kernel.transform(&weights, part)
         });
         kernel.error = aliases.fold(0.0, f64::max);
@@ -112,7 +117,12 @@ mod tests {
     /// A sum over the lattice of the spread wave, corrected, is the wave to the error the kernel states.
     #[test]
     fn spread_wave_comes_back() {
-        for (error, pixels, lattice) in [(1e-3, 40, 60), (1e-6, 41, 64), (1e-9, 30, 60), (1e-4, 48, 60)] {
+        for (error, pixels, lattice) in [
+            (1e-3, 40, 60),
+            (1e-6, 41, 64),
+            (1e-9, 30, 60),
+            (1e-4, 48, 60),
+        ] {
             let kernel = Kernel::new(error, lattice as f64 / pixels as f64);
             assert!(kernel.error <= error && kernel.width <= WIDEST);
             let correction = kernel.correction(pixels, lattice);
@@ -121,10 +131,12 @@ mod tests {
                 for i in 0..pixels {
                     let p = i as f64 - (pixels / 2) as f64;
                     let wave = |x: f64| (std::f64::consts::TAU * p * x / lattice as f64).cos();
-                    let sum: f64 = (-40..40).map(|l| {
-                        let l = f64::from(l);
-                        kernel.value(l - g) * wave(l - g)
-                    }).sum();
+                    let sum: f64 = (-40..40)
+                        .map(|l| {
+                            let l = f64::from(l);
+                            kernel.value(l - g) * wave(l - g)
+                        })
+                        .sum();
                     worst = worst.max((sum * correction[i] - 1.0).abs());
                 }
             }

@@ -29,7 +29,13 @@ fn scattered(raster: &Raster, count: usize) -> PlaneWaves {
         waves.push(k, 3.0, Complex64::from_polar(0.2 + a, phase));
     }
     // The corners and edges of the band, the mean, and twice the same wave.
-    for k in [[band, band], [-band, 0.0], [0.0, band], [0.0, 0.0], [0.1 * band, 0.0]] {
+    for k in [
+        [band, band],
+        [-band, 0.0],
+        [0.0, band],
+        [0.0, 0.0],
+        [0.1 * band, 0.0],
+    ] {
         waves.push(k, 3.0, Complex64::new(0.7, -0.4));
     }
     waves
@@ -82,7 +88,10 @@ fn tolerance_is_met_at_every_level() {
         let waves = scattered(&raster, 150);
         for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
             for (error, q) in errors(&waves, &raster, tolerance).into_iter().zip(ALL) {
-                assert!(error <= tolerance, "{q:?} {error:e} > {tolerance:e} on {raster:?}");
+                assert!(
+                    error <= tolerance,
+                    "{q:?} {error:e} > {tolerance:e} on {raster:?}"
+                );
             }
         }
     }

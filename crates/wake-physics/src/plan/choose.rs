@@ -26,21 +26,27 @@ pub(crate) struct Effect {
     pub(crate) absent: Option<&'static str>,
 }
 
-/// Chooses terms. By rule "needed" terms are left out from the smallest bound up, as long as the sum of
-/// the bounds left out stays within `budget`; speckle, which is no part of the image before speckle, has
-/// the budget for itself.
-pub(crate) fn choose(effects: &[Effect], terms: &Terms, budget: f64) -> Vec<PlannedTerm> {
+/// Share of the tolerance that terms left out may use; the rest is for the numerical methods.
+const SHARE_OF_TERMS: f64 = 0.5;
+
+/// Chooses terms. By rule "needed" terms are left out from the smallest bound up, as long as the sum of the bounds
+/// left out stays within their share of the tolerance; speckle, which is no part of the image before speckle, has
+/// the tolerance for itself.
+pub(crate) fn choose(effects: &[Effect], terms: &Terms, tolerance: f64) -> Vec<PlannedTerm> {
     let mut order: Vec<&Effect> = effects.iter().filter(|e| e.term != Term::Speckle).collect();
     order.sort_by(|a, b| a.bound.total_cmp(&b.bound));
     let mut left_out = Vec::new();
     let mut sum = 0.0;
     for effect in order {
         sum += effect.bound;
-        if sum <= budget {
+        if sum <= SHARE_OF_TERMS * tolerance {
             left_out.push(effect.term);
         }
     }
-    if effects.iter().any(|e| e.term == Term::Speckle && e.bound <= budget) {
+    if effects
+        .iter()
+        .any(|e| e.term == Term::Speckle && e.bound <= tolerance)
+    {
         left_out.push(Term::Speckle);
     }
     effects
@@ -55,9 +61,10 @@ fn planned(effect: &Effect, terms: &Terms, below_budget: bool) -> PlannedTerm {
         (None, Terms::List(list)) if list.contains(&effect.term) => (true, "asked for".to_owned()),
         (None, Terms::List(_)) => (false, "not in model.terms".to_owned()),
         (None, Terms::Rule(TermRule::All)) => (true, "all terms asked for".to_owned()),
-        (None, Terms::Rule(TermRule::Needed)) if below_budget => {
-            (false, "changes less than the tolerance leaves room for".to_owned())
-        }
+        (None, Terms::Rule(TermRule::Needed)) if below_budget => (
+            false,
+            "changes less than the tolerance leaves room for".to_owned(),
+        ),
         (None, Terms::Rule(TermRule::Needed)) => {
             (true, "may change more than the tolerance".to_owned())
         }
@@ -65,7 +72,11 @@ fn planned(effect: &Effect, terms: &Terms, below_budget: bool) -> PlannedTerm {
     PlannedTerm {
         term: effect.term,
         used,
-        bound: if effect.absent.is_some() { 0.0 } else { effect.bound },
+        bound: if effect.absent.is_some() {
+            0.0
+        } else {
+            effect.bound
+        },
         why,
     }
 }
@@ -83,19 +94,22 @@ mod tests {
     }
 
     fn used(effects: &[Effect], terms: &Terms) -> Vec<bool> {
-        choose(effects, terms, 1e-3).iter().map(|t| t.used).collect()
+        choose(effects, terms, 1e-3)
+            .iter()
+            .map(|t| t.used)
+            .collect()
     }
 
     #[test]
     fn small_terms_go_until_the_budget_is_spent() {
         let effects = [
-            effect(Term::Sea, 0.6e-3),
-            effect(Term::Kelvin, 0.3e-3),
-            effect(Term::Specular, 0.2e-3),
+            effect(Term::Sea, 0.3e-3),
+            effect(Term::Kelvin, 0.15e-3),
+            effect(Term::Specular, 0.1e-3),
             effect(Term::Bunching, 1.0),
         ];
         let needed = Terms::Rule(TermRule::Needed);
-        // 0.2 + 0.3 fit into 1.0; with 0.6 it would be 1.1.
+        // 0.1 + 0.15 fit into half of 1; with 0.3 it would be 0.55.
         assert_eq!(used(&effects, &needed), [true, false, false, true]);
         assert_eq!(used(&effects, &Terms::Rule(TermRule::All)), [true; 4]);
         let list = Terms::List(vec![Term::Kelvin]);
@@ -104,8 +118,11 @@ mod tests {
 
     #[test]
     fn speckle_is_judged_alone() {
-        let effects = [effect(Term::Sea, 0.9e-3), effect(Term::Speckle, 0.9e-3)];
-        assert_eq!(used(&effects, &Terms::Rule(TermRule::Needed)), [false, false]);
+        let effects = [effect(Term::Sea, 0.4e-3), effect(Term::Speckle, 0.9e-3)];
+        assert_eq!(
+            used(&effects, &Terms::Rule(TermRule::Needed)),
+            [false, false]
+        );
     }
 
     #[test]

@@ -18,9 +18,6 @@ use crate::setup::Setup;
 use serde::Serialize;
 use situation::Situation;
 
-/// Share of the tolerance that terms left out may use; the rest is for the numerical methods.
-const SHARE_OF_TERMS: f64 = 0.5;
-
 /// Fields of four bytes a pixel that are alive at once, at most; the target of the design.
 const FIELDS_IN_MEMORY: u64 = 40;
 
@@ -83,8 +80,8 @@ impl Plan {
 
     pub(crate) fn of(scene: &Scene, setup: &Setup) -> Result<Self> {
         let situation = Situation::new(scene, setup);
-        let budget = SHARE_OF_TERMS * scene.model.tolerance;
-        let terms = choose::choose(&situation.effects(), &scene.model.terms, budget);
+        let effects = situation.effects();
+        let terms = choose::choose(&effects, &scene.model.terms, scene.model.tolerance);
         let margin = situation.margin(setup);
         let raster = setup.image.with_margin(margin[0], margin[1]);
         let needed = FIELDS_IN_MEMORY * 4 * raster.len() as u64;
@@ -135,8 +132,16 @@ impl std::fmt::Display for Plan {
         write!(
             f,
             "computed {} x {} pixels (margin {} x {}), sea lattice {} x {}, wake nodes {} + {}, table {} x {}",
-            s.computed[0], s.computed[1], s.margin[0], s.margin[1], s.sea_lattice[0], s.sea_lattice[1],
-            s.wake_nodes[0], s.wake_nodes[1], s.table[0], s.table[1]
+            s.computed[0],
+            s.computed[1],
+            s.margin[0],
+            s.margin[1],
+            s.sea_lattice[0],
+            s.sea_lattice[1],
+            s.wake_nodes[0],
+            s.wake_nodes[1],
+            s.table[0],
+            s.table[1]
         )
     }
 }

@@ -77,10 +77,10 @@ pub(crate) fn wake(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Raster;
     use crate::scene::{SpectrumModel, SpreadingModel};
     use crate::waves::{Quantity, Transfer, harmonic_sum};
     use crate::wind_sea::WindSea;
-    use crate::Raster;
     use num_complex::Complex64;
 
     /// The bins have the variances of the band.
@@ -100,7 +100,10 @@ mod tests {
             let elevation: f64 = waves.iter().map(|w| w.variance).sum();
             let slope: f64 = waves.iter().map(|w| w.variance * w.k[0] * w.k[0]).sum();
             // Midpoint rule, 0.05 wide in ln k across a peak 0.2 wide: below a percent.
-            assert!((elevation / exact.elevation - 1.0).abs() < 0.01, "{wind_speed}");
+            assert!(
+                (elevation / exact.elevation - 1.0).abs() < 0.01,
+                "{wind_speed}"
+            );
             assert!((slope / exact.slope_xx - 1.0).abs() < 0.01, "{wind_speed}");
         }
     }
@@ -131,7 +134,13 @@ mod tests {
             for a in &mut shifted.amplitude {
                 *a *= Complex64::cis(shift);
             }
-            let zeta = harmonic_sum(&shifted, &transfer, &[Quantity::Elevation], &raster, &pixels);
+            let zeta = harmonic_sum(
+                &shifted,
+                &transfer,
+                &[Quantity::Elevation],
+                &raster,
+                &pixels,
+            );
             integral += 0.5 * 0.5 * zeta[0].iter().map(|z| z * z).sum::<f64>();
         }
         assert!((sum / integral - 1.0).abs() < 1e-3, "{sum} {integral}");

@@ -40,6 +40,8 @@ pub(crate) struct Situation {
     pub(crate) mean: [f64; 2],
     /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
     pub(crate) backscatter: [f64; 2],
+    /// Pixel size [m].
+    pub(crate) spacing: f64,
     /// Number of looks.
     pub(crate) looks: f64,
     /// Why a term is absent from the scene.
@@ -65,7 +67,11 @@ impl Situation {
             image: LinearImage {
                 transfer: setup.transfer,
                 tilt,
-                bragg_share: if total > 0.0 { sensitivity.mean[0] / total } else { 0.0 },
+                bragg_share: if total > 0.0 {
+                    sensitivity.mean[0] / total
+                } else {
+                    0.0
+                },
                 range_to_velocity: setup.range_to_velocity,
             },
             curvature,
@@ -73,6 +79,7 @@ impl Situation {
             damping: damping(setup),
             mean: sensitivity.mean,
             backscatter: [sensitivity.tilt_average, sensitivity.specular],
+            spacing: scene.grid.spacing,
             looks: f64::from(scene.radar.looks),
             absent: Vec::new(),
         };
@@ -88,7 +95,9 @@ impl Situation {
         let kelvin = match ship {
             None => Some("there is no ship"),
             Some(w) if w.speed == 0.0 => Some("the ship is at rest"),
-            Some(_) if self.wake.is_empty() => Some("no wave that a pixel carries reaches the image"),
+            Some(_) if self.wake.is_empty() => {
+                Some("no wave that a pixel carries reaches the image")
+            }
             Some(_) => None,
         };
         let turbulent = match ship {
@@ -98,7 +107,10 @@ impl Situation {
             Some(_) if self.damping == 0.0 => Some("it does not reach the image"),
             Some(_) => None,
         };
-        let sea = self.sea.is_empty().then_some("no wind wave that a pixel carries");
+        let sea = self
+            .sea
+            .is_empty()
+            .then_some("no wind wave that a pixel carries");
         let flat = no_waves.then_some("there are no resolved waves");
         let still = (setup.range_to_velocity == 0.0).then_some("R/V is 0");
         let bragg = no_bragg.then_some("there are no short waves to scatter");
@@ -146,13 +158,20 @@ impl Situation {
 fn sampled_wake(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
     let corners = wake.track.corners(image);
     let length = wake.hull.length();
-    let farthest = corners.iter().map(|c| 0.5 * length - c[0]).fold(0.0, f64::max);
-    let nearest = corners.iter().map(|c| -0.5 * length - c[0]).fold(f64::INFINITY, f64::min);
+    let farthest = corners
+        .iter()
+        .map(|c| 0.5 * length - c[0])
+        .fold(0.0, f64::max);
+    let nearest = corners
+        .iter()
+        .map(|c| -0.5 * length - c[0])
+        .fold(f64::INFINITY, f64::min);
     let nodes = wake.waves(&wake.plan(image, COARSE));
     let area = image.len() as f64 * image.spacing.powi(2);
-    let diagonal = (area * (image.rows as f64 / image.columns as f64
-        + image.columns as f64 / image.rows as f64
-        + 2.0))
+    let diagonal = (area
+        * (image.rows as f64 / image.columns as f64
+            + image.columns as f64 / image.rows as f64
+            + 2.0))
         .sqrt();
     let track_length = farthest.min(diagonal).min(farthest - nearest.min(0.0));
     let waves = sample::wake(&nodes, wake.track.forward, track_length, area);
@@ -199,11 +218,17 @@ fn damping(setup: &Setup) -> f64 {
     };
     let turbulent = TurbulentWake::of(wake);
     let image = &setup.image;
-    let (rows, columns) = (image.rows.min(DAMPING_POINTS), image.columns.min(DAMPING_POINTS));
+    let (rows, columns) = (
+        image.rows.min(DAMPING_POINTS),
+        image.columns.min(DAMPING_POINTS),
+    );
     let mut sum = 0.0;
     for i in 0..rows {
         for j in 0..columns {
-            let (x, y) = (image.x(j * image.columns / columns), image.y(i * image.rows / rows));
+            let (x, y) = (
+                image.x(j * image.columns / columns),
+                image.y(i * image.rows / rows),
+            );
             sum += turbulent.damping_at([x, y]).powi(2);
         }
     }

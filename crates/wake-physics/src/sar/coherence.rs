@@ -165,8 +165,8 @@ mod tests {
             let variance =
                 0.5 * alpha * GRAVITY.powi(2) * integral(0.0, end, |s| (-b * s * s).exp());
             let time = coherence_time(WAVELENGTH, variance.sqrt());
-            let erf = 2.0 / PI.sqrt()
-                * integral(0.0, 2.69 * cell / (wind * wind), |t| (-t * t).exp());
+            let erf =
+                2.0 / PI.sqrt() * integral(0.0, 2.69 * cell / (wind * wind), |t| (-t * t).exp());
             let closed = 1.742 * WAVELENGTH / wind / erf.sqrt();
             // The constants 1.742 and 2.69 are rounded to three digits.
             assert!((time / closed - 1.0).abs() < 2e-3, "{time} {closed}");
@@ -216,7 +216,8 @@ mod tests {
         let tau = coherence_time(WAVELENGTH, deviation);
         for looks in [1, 4, 16] {
             let n = f64::from(looks);
-            let ours = AzimuthResolution::of_moving_sea(WAVELENGTH, ratio, (single, looks), deviation);
+            let ours =
+                AzimuthResolution::of_moving_sea(WAVELENGTH, ratio, (single, looks), deviation);
             let theirs = n * single * (1.0 + (time / (n * tau)).powi(2)).sqrt();
             assert!((ours.at(0.0) / theirs - 1.0).abs() < 1e-12);
         }

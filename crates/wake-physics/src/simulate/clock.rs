@@ -25,8 +25,15 @@ impl std::fmt::Display for Seconds {
         write!(
             f,
             "{:.1} ms: plan {:.1}, sea {:.1}, kelvin {:.1}, turbulent {:.1}, backscatter {:.1}, imaging {:.1}, speckle {:.1}, labels {:.1}",
-            ms(self.total), ms(self.plan), ms(self.sea), ms(self.kelvin), ms(self.turbulent),
-            ms(self.backscatter), ms(self.imaging), ms(self.speckle), ms(self.labels)
+            ms(self.total),
+            ms(self.plan),
+            ms(self.sea),
+            ms(self.kelvin),
+            ms(self.turbulent),
+            ms(self.backscatter),
+            ms(self.imaging),
+            ms(self.speckle),
+            ms(self.labels)
         )
     }
 }
@@ -40,7 +47,10 @@ pub(crate) struct Clock {
 impl Clock {
     pub(crate) fn start() -> Self {
         let now = Instant::now();
-        Self { start: now, lap: now }
+        Self {
+            start: now,
+            lap: now,
+        }
     }
 
     /// Seconds since the last lap.

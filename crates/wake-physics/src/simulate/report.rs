@@ -38,10 +38,20 @@ impl Simulation {
         let grey = GreyScale::default();
         let level = |&power: &f32| grey.level(f64::from(power));
         let pixels: Vec<u8> = self.speckled.values.iter().map(level).collect();
-        output::write_png(&path("image.png"), &pixels, self.raster.rows, self.raster.columns)?;
+        output::write_png(
+            &path("image.png"),
+            &pixels,
+            self.raster.rows,
+            self.raster.columns,
+        )?;
         output::write_fields(&path("fields.safetensors"), &self.named_fields())?;
         output::write_json(&path("labels.json"), &self.labels)?;
-        let names = ["image.png", "fields.safetensors", "labels.json", "report.json"];
+        let names = [
+            "image.png",
+            "fields.safetensors",
+            "labels.json",
+            "report.json",
+        ];
         let report = json!({
             "method": self.method,
             "seconds": self.seconds,

@@ -1,8 +1,8 @@
 //! One function a stage: what it takes from the plan, and which method it calls.
 
 use super::Method;
-use crate::kelvin;
 use crate::constants::SEA_WATER_DENSITY;
+use crate::kelvin;
 use crate::labels::{Labels, Track as LabelTrack};
 use crate::nufft;
 use crate::plan::Plan;
@@ -70,7 +70,9 @@ impl<'a> Run<'a> {
             scene,
             setup,
             method,
-            raster: setup.image.with_margin(plan.sizes.margin[0], plan.sizes.margin[1]),
+            raster: setup
+                .image
+                .with_margin(plan.sizes.margin[0], plan.sizes.margin[1]),
             quantities,
         }
     }
@@ -99,7 +101,11 @@ impl<'a> Run<'a> {
 
     fn collect(&self, fields: Vec<Field>, plan: &Plan) -> SurfaceFields {
         let mut fields = fields.into_iter();
-        let mut next = || fields.next().unwrap_or_else(|| Field::constant(&self.raster, 0.0));
+        let mut next = || {
+            fields
+                .next()
+                .unwrap_or_else(|| Field::constant(&self.raster, 0.0))
+        };
         SurfaceFields {
             outputs: std::array::from_fn(|_| next()),
             acceleration: plan.uses(Term::Coherence).then(&mut next),
@@ -125,17 +131,23 @@ impl<'a> Run<'a> {
         for (field, wake) in fields.all().zip(&wake_fields) {
             let parts = field.values.par_chunks_mut(1 << 14);
             let parts = parts.zip(wake.values.par_chunks(1 << 14));
-            parts.zip(fade.values.par_chunks(1 << 14)).for_each(|((field, wake), fade)| {
-                for ((f, w), a) in field.iter_mut().zip(wake).zip(fade) {
-                    *f += w * a;
-                }
-            });
+            parts
+                .zip(fade.values.par_chunks(1 << 14))
+                .for_each(|((field, wake), fade)| {
+                    for ((f, w), a) in field.iter_mut().zip(wake).zip(fade) {
+                        *f += w * a;
+                    }
+                });
         }
     }
 
     /// What the turbulent wake leaves of the short waves.
     pub(super) fn damping(&self, plan: &Plan) -> Option<Field> {
-        let wake = self.setup.wake.as_ref().filter(|_| plan.uses(Term::Turbulent))?;
+        let wake = self
+            .setup
+            .wake
+            .as_ref()
+            .filter(|_| plan.uses(Term::Turbulent))?;
         Some(TurbulentWake::of(wake).remaining(&self.raster))
     }
 
@@ -217,7 +229,9 @@ impl<'a> Run<'a> {
 
     /// Azimuth displacement of the ship's echo [m].
     fn displacement(&self) -> f64 {
-        let Some(ship) = &self.scene.ship else { return 0.0 };
+        let Some(ship) = &self.scene.ship else {
+            return 0.0;
+        };
         let velocity = ship_radial_velocity(ship.speed, ship.heading, self.setup.incidence);
         azimuth_displacement(self.setup.range_to_velocity, velocity)
     }
@@ -253,7 +267,10 @@ impl<'a> Run<'a> {
 
 impl SurfaceFields {
     fn all(&mut self) -> impl Iterator<Item = &mut Field> {
-        let more = self.acceleration.iter_mut().chain(self.modulation.iter_mut());
+        let more = self
+            .acceleration
+            .iter_mut()
+            .chain(self.modulation.iter_mut());
         self.outputs.iter_mut().chain(more)
     }
 

@@ -24,11 +24,26 @@ fn every_corner_of_a_scene_is_sound() {
         &["ship.speed=0"],
         &["ship.speed=0.05"],
         // Froude number 0.05 and 1.5 of a 20 m boat.
-        &["ship.length=20", "ship.beam=4", "ship.draft=1", "ship.speed=0.7"],
-        &["ship.length=20", "ship.beam=4", "ship.draft=1", "ship.speed=21"],
+        &[
+            "ship.length=20",
+            "ship.beam=4",
+            "ship.draft=1",
+            "ship.speed=0.7",
+        ],
+        &[
+            "ship.length=20",
+            "ship.beam=4",
+            "ship.draft=1",
+            "ship.speed=21",
+        ],
         &["ship.speed=40", "sea.depth=5"],
         &["ship.length=1", "ship.beam=0.2", "ship.draft=0.1"],
-        &["ship.length=500", "ship.beam=100", "ship.draft=40", "ship.hull=full"],
+        &[
+            "ship.length=500",
+            "ship.beam=100",
+            "ship.draft=40",
+            "ship.hull=full",
+        ],
         &["ship.hull=full", "ship.block_coefficient=0.45"],
         &["ship.hull=full", "ship.block_coefficient=0.9"],
         &["ship.position=[1e6, 0]"],
@@ -41,7 +56,11 @@ fn every_corner_of_a_scene_is_sound() {
         &["radar.range_to_velocity=0"],
         &["radar.range_to_velocity=150"],
         &["radar.frequency=1e9", "grid.spacing=100"],
-        &["radar.frequency=2e10", "grid.spacing=0.1", "radar.resolution=0.5"],
+        &[
+            "radar.frequency=2e10",
+            "grid.spacing=0.1",
+            "radar.resolution=0.5",
+        ],
         &["radar.relaxation_rate=0.01", "radar.looks=1"],
         &["model.tolerance=1e-6", "ship.echo=true", "radar.looks=1000"],
     ];
@@ -68,7 +87,13 @@ fn every_shape_of_a_grid_is_sound() {
 fn no_wind_is_a_flat_sea() {
     let simulation = run(&open_sea(small(32, 32, &["sea.wind_speed=0"])));
     assert!(simulation.elevation.values.iter().all(|&v| v == 0.0));
-    assert!(simulation.intensity.values.iter().all(|&v| v == simulation.intensity.values[0]));
+    assert!(
+        simulation
+            .intensity
+            .values
+            .iter()
+            .all(|&v| v == simulation.intensity.values[0])
+    );
     assert!(!simulation.plan.uses(Term::Sea));
     assert!(!simulation.plan.notes.is_empty(), "the report says why");
     // With a ship its wake is there, on a flat sea.
@@ -83,7 +108,10 @@ fn ahead_of_the_ship_there_is_no_wake() {
         let assignments = [
             "sea.wind_speed=0".to_owned(),
             format!("ship.position={position}"),
-            format!("ship.heading={}", if position.starts_with("[-") { 270 } else { 90 }),
+            format!(
+                "ship.heading={}",
+                if position.starts_with("[-") { 270 } else { 90 }
+            ),
         ];
         let refs: Vec<&str> = assignments.iter().map(String::as_str).collect();
         let simulation = run(&small(48, 48, &refs));
@@ -113,7 +141,10 @@ fn the_same_scene_twice_is_the_same_image() {
 fn threads_change_nothing() {
     let scene = small(60, 52, &[]);
     let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| run(&scene))
     };
     let (one, two) = (on(1), on(3));
@@ -133,11 +164,41 @@ fn a_grid_too_large_for_memory_is_refused_with_what_it_needs() {
 }
 
 fn scenes() -> impl Strategy<Value = Scene> {
-    let sea = (0.0..=30.0f64, -720.0..720.0f64, 2.0..7.0f64, 0..3usize, 0..3usize, 0.0..4.0f64);
-    let ship = (1.0..400.0f64, 0.05..0.3f64, 0.03..0.1f64, 0.0..25.0f64, -400.0..400.0f64);
-    let radar = (9.0..10.3f64, 5.0..75.0f64, 0.0..200.0f64, 0.5..100.0f64, 1..100u32);
-    let grid = (1..40usize, 1..40usize, -1.0..2.0f64, any::<u64>(), 1.0..6.0f64);
-    let shape = (any::<[bool; 4]>(), -600.0..600.0f64, -600.0..600.0f64, 0.0..1e5f64);
+    let sea = (
+        0.0..=30.0f64,
+        -720.0..720.0f64,
+        2.0..7.0f64,
+        0..3usize,
+        0..3usize,
+        0.0..4.0f64,
+    );
+    let ship = (
+        1.0..400.0f64,
+        0.05..0.3f64,
+        0.03..0.1f64,
+        0.0..25.0f64,
+        -400.0..400.0f64,
+    );
+    let radar = (
+        9.0..10.3f64,
+        5.0..75.0f64,
+        0.0..200.0f64,
+        0.5..100.0f64,
+        1..100u32,
+    );
+    let grid = (
+        1..40usize,
+        1..40usize,
+        -1.0..2.0f64,
+        any::<u64>(),
+        1.0..6.0f64,
+    );
+    let shape = (
+        any::<[bool; 4]>(),
+        -600.0..600.0f64,
+        -600.0..600.0f64,
+        0.0..1e5f64,
+    );
     (sea, ship, radar, grid, shape).prop_map(|(sea, ship, radar, grid, shape)| {
         let mut s = Scene::default();
         s.seed = grid.3;
@@ -145,9 +206,21 @@ fn scenes() -> impl Strategy<Value = Scene> {
         (s.sea.wind_speed, s.sea.wind_toward) = (sea.0, sea.1);
         s.sea.fetch = 10f64.powf(sea.2);
         use wake_physics::scene::{HullForm, Polarization, SpectrumModel, SpreadingModel};
-        s.sea.spectrum = [SpectrumModel::Elfouhaily, SpectrumModel::Jonswap, SpectrumModel::PiersonMoskowitz][sea.3];
-        s.sea.spreading = [SpreadingModel::Hasselmann, SpreadingModel::Mitsuyasu, SpreadingModel::Elfouhaily][sea.4];
-        s.sea.depth = if shape.0[3] { f64::INFINITY } else { 10f64.powf(sea.5) };
+        s.sea.spectrum = [
+            SpectrumModel::Elfouhaily,
+            SpectrumModel::Jonswap,
+            SpectrumModel::PiersonMoskowitz,
+        ][sea.3];
+        s.sea.spreading = [
+            SpreadingModel::Hasselmann,
+            SpreadingModel::Mitsuyasu,
+            SpreadingModel::Elfouhaily,
+        ][sea.4];
+        s.sea.depth = if shape.0[3] {
+            f64::INFINITY
+        } else {
+            10f64.powf(sea.5)
+        };
         s.sea.time = shape.3;
         let vessel = s.ship.as_mut().unwrap();
         vessel.length = ship.0;
@@ -155,10 +228,18 @@ fn scenes() -> impl Strategy<Value = Scene> {
         vessel.draft = (ship.0 * ship.2).clamp(0.1, 40.0).min(0.9 * ship.0);
         (vessel.speed, vessel.heading) = (ship.3, ship.4);
         vessel.position = [shape.1, shape.2];
-        vessel.hull = if shape.0[0] { HullForm::Full } else { HullForm::Wigley };
+        vessel.hull = if shape.0[0] {
+            HullForm::Full
+        } else {
+            HullForm::Wigley
+        };
         vessel.echo = shape.0[1];
         s.radar.frequency = 10f64.powf(radar.0);
-        s.radar.polarization = if shape.0[2] { Polarization::HH } else { Polarization::VV };
+        s.radar.polarization = if shape.0[2] {
+            Polarization::HH
+        } else {
+            Polarization::VV
+        };
         s.radar.incidence = radar.1;
         s.radar.range_to_velocity = radar.2;
         s.radar.resolution = radar.3;
@@ -188,17 +269,25 @@ proptest! {
 #[test]
 fn the_variance_is_what_the_spectrum_says() {
     use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
-    for (wind, spacing, spectrum) in [(3.0, 1.0, "elfouhaily"), (7.0, 2.5, "jonswap"), (12.0, 5.0, "elfouhaily")] {
+    for (wind, spacing, spectrum) in [
+        (3.0, 1.0, "elfouhaily"),
+        (7.0, 2.5, "jonswap"),
+        (12.0, 5.0, "elfouhaily"),
+    ] {
         let mut sum = 0.0;
         let count = 24;
         let mut expected = 0.0;
         for seed in 0..count {
-            let scene = open_sea(small(96, 96, &[
-                &format!("sea.wind_speed={wind}"),
-                &format!("grid.spacing={spacing}"),
-                &format!("sea.spectrum={spectrum}"),
-                &format!("seed={seed}"),
-            ]));
+            let scene = open_sea(small(
+                96,
+                96,
+                &[
+                    &format!("sea.wind_speed={wind}"),
+                    &format!("grid.spacing={spacing}"),
+                    &format!("sea.spectrum={spectrum}"),
+                    &format!("seed={seed}"),
+                ],
+            ));
             let simulation = run(&scene);
             sum += simulation.elevation.rms().powi(2);
             let sea = WindSea {
@@ -210,9 +299,14 @@ fn the_variance_is_what_the_spectrum_says() {
                 spreading: scene.sea.spreading,
             };
             let band = simulation.raster.nyquist_wavenumber();
-            expected = DirectionalSpectrum::new(&sea).moments(0.0, band, 0.5).elevation;
+            expected = DirectionalSpectrum::new(&sea)
+                .moments(0.0, band, 0.5)
+                .elevation;
         }
         let mean = sum / f64::from(count);
-        assert!((mean / expected - 1.0).abs() < 0.6, "{wind} m/s: {mean} {expected}");
+        assert!(
+            (mean / expected - 1.0).abs() < 0.6,
+            "{wind} m/s: {mean} {expected}"
+        );
     }
 }

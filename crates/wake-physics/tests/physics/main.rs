@@ -31,12 +31,27 @@ fn assert_sound(simulation: &Simulation, what: &str) {
             (simulation.raster.rows, simulation.raster.columns),
             "{what}: {name}"
         );
-        assert!(field.values.iter().all(|v| v.is_finite()), "{what}: {name} is not finite");
+        assert!(
+            field.values.iter().all(|v| v.is_finite()),
+            "{what}: {name} is not finite"
+        );
     }
-    for field in [&simulation.sigma0, &simulation.intensity, &simulation.speckled] {
-        assert!(field.values.iter().all(|&v| v >= 0.0), "{what}: a negative power");
+    for field in [
+        &simulation.sigma0,
+        &simulation.intensity,
+        &simulation.speckled,
+    ] {
+        assert!(
+            field.values.iter().all(|&v| v >= 0.0),
+            "{what}: a negative power"
+        );
     }
     let plan = &simulation.plan;
     assert_eq!(plan.terms.len(), 10, "{what}");
-    assert!(plan.terms.iter().all(|t| t.bound.is_finite() && t.bound >= 0.0), "{what}: {plan}");
+    assert!(
+        plan.terms
+            .iter()
+            .all(|t| t.bound.is_finite() && t.bound >= 0.0),
+        "{what}: {plan}"
+    );
 }

@@ -8,11 +8,31 @@ use wake_physics::{Method, simulate_with};
 fn the_tolerance_is_met_at_every_level() {
     for (tolerance, assignments) in [
         (1e-1, &["ship.position=[30, 30]"][..]),
-        (1e-2, &["ship.position=[30, 30]", "radar.range_to_velocity=30"]),
+        (
+            1e-2,
+            &["ship.position=[30, 30]", "radar.range_to_velocity=30"],
+        ),
         (1e-3, &["ship.position=[30, 30]", "sea.wind_toward=20"]),
-        (1e-3, &["ship.position=[60, 0]", "ship.heading=90", "radar.incidence=20"]),
-        (1e-4, &["ship.position=[30, 30]", "radar.range_to_velocity=40", "radar.polarization=HH"]),
-        (1e-5, &["ship.position=[30, 30]", "radar.range_to_velocity=20"]),
+        (
+            1e-3,
+            &[
+                "ship.position=[60, 0]",
+                "ship.heading=90",
+                "radar.incidence=20",
+            ],
+        ),
+        (
+            1e-4,
+            &[
+                "ship.position=[30, 30]",
+                "radar.range_to_velocity=40",
+                "radar.polarization=HH",
+            ],
+        ),
+        (
+            1e-5,
+            &["ship.position=[30, 30]", "radar.range_to_velocity=20"],
+        ),
     ] {
         let mut scene = small(28, 24, assignments);
         scene.model.tolerance = tolerance;
@@ -24,10 +44,18 @@ fn the_tolerance_is_met_at_every_level() {
             match name {
                 "speckled" => {}
                 "intensity" | "sigma0" => {
-                    assert!(rms <= tolerance * b.mean(), "{tolerance} {name}: {rms} of {}", b.mean());
+                    assert!(
+                        rms <= tolerance * b.mean(),
+                        "{tolerance} {name}: {rms} of {}",
+                        b.mean()
+                    );
                 }
                 // A field's own rounding to f32 is part of the tolerance: 6e-8 of its largest value.
-                _ => assert!(max <= tolerance * b.rms(), "{tolerance} {name}: {max} of {}", b.rms()),
+                _ => assert!(
+                    max <= tolerance * b.rms(),
+                    "{tolerance} {name}: {max} of {}",
+                    b.rms()
+                ),
             }
         }
     }

@@ -20,7 +20,8 @@ fn fluctuation(scene: &Scene, heading: f64) -> f64 {
                 let (x, y) = (raster.x(j), raster.y(i));
                 let (astern, aside) = (-(x * sin + y * cos), (x * cos - y * sin).abs());
                 // Between one and three ship's lengths astern of midship, inside 19.47°.
-                if (195.0..585.0).contains(&astern) && aside < astern * 19.47f64.to_radians().tan() {
+                if (195.0..585.0).contains(&astern) && aside < astern * 19.47f64.to_radians().tan()
+                {
                     let value = f64::from(simulation.intensity.at(i, j));
                     count += 1.0;
                     first += value;
@@ -53,14 +54,20 @@ fn the_wake_of_the_default_scene_stands_out() {
 fn the_wake_drowns_in_wind() {
     let contrasts = ["3", "5", "7"].map(|wind| contrast(&[&format!("sea.wind_speed={wind}")]));
     println!("wind 3, 5, 7: {contrasts:?}");
-    assert!(contrasts[0] > contrasts[1] && contrasts[1] > contrasts[2], "{contrasts:?}");
+    assert!(
+        contrasts[0] > contrasts[1] && contrasts[1] > contrasts[2],
+        "{contrasts:?}"
+    );
 }
 
 #[test]
 fn faster_ships_make_stronger_wakes() {
     let contrasts = ["8", "10", "12"].map(|speed| contrast(&[&format!("ship.speed={speed}")]));
     println!("speed 8, 10, 12: {contrasts:?}");
-    assert!(contrasts[0] < contrasts[1] && contrasts[1] < contrasts[2], "{contrasts:?}");
+    assert!(
+        contrasts[0] < contrasts[1] && contrasts[1] < contrasts[2],
+        "{contrasts:?}"
+    );
 }
 
 #[test]
