@@ -99,7 +99,7 @@ pub struct Transfer {
 
 /// Strength of the hydrodynamic modulation for a spectrum falling with k⁻⁴ (Alpers, Ross and Rufenach 1981,
 /// J. Geophys. Res. 86, with γ = 1/2): 4 + γ.
-const BRAGG_SPECTRUM_STEEPNESS: f64 = 4.5;
+pub(crate) const BRAGG_SPECTRUM_STEEPNESS: f64 = 4.5;
 
 impl Transfer {
     /// Complex factor T of a quantity: the field is Σ Re[T·a·exp(i k·x)].

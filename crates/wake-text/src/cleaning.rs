@@ -159,3 +159,74 @@ fn collect(text: impl Iterator<Item = Traced>) -> Cleaned {
         origin: Some(origin),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn each_rule_does_what_its_table_says() {
+        let cases = [
+            ("&amp;lt; &#39;x&#x27; &nosuch; &;", "< 'x' &nosuch; &;"),
+            ("a < b &amp; c", "a < b &amp; c"),
+            ("a\0b\u{B}c\x1B\x7F\u{FEFF}d", "abcd"),
+            ("\u{201C}it\u{2019}s\u{201D} \u{2BC}", "\"it's\" '"),
+            ("\u{FB01}n \u{FB04}", "fin ffl"),
+            ("\u{FF33}\u{FF21}\u{FF32}\u{3000}\u{FF11}", "sar 1"),
+            ("e\u{301}", "\u{E9}"),
+            ("\u{1100}\u{1161}\u{11A8}", "\u{AC01}"),
+            ("\u{39F}\u{394}\u{39F}\u{3A3} \u{3A3}", "οδος σ"),
+            ("\u{130}", "i\u{307}"),
+        ];
+        for (prompt, expected) in cases {
+            assert_eq!(clean(prompt).text, expected, "{prompt:?}");
+        }
+    }
+
+    #[test]
+    fn nested_entities_are_decoded_in_linear_time() {
+        let prompt = format!("&{}", "amp;".repeat(100_000));
+        assert_eq!(clean(&prompt).text, "&");
+    }
+
+    #[test]
+    fn the_origin_is_where_a_byte_came_from() {
+        let cleaned = clean("&amp; e\u{301}\u{FB01}x");
+        assert_eq!(cleaned.text, "& \u{E9}fix");
+        let origins: Vec<usize> = (0..=cleaned.text.len())
+            .map(|at| cleaned.origin(at))
+            .collect();
+        // '&' 0, ' ' 5, the two bytes of 'é' 6, 'f' and 'i' 9, 'x' 12; past the end the number itself.
+        assert_eq!(origins, [0, 5, 6, 6, 9, 9, 12, 7]);
+    }
+
+    proptest! {
+        #[test]
+        fn composing_by_groups_is_composing_at_once(
+            text in "(\\PC|[\u{300}-\u{330}\u{1100}-\u{11FF}\u{9BE}\u{9C7}\u{9D7}]){0,40}"
+        ) {
+            let traced: Vec<Traced> = text.char_indices().map(|(at, c)| (c, at)).collect();
+            let composed: String = compose(&traced).iter().map(|&(c, _)| c).collect();
+            prop_assert_eq!(composed, text.nfc().collect::<String>());
+        }
+
+        #[test]
+        fn plain_ascii_becomes_lower_case_only(text in "[ -%'-~\t\n\r]{0,80}") {
+            let slow = collect(lower(&compose(&replace_forms(&decode_entities(&text)))));
+            let fast = clean(&text);
+            prop_assert_eq!(&fast.text, &text.to_lowercase());
+            prop_assert_eq!(&slow.text, &fast.text);
+            prop_assert!((0..text.len()).all(|at| slow.origin(at) == at && fast.origin(at) == at));
+        }
+
+        #[test]
+        fn origins_rise_and_are_character_boundaries(prompt in any::<String>()) {
+            let cleaned = clean(&prompt);
+            let origins: Vec<usize> =
+                (0..cleaned.text.len()).map(|at| cleaned.origin(at)).collect();
+            prop_assert!(origins.is_sorted());
+            prop_assert!(origins.iter().all(|&at| prompt.is_char_boundary(at)));
+        }
+    }
+}

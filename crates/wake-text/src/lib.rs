@@ -3,12 +3,23 @@
 #![cfg_attr(not(test), warn(unused_crate_dependencies))]
 
 mod error;
+
+// Scene → prompt.
 mod statement;
 mod wording;
+
+// Prompt → stated values.
+mod pieces;
+mod quantities;
+mod reading;
+mod subjects;
+
+// Prompt → tokens.
 mod cleaning;
-mod vocabulary_files;
-mod vocabulary;
 mod tokenizer;
+mod vocabulary;
+mod vocabulary_files;
+mod words;
 
 pub use error::{Error, Result};
 pub use statement::PartialScene;

@@ -98,3 +98,63 @@ fn tenths(value: f64) -> f64 {
 fn direction(degrees: f64) -> f64 {
     degrees.rem_euclid(360.0).round() % 360.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unsaid_values_are_those_of_the_base() {
+        let mut base = Scene::default();
+        base.sea.depth = 12.0;
+        let said = PartialScene {
+            ship_speed: Some(3.0),
+            fetch: Some(500.0),
+            ..PartialScene::default()
+        };
+        let mut expected = base.clone();
+        expected.ship.as_mut().unwrap().speed = 3.0;
+        expected.sea.fetch = 500.0;
+        assert_eq!(said.onto(&base), Ok(expected));
+        assert_eq!(PartialScene::default().onto(&base), Ok(base));
+    }
+
+    #[test]
+    fn a_ship_comes_and_goes_as_stated() {
+        let open_sea = Scene {
+            ship: None,
+            ..Scene::default()
+        };
+        let said = |ship, ship_heading| PartialScene {
+            ship,
+            ship_heading,
+            ..PartialScene::default()
+        };
+        assert_eq!(said(None, None).onto(&open_sea).unwrap().ship, None);
+        assert_eq!(
+            said(Some(true), None).onto(&open_sea).unwrap().ship,
+            Some(Ship::default())
+        );
+        let ship = said(None, Some(7.0)).onto(&open_sea).unwrap().ship.unwrap();
+        assert_eq!(
+            ship,
+            Ship {
+                heading: 7.0,
+                ..Ship::default()
+            }
+        );
+        assert_eq!(
+            said(Some(false), None).onto(&Scene::default()),
+            Ok(open_sea)
+        );
+    }
+
+    #[test]
+    fn values_outside_their_range_make_no_scene() {
+        let said = PartialScene {
+            incidence: Some(76.0),
+            ..PartialScene::default()
+        };
+        assert!(matches!(said.onto(&Scene::default()), Err(Error::Scene(_))));
+    }
+}

@@ -3,10 +3,10 @@
 use crate::cleaning::{Cleaned, clean};
 use crate::error::Result;
 use crate::vocabulary::{END_MARK, START_MARK, Vocabulary, to_symbols};
+use crate::words::for_words;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::LazyLock;
-use tokenizers::{Model, utils::SysRegex};
 
 /// Number of tokens the text encoder of CLIP takes, start and end mark included.
 pub const TOKENS: usize = 77;
@@ -50,11 +50,7 @@ impl Tokens {
 #[derive(Debug)]
 pub struct Tokenizer {
     vocabulary: Vocabulary,
-    words: SysRegex,
 }
-
-/// Words of a cleaned prompt: English contractions, letters, one digit, or a run of anything else.
-const WORD: &str = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+";
 
 impl Tokenizer {
     /// The tokenizer of Stable Diffusion v1: CLIP's vocabulary of 49,408 tokens, padded with the end mark.
@@ -103,13 +99,15 @@ impl Tokenizer {
     }
 
     fn new(vocabulary: Vocabulary) -> Self {
-        Self {
-            vocabulary,
-            words: SysRegex::new(WORD).expect("a constant pattern, compiled in every test"),
-        }
+        Self { vocabulary }
     }
 
     /// The tokens of a prompt; a longer one is cut, with the end mark kept last.
+    ///
+    /// The prompt is cleaned first, as Stable Diffusion does with `ftfy`, short of guesses. In this order:
+    /// HTML entities are decoded, unless there is a `<`; control characters go; curly quotes, ligatures and
+    /// full-width forms become the usual characters; Unicode form NFC; lower case. White space only separates
+    /// words. Text in a wrong encoding is not repaired. Printable ASCII without `&` only becomes lower case.
     ///
     /// The marks `<|startoftext|>` and `<|endoftext|>` within a prompt become their tokens, as in Stable
     /// Diffusion.
@@ -144,18 +142,14 @@ impl Tokenizer {
     }
 
     fn push_words(&self, text: &str, range: std::ops::Range<usize>, row: &mut Row) {
-        for (start, end) in self.words.find_iter(&text[range.clone()]) {
-            let start = range.start + start;
-            let word = &text[start..range.start + end];
+        for_words(&text[range.clone()], |word| {
+            let start = range.start + word.start;
+            let word = &text[start..range.start + word.end];
             let symbols = to_symbols(word);
-            // Cannot fail: an unknown symbol becomes the end mark, which is in every vocabulary.
-            let tokens = self.vocabulary.bpe.tokenize(&symbols).unwrap_or_default();
-            for token in tokens {
-                row.push(token.id, || {
-                    start + symbols[..token.offsets.0].chars().count()
-                });
-            }
-        }
+            self.vocabulary.for_tokens(&symbols, |id, at| {
+                row.push(id, || start + symbols[..at].chars().count());
+            });
+        });
     }
 }
 
@@ -199,6 +193,189 @@ impl Row {
             mask: std::array::from_fn(|i| i <= end),
             token_count: self.count + 1,
             truncated_at: self.cut.map(|at| cleaned.origin(at)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const START: u32 = 49406;
+    const END: u32 = 49407;
+
+    fn encode(prompt: &str) -> Tokens {
+        Tokenizer::clip().encode(prompt)
+    }
+
+    fn assert_whole(prompt: &str, tokens: &Tokens) {
+        let last = tokens.token_count.min(TOKENS) - 1;
+        assert_eq!(
+            (tokens.ids[0], tokens.ids[last], tokens.ids[76]),
+            (START, END, END)
+        );
+        assert!(tokens.ids[last..].iter().all(|&id| id == END));
+        assert!(tokens.ids.iter().all(|&id| id <= END));
+        assert!((0..TOKENS).all(|i| tokens.mask[i] == (i <= last)));
+        assert_eq!(tokens.truncated(), tokens.token_count > TOKENS);
+        if let Some(at) = tokens.truncated_at {
+            assert!(at < prompt.len() && prompt.is_char_boundary(at), "{at}");
+        }
+    }
+
+    #[test]
+    fn hard_prompts_have_77_tokens() {
+        let long = "x".repeat(10_000);
+        let words = "ship ".repeat(2_000);
+        let digits = "1".repeat(10_000);
+        let cjk = "海".repeat(10_000);
+        let prompts = [
+            "",
+            " ",
+            "\n\t",
+            "\0\u{1}\u{7F}",
+            "\u{200B}",
+            "\u{202E}abc\u{202C}",
+            "🚢🌊👨‍👩‍👧‍👦🏽",
+            "海洋波浪 船の航跡",
+            "<|endoftext|>",
+            "<|startoftext|><|endoftext|>",
+            "<|",
+            "&",
+            "&amp",
+            "&#xD800;",
+            "&#99999999999;",
+            "\u{301}",
+            "\u{FFFD}\u{10FFFF}",
+            &long,
+            &words,
+            &digits,
+            &cjk,
+        ];
+        for prompt in prompts {
+            assert_whole(prompt, &encode(prompt));
+        }
+        assert_eq!(encode("").token_count, 2);
+        assert_eq!(encode(&words).token_count, 2_002);
+        assert_eq!(encode(&digits).token_count, 10_002);
+    }
+
+    #[test]
+    fn marks_within_a_prompt_become_their_tokens() {
+        let tokens = encode("!!<|ENDOFTEXT|>ship<|startoftext|>");
+        assert_eq!(tokens.ids[..6], [START, 748, END, 1158, START, END]);
+        assert_eq!(tokens.token_count, 6);
+    }
+
+    #[test]
+    fn the_cut_is_where_the_first_lost_token_starts() {
+        let fits = "ship ".repeat(75);
+        assert_eq!(encode(&fits).truncated_at, None);
+        assert_eq!(encode(&fits).token_count, 77);
+        assert_eq!(
+            encode(&format!("{fits}  wake")).truncated_at,
+            Some(fits.len() + 2)
+        );
+        // 75 words, then one in three tokens: j, ek and yl.
+        let word = encode(&format!("{}1.5", "ship ".repeat(74)));
+        assert_eq!(word.truncated_at, Some(74 * 5 + 1));
+    }
+
+    #[test]
+    fn the_cut_is_counted_in_the_prompt_not_in_the_cleaned_text() {
+        let prompt = format!("{}\u{FB01}n &amp; \u{65E5}", "e\u{301} ".repeat(75));
+        assert_eq!(encode(&prompt).truncated_at, Some(75 * 4));
+        let prompt = format!("&lt;{}\u{65E5}", " ship".repeat(74));
+        assert_eq!(encode(&prompt).truncated_at, Some(4 + 74 * 5));
+    }
+
+    #[test]
+    fn a_batch_is_its_prompts_in_order() {
+        let prompts: Vec<String> = (0..1000).map(|i| format!("ship {i} {}", i % 7)).collect();
+        let batch = Tokenizer::clip().encode_batch(&prompts);
+        let single: Vec<Tokens> = prompts.iter().map(|prompt| encode(prompt)).collect();
+        assert_eq!(batch, single);
+    }
+
+    /// The same tokenizer, put together from the parts of the crate `tokenizers`, as a `tokenizer.json` of
+    /// CLIP describes it.
+    fn pipeline() -> tokenizers::Tokenizer {
+        use tokenizers::normalizers::{Lowercase, NFC, Replace, Sequence};
+        use tokenizers::pre_tokenizers::{byte_level::ByteLevel, sequence, split};
+        use tokenizers::{SplitDelimiterBehavior, models::bpe::BPE, normalizers::replace};
+        let (vocab, merges) = Vocabulary::clip_parts().unwrap();
+        let bpe = BPE::builder()
+            .vocab_and_merges(vocab, merges)
+            .end_of_word_suffix("</w>".into())
+            .build()
+            .unwrap();
+        let words = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+";
+        let spaces = Replace::new(replace::ReplacePattern::Regex(r"\s+".into()), " ").unwrap();
+        let words = split::SplitPattern::Regex(words.into());
+        let words = split::Split::new(words, SplitDelimiterBehavior::Removed, true).unwrap();
+        let bytes = ByteLevel::new(false, true, false);
+        let mut tokenizer = tokenizers::Tokenizer::new(bpe);
+        let normalizer = Sequence::new(vec![NFC.into(), spaces.into(), Lowercase.into()]);
+        tokenizer.with_normalizer(Some(normalizer)).unwrap();
+        let splitter = sequence::Sequence::new(vec![words.into(), bytes.into()]);
+        tokenizer.with_pre_tokenizer(Some(splitter));
+        tokenizer
+    }
+
+    fn assert_agrees(pipeline: &tokenizers::Tokenizer, prompt: &str) {
+        // That pipeline lowers Σ letter by letter and cleans less; where cleaning did its part, both agree.
+        let cleaned = clean(prompt).text;
+        if cleaned.contains(['ς', '&']) || cleaned.contains("<|") || clean(&cleaned).text != cleaned
+        {
+            return;
+        }
+        let expected = pipeline.encode_fast(cleaned.as_str(), false).unwrap();
+        let tokens = encode(&cleaned);
+        assert_eq!(
+            tokens.token_count,
+            expected.get_ids().len() + 2,
+            "{cleaned:?}"
+        );
+        let count = expected.get_ids().len().min(75);
+        assert_eq!(
+            tokens.ids[1..=count],
+            expected.get_ids()[..count],
+            "{cleaned:?}"
+        );
+    }
+
+    #[test]
+    fn the_pipeline_of_the_crate_tokenizers_gives_the_same_ids() {
+        let pipeline = pipeline();
+        let config = ProptestConfig::with_cases(1000);
+        let text = "\\PC{0,40}|([a-z]{1,9}('s|'ll|'re)?[ ,.]){0,20}|[ -~]{0,80}|[\u{A0}-\u{2FF}\u{400}-\u{52F}\u{3040}-\u{9FFF}]{0,20}";
+        proptest!(config, |(prompt in text)| assert_agrees(&pipeline, &prompt));
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_has_77_tokens(prompt in any::<String>()) {
+            assert_whole(&prompt, &encode(&prompt));
+        }
+
+        #[test]
+        fn long_text_has_77_tokens(prompt in "(\\PC{0,9}|<\\|endoftext\\|>|&[a-z#]{1,4};|[\\x00-\\x20]){0,200}") {
+            assert_whole(&prompt, &encode(&prompt));
+        }
+
+        /// What stands before the cut has exactly the tokens that were kept.
+        #[test]
+        fn the_prompt_up_to_the_cut_fills_the_row(
+            words in prop::collection::vec("[a-z]{1,3}|[0-9]|&amp;|e\u{301}|\u{FB02}|\u{65E5}", 76..200)
+        ) {
+            let prompt = words.join(" ");
+            let tokens = encode(&prompt);
+            let cut = tokens.truncated_at.unwrap();
+            prop_assume!(prompt[..cut].ends_with(' '));
+            let kept = encode(&prompt[..cut]);
+            prop_assert_eq!(kept.ids, tokens.ids);
+            prop_assert_eq!(kept.token_count, TOKENS);
         }
     }
 }

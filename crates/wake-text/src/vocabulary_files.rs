@@ -148,7 +148,10 @@ fn known(
         return Ok((left, right));
     };
     let made = format!("{left}{right}");
-    match [&left, &right, &made].iter().find(|token| !vocab.contains_key(token.as_str())) {
+    match [&left, &right, &made]
+        .iter()
+        .find(|token| !vocab.contains_key(token.as_str()))
+    {
         Some(token) => Err(format!(
             "the merge '{left} {right}' needs the token '{token}', which is not in the vocabulary"
         )),
@@ -169,8 +172,14 @@ fn place(text: &str, raw: &RawValue) -> (usize, usize) {
 /// Line and column, from 1, right after these bytes.
 fn position(before: &[u8]) -> (usize, usize) {
     let line = before.split(|&byte| byte == b'\n').count();
-    let start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-    (line, String::from_utf8_lossy(&before[start..]).chars().count() + 1)
+    let start = before
+        .iter()
+        .rposition(|&byte| byte == b'\n')
+        .map_or(0, |at| at + 1);
+    (
+        line,
+        String::from_utf8_lossy(&before[start..]).chars().count() + 1,
+    )
 }
 
 fn json_error(path: &Path, error: &serde_json::Error) -> Error {

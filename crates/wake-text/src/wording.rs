@@ -6,7 +6,7 @@ use wake_physics::Scene;
 
 /// One way to say a scene in words.
 ///
-/// All state the same values, and all of them can be read back. Different words for the
+/// All state the same values, and [`PartialScene::read`] reads all of them back. Different words for the
 /// same scene keep a text encoder from learning one sentence by heart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Wording {
@@ -99,9 +99,9 @@ type Wind = Option<[f64; 3]>;
 
 fn paper(ship: Ship, wind: Wind, incidence: f64) -> String {
     let ship = match ship {
-        Some((speed, heading)) => format!(
-            "wakes from a ship moving at {speed} mps toward {heading} degrees"
-        ),
+        Some((speed, heading)) => {
+            format!("wakes from a ship moving at {speed} mps toward {heading} degrees")
+        }
         None => "open sea without a ship".to_owned(),
     };
     let wind = match wind {
@@ -121,9 +121,9 @@ fn wind_first(ship: Ship, wind: Wind, incidence: f64) -> String {
         None => "No wind blows".to_owned(),
     };
     let ship = match ship {
-        Some((speed, heading)) => format!(
-            "A ship moves toward {heading} degrees at {speed} mps and leaves a wake"
-        ),
+        Some((speed, heading)) => {
+            format!("A ship moves toward {heading} degrees at {speed} mps and leaves a wake")
+        }
         None => "Open sea without a ship".to_owned(),
     };
     format!("{wind}. {ship}. Simulated SAR image at {incidence} degree incidence.")
@@ -159,4 +159,222 @@ fn brief(ship: Ship, wind: Wind, incidence: f64) -> String {
         None => "no wind".to_owned(),
     };
     format!("{ship}, {wind}, incidence {incidence} degrees.")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{TOKENS, Tokenizer};
+    use proptest::prelude::*;
+    use wake_physics::scene::{Ship, paper_grid};
+
+    /// Any valid ship, sea and radar, as far as a prompt speaks of them.
+    fn scenes() -> impl Strategy<Value = Scene> {
+        let angle = || prop_oneof![-720.0..720.0_f64, prop::num::f64::NORMAL];
+        let ship = prop::option::of((0.0..=40.0_f64, angle()));
+        let wind = prop_oneof![4 => 0.0..=30.0_f64, 1 => 0.0..0.1_f64];
+        let fetch = (2.0..=7.0_f64).prop_map(|power| 10_f64.powf(power).clamp(100.0, 1e7));
+        (ship, wind, angle(), fetch, 5.0..=75.0_f64).prop_map(
+            |(ship, wind, toward, fetch, incidence)| {
+                let mut scene = Scene {
+                    ship: ship.map(|(speed, heading)| Ship {
+                        speed,
+                        heading,
+                        ..Ship::default()
+                    }),
+                    ..Scene::default()
+                };
+                (scene.sea.wind_speed, scene.sea.wind_toward) = (wind, toward);
+                (scene.sea.fetch, scene.radar.incidence) = (fetch, incidence);
+                scene
+            },
+        )
+    }
+
+    /// Degrees between two directions, 0 to 180.
+    fn turn(a: f64, b: f64) -> f64 {
+        let turn = (a - b.rem_euclid(360.0)).rem_euclid(360.0);
+        turn.min(360.0 - turn)
+    }
+
+    /// Whether a value is what is left of another after rounding to a step: half a step away, and the few
+    /// units in the last place that the arithmetic itself may lose.
+    fn is_rounded(stated: f64, value: f64, step: f64) -> bool {
+        (stated - value).abs() <= 0.5 * step * (1.0 + 1e-12) + 1e-12 * value.abs()
+    }
+
+    fn assert_states(said: &PartialScene, scene: &Scene) {
+        assert_eq!(said.ship, Some(scene.ship.is_some()));
+        match &scene.ship {
+            Some(ship) => {
+                assert!(
+                    is_rounded(said.ship_speed.unwrap(), ship.speed, 0.1),
+                    "{said:?}"
+                );
+                assert!(
+                    turn(said.ship_heading.unwrap(), ship.heading) <= 0.5,
+                    "{said:?}"
+                );
+            }
+            None => assert_eq!((said.ship_speed, said.ship_heading), (None, None)),
+        }
+        let wind_speed = said.wind_speed.unwrap();
+        assert!(
+            is_rounded(wind_speed, scene.sea.wind_speed, 0.1),
+            "{said:?}"
+        );
+        assert_eq!(
+            wind_speed > 0.0,
+            said.wind_toward.is_some() && said.fetch.is_some()
+        );
+        if wind_speed > 0.0 {
+            assert!(
+                turn(said.wind_toward.unwrap(), scene.sea.wind_toward) <= 0.5,
+                "{said:?}"
+            );
+            assert!(
+                is_rounded(said.fetch.unwrap(), scene.sea.fetch, 1.0),
+                "{said:?}"
+            );
+        }
+        assert!(
+            is_rounded(said.incidence.unwrap(), scene.radar.incidence, 1.0),
+            "{said:?}"
+        );
+    }
+
+    fn assert_round_trip(scene: &Scene) {
+        for wording in Wording::ALL {
+            let prompt = wording.prompt(scene).unwrap();
+            assert!(prompt.is_ascii() && !prompt.contains('&'), "{prompt}");
+            let tokens = Tokenizer::clip().encode(&prompt);
+            assert!(
+                tokens.token_count <= TOKENS,
+                "{} tokens: {prompt}",
+                tokens.token_count
+            );
+            let said = PartialScene::read(&prompt).unwrap();
+            assert_eq!(said, PartialScene::of(scene), "{prompt}");
+            assert_states(&said, scene);
+            let again = said.onto(&Scene::default()).unwrap();
+            assert_eq!(PartialScene::of(&again), said, "{prompt}");
+        }
+    }
+
+    #[test]
+    fn the_paper_grid_goes_round_in_every_wording() {
+        let scenes: Vec<Scene> = paper_grid().collect();
+        assert_eq!(scenes.len(), 3456);
+        scenes.iter().for_each(assert_round_trip);
+    }
+
+    #[test]
+    fn the_grid_is_stated_exactly() {
+        for scene in paper_grid() {
+            let ship = scene.ship.as_ref().unwrap();
+            let expected = PartialScene {
+                ship: Some(true),
+                ship_speed: Some(ship.speed),
+                ship_heading: Some(ship.heading),
+                wind_speed: Some(scene.sea.wind_speed),
+                wind_toward: Some(scene.sea.wind_toward),
+                fetch: Some(scene.sea.fetch),
+                incidence: Some(scene.radar.incidence),
+            };
+            assert_eq!(PartialScene::read(&prompt(&scene).unwrap()), Ok(expected));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn random_scenes_go_round(scene in scenes()) {
+            assert_round_trip(&scene);
+        }
+
+        /// Spelling, spacing and the order of the sentences do not matter.
+        #[test]
+        fn the_same_words_otherwise_spelt_state_the_same(
+            scene in scenes(), swap in 0..6_usize, upper in any::<bool>()
+        ) {
+            let prompt = prompt(&scene).unwrap();
+            let mut sentences: Vec<&str> = prompt.split_inclusive(". ").collect();
+            sentences.rotate_left(swap % 3);
+            sentences.swap(0, swap / 3);
+            let text = sentences.join(". ").replace(" mps", "m/s").replace("degrees", "deg").replace(' ', " \t ");
+            let text = if upper { text.to_uppercase() } else { text };
+            prop_assert_eq!(PartialScene::read(&text), Ok(PartialScene::of(&scene)), "{}", text);
+        }
+    }
+
+    fn scene(assignments: &[&str]) -> Scene {
+        Scene::default().with_assignments(assignments).unwrap()
+    }
+
+    #[test]
+    fn the_papers_example_is_word_for_word() {
+        let scene = scene(&["ship.heading=135", "sea.wind_speed=3", "sea.fetch=10000"]);
+        let expected = "Simulated SAR image of wakes from a ship moving at 10 mps toward 135 degrees. Ocean \
+                        waves are shaped by 3 mps wind directing toward 90 degrees and 10000 meter fetch. \
+                        Captured at 32 degree incidence.";
+        assert_eq!(prompt(&scene).unwrap(), expected);
+        assert_eq!(Tokenizer::clip().encode(expected).token_count, 50);
+    }
+
+    #[test]
+    fn no_ship_and_no_wind_have_their_own_words() {
+        let mut scene = scene(&["sea.wind_speed=0.04"]);
+        scene.ship = None;
+        let expected = "Simulated SAR image of open sea without a ship. The ocean is flat without wind. \
+                        Captured at 32 degree incidence.";
+        assert_eq!(prompt(&scene).unwrap(), expected);
+        assert_round_trip(&scene);
+    }
+
+    #[test]
+    fn numbers_are_short_and_rounded() {
+        let cases = [
+            ("ship.speed=10", "at 10 mps"),
+            ("ship.speed=7.25", "at 7.3 mps"),
+            ("ship.speed=0.04", "at 0 mps"),
+            ("sea.wind_speed=2.999", "by 3 mps"),
+            ("ship.heading=359.7", "toward 0 degrees. "),
+            ("ship.heading=-1e-20", "toward 0 degrees. "),
+            ("ship.heading=-90", "toward 270 degrees. "),
+            ("ship.heading=719.4", "toward 359 degrees. "),
+            ("sea.fetch=1e7", "and 10000000 meter"),
+            ("radar.incidence=31.5", "at 32 degree"),
+        ];
+        for (assignment, words) in cases {
+            let prompt = prompt(&scene(&[assignment])).unwrap();
+            assert!(prompt.contains(words), "{assignment}: {prompt}");
+        }
+    }
+
+    #[test]
+    fn the_longest_numbers_fit() {
+        let longest = [
+            "ship.speed=39.9",
+            "ship.heading=359",
+            "sea.wind_speed=29.9",
+            "sea.fetch=1e7",
+        ];
+        let mut scene = scene(&longest);
+        scene.sea.wind_toward = 359.0;
+        let counts = Wording::ALL.map(|wording| {
+            Tokenizer::clip()
+                .encode(&wording.prompt(&scene).unwrap())
+                .token_count
+        });
+        // The paper's example has 50; these numbers are nine digits or points longer.
+        assert_eq!(counts[0], 59);
+        assert!(counts.iter().all(|&count| count <= TOKENS), "{counts:?}");
+    }
+
+    #[test]
+    fn an_invalid_scene_has_no_prompt() {
+        let mut scene = Scene::default();
+        scene.sea.wind_speed = f64::NAN;
+        let message = prompt(&scene).unwrap_err().to_string();
+        assert!(message.starts_with("sea.wind_speed is NaN"), "{message}");
+    }
 }

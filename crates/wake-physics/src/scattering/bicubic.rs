@@ -56,6 +56,10 @@ fn weights(t: f64) -> [f64; 4] {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
 

@@ -321,4 +321,21 @@ impl Term {
         Self::Coherence,
         Self::Speckle,
     ];
+
+    /// Name in scene files and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sea => "sea",
+            Self::Kelvin => "kelvin",
+            Self::Turbulent => "turbulent",
+            Self::TiltAverage => "tilt_average",
+            Self::Specular => "specular",
+            Self::RangeBunching => "range_bunching",
+            Self::Hydrodynamic => "hydrodynamic",
+            Self::Bunching => "bunching",
+            Self::Coherence => "coherence",
+            Self::Speckle => "speckle",
+        }
+    }
 }
