@@ -40,7 +40,7 @@ pub fn coefficients(permittivity: Complex64, cos_incidence: f64) -> Coefficients
 
 /// Principal square root of a number with positive imaginary part, without the sines of the general one.
 fn square_root(z: Complex64) -> Complex64 {
-    let re = (0.5 * (z.norm() + z.re)).sqrt();
+    let re = (0.5 * (z.norm_sqr().sqrt() + z.re)).sqrt();
     Complex64::new(re, 0.5 * z.im / re)
 }
 

@@ -175,7 +175,13 @@ impl Elfouhaily {
             return 0.0;
         }
         let age = (k / self.peak_wavenumber).sqrt() - 1.0;
-        let peak = (-0.5 * (age / self.peak_width).powi(2)).exp();
+        let distance = age / self.peak_width;
+        // Nine widths from the peak Γ is below rounding; no exponential for the short waves of a radar.
+        let peak = if distance < 9.0 {
+            (-0.5 * distance * distance).exp()
+        } else {
+            0.0
+        };
         let shape = (self.ln_enhancement * peak - 1.25 * (self.peak_wavenumber / k).powi(2)).exp();
         let long =
             self.long_level * self.peak_speed * (-self.inverse_wave_age / 10f64.sqrt() * age).exp();
