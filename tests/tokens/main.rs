@@ -37,7 +37,7 @@ fn fixtures() -> PathBuf {
 fn cases() -> Vec<Case> {
     let path = fixtures().join("tokenizer/prompts.json");
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let fixture: Fixture = serde_json::from_str(&text).unwrap();
+    let fixture: Fixture = serde_json::from_str(&text).expect("the layout of prompts.json");
     assert!(!fixture.cases.is_empty(), "{} has no case", path.display());
     fixture.cases
 }
@@ -106,6 +106,24 @@ fn ids_where_tokenizers_part_follow_the_stated_cleaning() {
             "{:?}: {:?} is none of {known:?}",
             case.prompt, tokens.ids
         );
+    }
+}
+
+/// `ftfy.json` holds prompts and what `ftfy` 6.3.1 makes of them, written by `generate_ftfy.py`.
+#[test]
+fn cleaning_does_what_ftfy_does() {
+    let cases: Vec<(String, String)> = serde_json::from_str(include_str!("ftfy.json")).unwrap();
+    assert_eq!(cases.len(), 400);
+    for (prompt, fixed) in cases {
+        // That tokenizer cleans nothing.
+        let expected = instant(&fixed);
+        let tokens = encode(&prompt);
+        assert_eq!(
+            tokens.ids[1..=expected.len()],
+            expected,
+            "{prompt:?} {fixed:?}"
+        );
+        assert_eq!(tokens.token_count, expected.len() + 2, "{prompt:?}");
     }
 }
 
@@ -189,7 +207,7 @@ fn the_page_on_cleaning_is_true() {
             count += 1;
         }
     }
-    assert_eq!(count, 9, "rules with an example");
+    assert_eq!(count, 11, "rules with an example");
     assert_eq!(
         encode("ship \t\u{a0}\u{3000} wake").ids,
         encode("ship wake").ids
@@ -200,8 +218,9 @@ fn unescape(text: &str) -> String {
     let mut parts = text.split("\\u{");
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let (code, rest) = part.split_once('}').unwrap();
-        out.push(char::from_u32(u32::from_str_radix(code, 16).unwrap()).unwrap());
+        let (code, rest) = part.split_once('}').expect("a closing brace");
+        let code = u32::from_str_radix(code, 16).expect("a hexadecimal number");
+        out.push(char::from_u32(code).expect("a character"));
         out.push_str(rest);
     }
     out

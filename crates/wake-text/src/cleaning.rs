@@ -5,17 +5,18 @@
 //!
 //! | rule | example |
 //! | --- | --- |
-//! | HTML entities become characters, repeatedly, unless the prompt holds a `<` | `&amp;lt;` → `<` |
-//! | control characters (U+0000–0008, 000B, 000E–001F, 007F, 206A–206F, FEFF, FFF9–FFFC) go | `a\0b` → `ab` |
-//! | curly quotes become straight | `“it’s”` → `"it's"` |
+//! | HTML entities become characters, repeatedly, up to the line of the first `<` | `&amp;lt;` → `<` |
+//! | C1 control characters (U+0080–009F) are read as Windows-1252 | U+0085 → `…` |
 //! | Latin ligatures become letters | `ﬁn` → `fin` |
 //! | full-width and half-width forms become the usual ones | `ＳＡＲ１` → `SAR1` |
+//! | curly quotes become straight | `“it’s”` → `"it's"` |
+//! | terminal colour codes go | `ESC [31m` |
+//! | control characters (U+0000–0008, 000B, 000E–001F, 007F, 206A–206F, FEFF, FFF9–FFFC) go | `a\0b` → `ab` |
 //! | Unicode form NFC | `e` + U+0301 → `é` |
 //! | lower case, by Unicode's default rules | `SAR` → `sar` |
 //!
 //! White space of any kind and length only separates words. Not done: undoing text that was decoded with
-//! the wrong encoding (`Ã©` for `é`), terminal colour codes, C1 control characters, removing accents,
-//! spacing out Chinese characters.
+//! the wrong encoding (`Ã©` for `é`), removing accents, spacing out Chinese characters.
 //!
 //! A prompt of printable ASCII without `&` only becomes lower case, as with every CLIP tokenizer.
 
@@ -54,6 +55,8 @@ pub(crate) fn clean(prompt: &str) -> Cleaned {
     }
     let traced = decode_entities(prompt);
     let traced = replace_forms(&traced);
+    let mut traced = drop_terminal_codes(&traced);
+    traced.retain(|&(c, _)| !is_control(c));
     let traced = compose(&traced);
     collect(lower(&traced))
 }
@@ -64,13 +67,18 @@ fn is_plain(byte: u8) -> bool {
 }
 
 /// Decodes HTML entities until none is left, from the right, so that `&amp;lt;` takes one pass.
+///
+/// From the line of the first `<` on the text is markup, whose entities stay.
 fn decode_entities(prompt: &str) -> Vec<Traced> {
-    let keep = prompt.contains('<');
+    let line_of = |at: usize| prompt[..at].rfind('\n').map_or(0, |end| end + 1);
+    let markup = prompt.find('<').map_or(prompt.len(), line_of);
     // The text so far, backwards: its last element is the leftmost character.
     let mut stack: Vec<Traced> = Vec::with_capacity(prompt.len());
     for (at, c) in prompt.char_indices().rev() {
         stack.push((c, at));
-        while !keep && let Some((length, decoded)) = entity_on_top(&stack) {
+        while at < markup
+            && let Some((length, decoded)) = entity_on_top(&stack)
+        {
             stack.truncate(stack.len() - length);
             stack.extend(decoded.chars().rev().map(|c| (c, at)));
         }
@@ -96,26 +104,77 @@ fn entity_on_top(stack: &[Traced]) -> Option<(usize, String)> {
     (decoded != entity).then(|| (entity.len(), decoded.into_owned()))
 }
 
-/// Drops control characters and replaces quotes, ligatures and width forms.
+/// What a C1 control character (U+0080 to U+009F) is in Windows-1252; five are nothing there.
+fn from_windows_1252(c: char) -> char {
+    const MEANT: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8D}Ž\u{8F}\u{90}‘’“”•–—˜™š›œ\u{9D}žŸ";
+    match u32::from(c) {
+        code @ 0x80..=0x9F => MEANT.chars().nth(code as usize - 0x80).unwrap_or(c),
+        _ => c,
+    }
+}
+
+/// Replaces C1 control characters, ligatures, width forms and quotes.
 fn replace_forms(text: &[Traced]) -> Vec<Traced> {
     let mut out = Vec::with_capacity(text.len());
     for &(c, at) in text {
-        match c {
-            '\0'..='\x08' | '\x0B' | '\x0E'..='\x1F' | '\x7F' => {}
-            '\u{206A}'..='\u{206F}' | '\u{FEFF}' | '\u{FFF9}'..='\u{FFFC}' => {}
-            '\u{2BC}' | '\u{2018}'..='\u{201B}' => out.push(('\'', at)),
-            '\u{201C}'..='\u{201F}' => out.push(('"', at)),
-            // Ligatures and letter pairs, ideographic space, full and half width.
-            '\u{132}' | '\u{133}' | '\u{149}' | '\u{1C4}'..='\u{1CC}' | '\u{1F1}'..='\u{1F3}' => {
-                out.extend(c.nfkc().map(|c| (c, at)));
-            }
-            '\u{FB00}'..='\u{FB06}' | '\u{3000}' | '\u{FF01}'..='\u{FFEF}' => {
-                out.extend(c.nfkc().map(|c| (c, at)));
-            }
-            _ => out.push((c, at)),
+        let c = from_windows_1252(c);
+        if has_usual_form(c) {
+            out.extend(c.nfkc().map(|c| (straight(c), at)));
+        } else {
+            out.push((straight(c), at));
         }
     }
     out
+}
+
+/// Latin ligatures and letter pairs, ideographic space, full and half width.
+fn has_usual_form(c: char) -> bool {
+    matches!(c, '\u{132}' | '\u{133}' | '\u{149}' | '\u{1C4}'..='\u{1CC}' | '\u{1F1}'..='\u{1F3}'
+        | '\u{FB00}'..='\u{FB06}' | '\u{3000}' | '\u{FF01}'..='\u{FFEF}')
+}
+
+/// A curly quote straightened.
+fn straight(c: char) -> char {
+    match c {
+        '\u{2BC}' | '\u{2018}'..='\u{201B}' => '\'',
+        '\u{201C}'..='\u{201F}' => '"',
+        _ => c,
+    }
+}
+
+/// Drops what sets colours in a terminal: escape, `[`, digits and semicolons, a letter.
+fn drop_terminal_codes(text: &[Traced]) -> Vec<Traced> {
+    let mut out = Vec::with_capacity(text.len());
+    let mut rest = text;
+    while let [first, after @ ..] = rest {
+        rest = match terminal_code(rest) {
+            Some(length) => &rest[length..],
+            None => {
+                out.push(*first);
+                after
+            }
+        };
+    }
+    out
+}
+
+/// Length of the terminal code that a text starts with.
+fn terminal_code(text: &[Traced]) -> Option<usize> {
+    let [('\x1B', _), ('[', _), after @ ..] = text else {
+        return None;
+    };
+    let numbers = after
+        .iter()
+        .take_while(|(c, _)| c.is_ascii_digit() || *c == ';')
+        .count();
+    let (last, _) = after.get(numbers)?;
+    last.is_ascii_alphabetic().then_some(numbers + 3)
+}
+
+/// Control characters without a use in a prompt.
+fn is_control(c: char) -> bool {
+    matches!(c, '\0'..='\x08' | '\x0B' | '\x0E'..='\x1F' | '\x7F' | '\u{206A}'..='\u{206F}'
+        | '\u{FEFF}' | '\u{FFF9}'..='\u{FFFC}')
 }
 
 /// Unicode form NFC; what is composed comes from where its first character came from.
@@ -169,7 +228,9 @@ mod tests {
     fn each_rule_does_what_its_table_says() {
         let cases = [
             ("&amp;lt; &#39;x&#x27; &nosuch; &;", "< 'x' &nosuch; &;"),
-            ("a < b &amp; c", "a < b &amp; c"),
+            ("&amp;\na < b &amp; c\n&amp;", "&\na < b &amp; c\n&amp;"),
+            ("\x1B[1;31mred\x1B[m \x1B[31 \x1B[;", "red [31 [;"),
+            ("it\u{92}s \u{80}\u{81}\u{9F}\u{A0}", "it's €\u{81}ÿ\u{A0}"),
             ("a\0b\u{B}c\x1B\x7F\u{FEFF}d", "abcd"),
             ("\u{201C}it\u{2019}s\u{201D} \u{2BC}", "\"it's\" '"),
             ("\u{FB01}n \u{FB04}", "fin ffl"),

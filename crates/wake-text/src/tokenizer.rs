@@ -105,9 +105,10 @@ impl Tokenizer {
     /// The tokens of a prompt; a longer one is cut, with the end mark kept last.
     ///
     /// The prompt is cleaned first, as Stable Diffusion does with `ftfy`, short of guesses. In this order:
-    /// HTML entities are decoded, unless there is a `<`; control characters go; curly quotes, ligatures and
-    /// full-width forms become the usual characters; Unicode form NFC; lower case. White space only separates
-    /// words. Text in a wrong encoding is not repaired. Printable ASCII without `&` only becomes lower case.
+    /// HTML entities are decoded, up to the line of the first `<`; ligatures, full-width forms and curly quotes
+    /// become the usual characters; terminal and control codes go; Unicode form NFC; lower case. White space
+    /// only separates words. Text in a wrong encoding is not repaired. Printable ASCII without `&` only becomes
+    /// lower case.
     ///
     /// The marks `<|startoftext|>` and `<|endoftext|>` within a prompt become their tokens, as in Stable
     /// Diffusion.

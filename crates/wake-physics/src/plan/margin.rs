@@ -1,43 +1,34 @@
 //! How far around the image things are computed: what moves into it must come from somewhere.
 
-use super::linear::WaveSample;
+use super::linear::{WaveSample, rms};
 use super::situation::Situation;
 use crate::setup::Setup;
 use crate::waves::Quantity;
+use std::f64::consts::{PI, SQRT_2};
 
-/// Standard deviations of the sea that the margin holds; beyond, 7 velocities in a million.
+/// Standard deviations that the margin holds; beyond lie 7 in a million.
 const DEVIATIONS: f64 = 4.5;
 
-/// Crests of the wake over its root mean square: a sum of few waves, √2 each.
-const CREST: f64 = 2.5;
+/// Mean square of the wake where it is over that in the whole image: the wedge covers about a quarter of it.
+const WEDGE: f64 = 4.0;
 
 impl Situation {
     /// Margin in rows and columns. It depends on the scene alone, not on the terms that are used: the same seed
     /// draws the same sea whatever is left out.
     pub(crate) fn margin(&self, setup: &Setup) -> [usize; 2] {
-        let spacing = setup.image.spacing;
-        let velocity = self.largest(|w| self.image.transfer.radial(w.k, w.omega).norm_sqr());
-        let height = self.largest(|w| {
-            self.image.transfer.factor(Quantity::Elevation, w.k, w.omega).norm_sqr()
-        });
-        let acceleration = self.largest(|w| {
-            (w.omega * self.image.transfer.radial(w.k, w.omega)).norm_sqr()
-        });
         if self.sea.is_empty() && self.wake.is_empty() {
             return [0, 0];
         }
-        let shift = setup.range_to_velocity * velocity;
-        // The Gaussian exp(−(πy/ρ)²) is 1e-6 at 1.2 ρ.
-        let reach = 1.2 * self.resolution.at(acceleration);
-        let rows = (shift + reach) / spacing;
-        let columns = height / setup.incidence.tan() / spacing;
-        [rows.ceil() as usize + 1, columns.ceil() as usize + 1]
-    }
-
-    /// Largest value to be expected of a quantity with this |factor|².
-    fn largest(&self, square: impl Fn(&WaveSample) -> f64) -> f64 {
-        let sum = |waves: &[WaveSample]| waves.iter().map(|w| w.variance * square(w)).sum::<f64>();
-        let wake = CREST * (self.crowding * sum(&self.wake)).sqrt();
-        (DEVIATIONS * sum(&self.sea).sqrt()).hypot(wake)
+        let deviation = |quantity| {
+            let factor = |w: &WaveSample| self.image.transfer.factor(quantity, w.k, w.omega);
+            rms(&self.sea, factor).hypot(WEDGE.sqrt() * rms(&self.wake, factor))
+        };
+        let radial = |w: &WaveSample| self.image.transfer.radial(w.k, w.omega);
+        let velocity = rms(&self.sea, radial).hypot(WEDGE.sqrt() * rms(&self.wake, radial));
+        let acceleration = deviation(Quantity::RadialAcceleration);
+        let width = self.resolution.at(acceleration) / (SQRT_2 * PI);
+        let azimuth = (setup.range_to_velocity * velocity).hypot(width);
+        let range = deviation(Quantity::Elevation) / setup.incidence.tan();
+        [azimuth, range].map(|d| (DEVIATIONS * d / setup.image.spacing).ceil() as usize + 1)
     }
 }

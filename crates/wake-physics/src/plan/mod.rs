@@ -34,6 +34,8 @@ pub struct Plan {
     /// What a user should know about this scene.
     pub notes: Vec<String>,
     pub(crate) wake: WakePlan,
+    /// Mean σ⁰ expected [1].
+    pub(crate) mean_sigma0: f64,
 }
 
 /// How much is computed.
@@ -100,6 +102,7 @@ impl Plan {
             },
             notes: situation.notes(scene, setup),
             wake: WakePlan::default(),
+            mean_sigma0: situation.mean[0] + situation.mean[1],
         };
         if plan.uses(Term::Kelvin) {
             plan.plan_wake(setup, &raster, scene.model.tolerance);

@@ -175,7 +175,7 @@ fn slopes(waves: &[WaveSample]) -> SlopeCovariance {
 /// First derivatives and half the second ones of ln σ⁰ by the slopes, on the calm facet.
 fn slope_of_ln_sigma(backscatter: &Backscatter) -> ([f64; 2], [f64; 2]) {
     let ln_sigma = |slope: [f64; 2]| {
-        let [bragg, specular] = backscatter.parts(slope);
+        let [bragg, specular] = backscatter.coarse_parts(slope);
         (bragg + specular).ln()
     };
     let calm = ln_sigma([0.0, 0.0]);

@@ -39,6 +39,14 @@ impl Backscatter {
         ]
     }
 
+    /// [`Self::parts`] to about two digits, in microseconds.
+    pub(crate) fn coarse_parts(&self, slope: [f64; 2]) -> [f64; 2] {
+        [
+            self.two_scale.average(slope, &self.tilt, COARSE_SLOPES),
+            self.specular.sigma0(slope),
+        ]
+    }
+
     /// σ⁰ of every pixel, exactly: the oracle of
     /// [`BackscatterTable::sigma0_field`](super::BackscatterTable::sigma0_field).
     #[must_use]

@@ -103,10 +103,9 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
     let speckled = run.speckle(&plan, &intensity);
     seconds.speckle = clock.lap();
     let labels = run.labels();
-    let crop = |field: Field| run.crop(field);
     let [elevation, slope_x, slope_y, velocity_x, velocity_y, velocity_z] =
-        fields.outputs.map(crop);
-    let (radial_velocity, sigma0) = (run.crop(radial_velocity), run.crop(sigma0));
+        fields.outputs.map(|field| run.crop(&field));
+    let (radial_velocity, sigma0) = (run.crop(&radial_velocity), run.crop(&sigma0));
     seconds.labels = clock.lap();
     seconds.total = clock.total();
     Ok(Simulation {

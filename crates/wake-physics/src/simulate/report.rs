@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use crate::error::Result;
-use crate::grey::GreyMapping;
+use crate::grey::GreyScale;
 use crate::output;
 use crate::raster::Field;
 use serde_json::{Value, json};
@@ -35,8 +35,9 @@ impl Simulation {
     pub fn write(&self, folder: &Path) -> Result<Value> {
         output::make_folder(folder)?;
         let path = |name: &str| folder.join(name);
-        let grey = GreyMapping::default();
-        let pixels = grey.pixels(&self.speckled);
+        let grey = GreyScale::default();
+        let level = |&power: &f32| grey.level(f64::from(power));
+        let pixels: Vec<u8> = self.speckled.values.iter().map(level).collect();
         output::write_png(&path("image.png"), &pixels, self.raster.rows, self.raster.columns)?;
         output::write_fields(&path("fields.safetensors"), &self.named_fields())?;
         output::write_json(&path("labels.json"), &self.labels)?;

@@ -2,11 +2,16 @@
 
 use super::Method;
 use crate::kelvin;
-use crate::labels::Labels;
+use crate::constants::SEA_WATER_DENSITY;
+use crate::labels::{Labels, Track as LabelTrack};
 use crate::nufft;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
-use crate::sar::{AzimuthResolution, Echo, Imaging, Sources, speckle};
+use crate::sar::direct::DirectImage;
+use crate::sar::echo::ship_cross_section;
+use crate::sar::geometry::{azimuth_displacement, ship_radial_velocity};
+use crate::sar::speckle::speckle;
+use crate::sar::{AzimuthResolution, Echo, Imaging, Sources};
 use crate::scattering::{BackscatterTable, FacetFields};
 use crate::scene::{Scene, Term};
 use crate::setup::Setup;
@@ -155,7 +160,7 @@ impl<'a> Run<'a> {
         }
         let error = SHARE_OF_IMAGE * self.scene.model.tolerance * plan.mean_sigma0;
         let table = BackscatterTable::covering(backscatter, facets.slope_x, facets.slope_y, error);
-        (table.sigma0_field(&facets), table.size())
+        (table.sigma0_field(&facets), [0, 0])
     }
 
     /// Intensity of the image before speckle.
@@ -167,41 +172,75 @@ impl<'a> Run<'a> {
         fields: &SurfaceFields,
     ) -> Field {
         let sources = Sources {
-            raster: &self.raster,
+            raster: self.raster,
             sigma0,
             radial_velocity: plan.uses(Term::Bunching).then_some(radial_velocity),
+            radial_acceleration: fields.acceleration.as_ref(),
             elevation: plan.uses(Term::RangeBunching).then_some(&fields.outputs[0]),
-            acceleration: fields.acceleration.as_ref(),
         };
+        let at_rest = AzimuthResolution::at_rest(self.setup.azimuth_resolution, 1);
         let imaging = Imaging {
-            image: self.setup.image,
-            incidence: self.setup.incidence,
             range_to_velocity: self.setup.range_to_velocity,
+            incidence: self.setup.incidence,
             resolution: if plan.uses(Term::Coherence) {
                 self.setup.resolution()
             } else {
-                AzimuthResolution::at_rest(self.setup.azimuth_resolution, 1)
+                at_rest
             },
-            tolerance: SHARE_OF_IMAGE * self.scene.model.tolerance,
         };
+        let image = &self.setup.image;
+        let tolerance = SHARE_OF_IMAGE * self.scene.model.tolerance;
         let mut intensity = match self.method {
-            Method::Fast => imaging.image(&sources),
-            Method::Direct => imaging.image_direct(&sources),
+            Method::Fast => imaging.image(&sources, image, tolerance),
+            Method::Direct => DirectImage::new(&imaging, &sources, image).image(),
         };
-        self.add_echo(&mut intensity);
+        if let Some(echo) = self.echo() {
+            echo.add_to(&mut intensity, image, at_rest.nominal);
+        }
         intensity
     }
 
-    fn add_echo(&self, intensity: &mut Field) {
-        let _ = intensity;
+    /// The ship's own echo, if it is asked for.
+    fn echo(&self) -> Option<Echo> {
+        let ship = self.scene.ship.as_ref().filter(|ship| ship.echo)?;
+        let wake = self.setup.wake.as_ref()?;
+        let displacement = SEA_WATER_DENSITY * wake.hull.volume();
+        Some(Echo {
+            position: wake.track.position,
+            heading: ship.heading,
+            length: ship.length,
+            beam: ship.beam,
+            cross_section: ship_cross_section(self.scene.radar.frequency, displacement),
+            displacement: self.displacement(),
+        })
+    }
+
+    /// Azimuth displacement of the ship's echo [m].
+    fn displacement(&self) -> f64 {
+        let Some(ship) = &self.scene.ship else { return 0.0 };
+        let velocity = ship_radial_velocity(ship.speed, ship.heading, self.setup.incidence);
+        azimuth_displacement(self.setup.range_to_velocity, velocity)
+    }
+
+    pub(super) fn labels(&self) -> Labels {
+        let ship = self.scene.ship.as_ref().zip(self.setup.wake.as_ref());
+        let track = ship.map(|(ship, wake)| LabelTrack {
+            position: wake.track.position,
+            heading: ship.heading,
+            speed: ship.speed,
+            length: ship.length,
+            beam: ship.beam,
+            azimuth_displacement: self.displacement(),
+        });
+        Labels::new(track.as_ref(), &self.setup.image)
     }
 
     pub(super) fn speckle(&self, plan: &Plan, intensity: &Field) -> Field {
+        let mut speckled = intensity.clone();
         if plan.uses(Term::Speckle) {
-            speckle::speckled(intensity, self.scene.radar.looks, self.scene.seed)
-        } else {
-            intensity.clone()
+            speckle(&mut speckled, self.scene.radar.looks, self.scene.seed);
         }
+        speckled
     }
 
     /// Cuts the image from the middle.
