@@ -30,7 +30,7 @@ pub struct Sensitivity {
 }
 
 impl Backscatter {
-    /// Bragg and specular cross-section of a facet of resolved slope (s_x, s_y), by direct quadrature.
+    /// Bragg and specular cross-section of a facet of resolved slope (`s_x`, `s_y`), by direct quadrature.
     #[must_use]
     pub fn parts(&self, slope: [f64; 2]) -> [f64; 2] {
         [
@@ -127,6 +127,10 @@ const HERMITE_3: [[f64; 2]; 3] = [
 
 /// Gates against tables of other programmes and an empirical model.
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
     use crate::constants::SPEED_OF_LIGHT;
@@ -215,8 +219,8 @@ mod tests {
         }
     }
 
-    /// The same programme at X band: Bragg, two-scale, specular, sum. The two-scale column at 16° is left out
-    /// here, see below; where specular return is far below the rest the table has no value.
+    /// The same programme at X band: Bragg, two-scale, specular, sum, all within 0.3 dB but one value, see below.
+    /// Where the specular return is far below the rest the table has none.
     #[test]
     fn x_band_parts_meet_the_reference() {
         let none = f64::NAN;
@@ -224,10 +228,10 @@ mod tests {
             (3.0, 16.0, [-8.1, none, 0.6, 1.8]),
             (3.0, 24.0, [-15.9, -11.4, -20.4, -10.9]),
             (3.0, 32.0, [-20.9, -18.8, none, -18.8]),
-            (5.0, 16.0, [-7.1, none, 2.5, 3.3]),
+            (5.0, 16.0, [-7.1, -4.2, 2.5, 3.3]),
             (5.0, 24.0, [-12.8, -9.9, -14.6, -8.6]),
             (5.0, 32.0, [-16.3, -15.0, none, -15.0]),
-            (7.0, 16.0, [-5.1, none, 3.2, 4.2]),
+            (7.0, 16.0, [-5.1, -2.7, 3.2, 4.2]),
             (7.0, 24.0, [-10.4, -7.9, -12.1, -6.5]),
             (7.0, 32.0, [-13.8, -12.5, none, -12.5]),
         ];
@@ -239,27 +243,26 @@ mod tests {
             };
             for (db, expected) in case.decibels().into_iter().zip(expected) {
                 assert!(
-                    !((db - expected).abs() > 0.3),
+                    expected.is_nan() || (db - expected).abs() < 0.3,
                     "{wind_speed} {degrees}: {db} {expected}"
                 );
             }
         }
     }
 
-    /// At 16° many facets come within reach of nadir, where the two scales part by choice. A sharp limit at k_d
-    /// gives −4.3, −4.7, −3.5 dB, a coarse quadrature of it the table's −4.6, −4.2, −2.7; ours lies within 1 dB
-    /// of both and changes the sum by less than 0.3 dB.
+    /// The one value left out above: two-scale, 3 m/s, 16°, −4.6 dB there and −3.7 dB here. Many facets come within
+    /// reach of nadir, where the two scales part by choice: a sharp limit at `k_d` gives −4.3 dB. It lies 4 dB
+    /// below the specular return.
     #[test]
-    fn bragg_near_nadir_is_model_dependent() {
-        for (wind_speed, table) in [(3.0, -4.6), (5.0, -4.2), (7.0, -2.7)] {
-            let case = Case {
-                degrees: 16.0,
-                wind_speed,
-                ..X_BAND
-            };
-            let db = case.decibels()[1];
-            assert!((db - table).abs() < 1.0, "{wind_speed}: {db}");
-        }
+    fn bragg_near_nadir_depends_on_where_the_scales_part() {
+        let case = Case {
+            degrees: 16.0,
+            wind_speed: 3.0,
+            ..X_BAND
+        };
+        let [_, bragg, specular, _] = case.decibels();
+        assert!((bragg + 4.3).abs() < 0.7, "{bragg}");
+        assert!(specular > bragg + 4.0);
     }
 
     /// The external gate: CMOD5.N within 2.5 dB from 30 to 40°, 3 to 10 m/s, up- and crosswind.

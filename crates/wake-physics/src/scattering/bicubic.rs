@@ -27,12 +27,16 @@ impl Bicubic {
         let (i, s) = cell((u - self.start[0]) * self.inverse_step, self.nodes[0])?;
         let (j, t) = cell((v - self.start[1]) * self.inverse_step, self.nodes[1])?;
         let (along, across) = (weights(s), weights(t));
-        let mut sum = 0.0;
+        // Four columns at once, then across them.
+        let mut sums = [0.0; 4];
         for (r, weight) in across.iter().enumerate() {
-            let [a, b, c, d] = self.values[(j + r) * self.nodes[0] + i..].first_chunk::<4>()?;
-            sum += weight * (along[0] * a + along[1] * b + along[2] * c + along[3] * d);
+            let row = self.values[(j + r) * self.nodes[0] + i..].first_chunk::<4>()?;
+            for (sum, value) in sums.iter_mut().zip(row) {
+                *sum += weight * value;
+            }
         }
-        Some(sum)
+        let terms: [f64; 4] = std::array::from_fn(|n| along[n] * sums[n]);
+        Some((terms[0] + terms[2]) + (terms[1] + terms[3]))
     }
 }
 
@@ -41,21 +45,32 @@ impl Bicubic {
 fn cell(position: f64, nodes: usize) -> Option<(usize, f64)> {
     if position >= 1.0 && position <= nodes as f64 - 2.0 {
         // The last admitted position is the right end of the last cell.
-        let node = (position as u32 as usize).min(nodes - 3);
+        let node = (position as usize).min(nodes - 3);
         return Some((node - 1, position - node as f64));
     }
     None
 }
 
-/// Weights of the nodes −1, 0, 1, 2 at t between 0 and 1.
+/// Coefficients of t³, t², t and 1 in the weights of the nodes −1, 0, 1, 2.
+const WEIGHTS: [[f64; 4]; 4] = [
+    [-1.0 / 6.0, 0.5, -0.5, 1.0 / 6.0],
+    [0.5, -1.0, 0.5, 0.0],
+    [-1.0 / 3.0, -0.5, 1.0, -1.0 / 6.0],
+    [0.0, 1.0, 0.0, 0.0],
+];
+
+/// Weights of the nodes −1, 0, 1, 2 at t between 0 and 1, all four at once.
 #[inline]
 fn weights(t: f64) -> [f64; 4] {
-    let (before, after, far) = (t + 1.0, 1.0 - t, 2.0 - t);
-    let (inner, outer) = (0.5 * before * far, t * after * (1.0 / 6.0));
-    [-outer * far, inner * after, inner * t, -outer * before]
+    let [a, b, c, d] = &WEIGHTS;
+    std::array::from_fn(|n| ((a[n] * t + b[n]) * t + c[n]) * t + d[n])
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
 

@@ -6,9 +6,9 @@ use std::f64::consts::PI;
 /// First-order scattering coefficients of a slightly rough dielectric plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients {
-    /// g_VV, vertical polarization both ways [1].
+    /// `g_VV`, vertical polarization both ways [1].
     pub vv: Complex64,
-    /// g_HH, horizontal polarization both ways [1].
+    /// `g_HH`, horizontal polarization both ways [1].
     pub hh: Complex64,
 }
 
@@ -40,13 +40,13 @@ pub fn coefficients(permittivity: Complex64, cos_incidence: f64) -> Coefficients
 
 /// Principal square root of a number with positive imaginary part, without the sines of the general one.
 fn square_root(z: Complex64) -> Complex64 {
-    let re = (0.5 * (z.norm() + z.re)).sqrt();
+    let re = (0.5 * (z.norm_sqr().sqrt() + z.re)).sqrt();
     Complex64::new(re, 0.5 * z.im / re)
 }
 
-/// Wavenumber of the Bragg wave, k_B = 2 k_e sin θ [rad/m].
+/// Wavenumber of the Bragg wave, `k_B` = 2 `k_e` sin θ [rad/m].
 ///
-/// - `radar_wavenumber` k_e = 2π/λ [rad/m], `incidence` θ [rad]
+/// - `radar_wavenumber` `k_e` = 2π/λ [rad/m], `incidence` θ [rad]
 #[must_use]
 pub fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
     2.0 * radar_wavenumber * incidence.sin()
@@ -58,8 +58,8 @@ pub fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
 /// σ⁰ = 16π k_e⁴ cos⁴θ |g|² Ψ_e(k_B),   Ψ_e = ½[Ψ(k_B) + Ψ(−k_B)],   ∬Ψ = ⟨ζ²⟩
 /// ```
 ///
-/// - `radar_wavenumber` k_e [rad/m], `cos_incidence` cos θ
-/// - `gain` |g|² [1], `density` Ψ_e [m⁴] at the Bragg wavenumber
+/// - `radar_wavenumber` `k_e` [rad/m], `cos_incidence` cos θ
+/// - `gain` |g|² [1], `density` `Ψ_e` [m⁴] at the Bragg wavenumber
 /// - returns σ⁰ [1], per unit area of that plane
 ///
 /// # References
@@ -76,7 +76,7 @@ mod tests {
     use crate::constants::SPEED_OF_LIGHT;
     use crate::permittivity::sea_water;
 
-    /// |g|² and k_B of an independent programme at 9.6 GHz, 20 °C, 35 psu.
+    /// |g|² and `k_B` of an independent programme at 9.6 GHz, 20 °C, 35 psu.
     #[test]
     fn coefficients_meet_the_reference() {
         let table = [
@@ -98,8 +98,8 @@ mod tests {
         }
     }
 
-    /// At nadir both are the reflection coefficient (√ε − 1)/(√ε + 1), and a metal has |g_HH| = 1,
-    /// |g_VV| = (1 + sin²θ)/cos²θ.
+    /// At nadir both are the reflection coefficient (√ε − 1)/(√ε + 1), and a metal has |`g_HH`| = 1,
+    /// |`g_VV`| = (1 + sin²θ)/cos²θ.
     #[test]
     fn limits_of_the_coefficients() {
         let e = Complex64::new(56.063, 37.275);

@@ -15,7 +15,7 @@ pub const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 /// μ = 0.04 (u*/c_B)² ω_B,  clamped to 0.01…100 1/s
 /// ```
 ///
-/// - `friction_velocity` u* [m/s], `bragg_wavenumber` k_B [rad/m], above 0
+/// - `friction_velocity` u* [m/s], `bragg_wavenumber` `k_B` [rad/m], above 0
 /// - returns μ [1/s]; about 1 at X band, 32° and 5 m/s wind
 ///
 /// # Validity
@@ -44,6 +44,10 @@ pub fn bragg_factor(modulation: f32) -> f32 {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
 

@@ -160,6 +160,10 @@ fn weights(ratio: f64, radius: usize, offset: f64) -> Vec<f64> {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
 

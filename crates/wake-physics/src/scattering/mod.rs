@@ -5,8 +5,8 @@
 //! ```
 //!
 //! Waves come in three bands. Those a pixel resolves tilt its facet. Those between the pixel and the radar's
-//! split wavenumber k_d are averaged over, as Gaussian slopes. Those shorter than k_d scatter (Bragg).
-//! The tilt lives in σ_Bragg and nowhere else; m is the hydrodynamic modulation alone.
+//! split wavenumber `k_d` are averaged over, as Gaussian slopes. Those shorter than `k_d` scatter (Bragg).
+//! The tilt lives in `σ_Bragg` and nowhere else; m is the hydrodynamic modulation alone.
 //!
 //! Linear units, per unit area of the horizontal plane. The radar looks toward +x, so a slope ∂ζ/∂x > 0, which
 //! rises away from the radar, faces it and is bright.

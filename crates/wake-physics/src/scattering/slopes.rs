@@ -177,6 +177,10 @@ pub(crate) fn gaussian_nodes(std: f64, step: f64) -> Vec<[f64; 2]> {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
 

@@ -17,7 +17,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// # Without unresolved slopes
 ///
 /// p would be a delta function. But a plane mirror of pixel size L reflects into a lobe, and the lobe acts like
-/// slopes of variance (π/2)/(k_e L)²: with it a flat pixel at its specular slope has the cross-section
+/// slopes of variance (π/2)/(`k_e` L)²: with it a flat pixel at its specular slope has the cross-section
 /// |R|² 4π L²/λ² of a mirror, and every σ is finite. See [`mirror_lobe`](Self::mirror_lobe).
 ///
 /// # References
@@ -62,18 +62,18 @@ impl Specular {
         }
     }
 
-    /// Slope variance that stands for the lobe of a square mirror, (π/2)/(k_e L)² [1].
+    /// Slope variance that stands for the lobe of a square mirror, (π/2)/(`k_e` L)² [1].
     ///
-    /// The lobe sinc²(k_e L s) has the peak 1 and the area π/(k_e L); the Gaussian of the same peak and area has
+    /// The lobe sinc²(`k_e` L s) has the peak 1 and the area π/(`k_e` L); the Gaussian of the same peak and area has
     /// this variance.
     ///
-    /// - `radar_wavenumber` k_e [rad/m], `size` L [m]
+    /// - `radar_wavenumber` `k_e` [rad/m], `size` L [m]
     #[must_use]
     pub fn mirror_lobe(radar_wavenumber: f64, size: f64) -> f64 {
         FRAC_PI_2 / (radar_wavenumber * size).powi(2)
     }
 
-    /// Cross-section of a facet of resolved slope (s_x, s_y), per unit area of the horizontal plane.
+    /// Cross-section of a facet of resolved slope (`s_x`, `s_y`), per unit area of the horizontal plane.
     #[must_use]
     pub fn sigma0(&self, slope: [f64; 2]) -> f64 {
         self.strength * self.density.at(self.missing(slope))
@@ -106,6 +106,10 @@ impl Specular {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
     use crate::scattering::slopes::gaussian_nodes;
