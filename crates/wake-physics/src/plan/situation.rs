@@ -50,7 +50,10 @@ pub(crate) struct Situation {
 
 impl Situation {
     pub(crate) fn new(scene: &Scene, setup: &Setup) -> Self {
-        let sea = sample::sea(&setup.sea, setup.image.nyquist_wavenumber());
+        // Half a cell of the sea's lattice more than the band: cells at its edge hold waves from beyond.
+        let half_cell = 1.0 / setup.image.rows.min(setup.image.columns) as f64;
+        let band = setup.image.nyquist_wavenumber() * (1.0 + half_cell);
+        let sea = sample::sea(&setup.sea, band);
         let (wake, crowding) = match &setup.wake {
             Some(wake) => sampled_wake(wake, &setup.image),
             None => (Vec::new(), 1.0),

@@ -12,6 +12,10 @@ pub(crate) struct Bicubic {
 }
 
 impl Bicubic {
+    pub(crate) fn nodes(&self) -> [usize; 2] {
+        self.nodes
+    }
+
     pub(crate) fn through(lattice: Lattice) -> Self {
         Self {
             start: lattice.start,

@@ -78,6 +78,12 @@ impl BackscatterTable {
         }
     }
 
+    /// Nodes along the two principal axes of the unresolved slopes.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        self.bragg.nodes()
+    }
+
     /// Stated absolute error of the interpolated σ⁰ [1].
     #[must_use]
     pub fn error(&self) -> f64 {
@@ -223,7 +229,10 @@ fn interpolation_error(lattice: &Lattice) -> f64 {
     difference / 8.0
 }
 
-/// Range of the slopes along two axes, at least 0 to 0 and at most [`STEEPEST`] either way.
+/// The range of a table ends on multiples of this slope [1]: fields that hardly differ get the same table.
+const RANGE_STEP: f64 = 1.0 / 16.0;
+
+/// Range of the slopes along two axes, rounded outward, at least 0 to 0 and at most [`STEEPEST`] either way.
 fn extent(axes: &PrincipalAxes, slope_x: &[f32], slope_y: &[f32]) -> [[f64; 2]; 2] {
     let widen = |a: [[f64; 2]; 2], b: [[f64; 2]; 2]| {
         [0, 1].map(|n| [a[n][0].min(b[n][0]), a[n][1].max(b[n][1])])
@@ -239,7 +248,8 @@ fn extent(axes: &PrincipalAxes, slope_x: &[f32], slope_y: &[f32]) -> [[f64; 2]; 
         .zip(slope_y.par_chunks(1 << 14))
         .map(of_chunk)
         .reduce(|| [[0.0; 2]; 2], widen);
-    range.map(|r| r.map(|bound| bound.clamp(-STEEPEST, STEEPEST)))
+    let outward = |bound: f64| bound.signum() * (bound.abs() / RANGE_STEP).ceil() * RANGE_STEP;
+    range.map(|r| r.map(|bound| outward(bound).clamp(-STEEPEST, STEEPEST)))
 }
 
 #[cfg(test)]

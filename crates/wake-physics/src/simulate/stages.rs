@@ -172,7 +172,7 @@ impl<'a> Run<'a> {
         }
         let error = SHARE_OF_IMAGE * self.scene.model.tolerance * plan.mean_sigma0;
         let table = BackscatterTable::covering(backscatter, facets.slope_x, facets.slope_y, error);
-        (table.sigma0_field(&facets), [0, 0])
+        (table.sigma0_field(&facets), table.size())
     }
 
     /// Intensity of the image before speckle.

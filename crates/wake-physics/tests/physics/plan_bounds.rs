@@ -72,29 +72,20 @@ fn what_is_left_out_is_bounded() {
             continue;
         }
         let actual = difference / mean;
-        // Both runs carry the error of the numerical methods, each within its share of the tolerance.
-        let numerical = 0.5 * scene.model.tolerance;
+        // Both runs carry the error of the numerical methods, mostly the same; where a field differs by its last bit,
+        // the kernels of the imaging may take another step. A hundredth of the tolerance is allowed for that.
+        let allowance = 0.01 * scene.model.tolerance;
         println!(
-            "{n} bound {bound:.3e} actual {actual:.3e} tolerance {}",
+            "{n} bound {bound:.2e} actual {actual:.2e} tolerance {}",
             scene.model.tolerance
         );
-        if bound == 0.0 {
-            assert!(
-                actual <= numerical,
-                "scene {n}: {actual} without anything left out"
-            );
-            continue;
-        }
-        if actual > bound {
-            println!("VIOLATION {n}\n{}\n{scene:?}", needed.plan);
-            continue;
-        }
         assert!(
-            actual <= bound + 0.1 * numerical,
+            actual <= bound + allowance,
             "scene {n}: {actual} above {bound}\n{}",
             needed.plan
         );
-        if actual > 0.0 {
+        // Below 1e-6 there is only the rounding of f32 fields to be seen.
+        if bound > 0.0 && actual > 1e-6 {
             ratios.push(bound / actual);
         }
     }
