@@ -66,7 +66,13 @@ mod tests {
     #[allow(clippy::float_cmp, reason = "the ends are exact")]
     fn the_ends_are_black_and_white() {
         let scale = GreyScale::default();
-        for (sigma0, grey) in [(0.0, 0.0), (1e-9, 0.0), (-1.0, 0.0), (1e3, 1.0), (f64::INFINITY, 1.0)] {
+        for (sigma0, grey) in [
+            (0.0, 0.0),
+            (1e-9, 0.0),
+            (-1.0, 0.0),
+            (1e3, 1.0),
+            (f64::INFINITY, 1.0),
+        ] {
             assert_eq!(scale.grey(sigma0), grey);
         }
         assert!((scale.grey(0.1) - 0.5).abs() < 1e-12);
@@ -90,7 +96,9 @@ mod tests {
     #[test]
     fn brighter_is_never_darker() {
         let scale = GreyScale::default();
-        let greys: Vec<f64> = (0..200).map(|i| scale.grey(1e-4 * 1.1f64.powi(i))).collect();
+        let greys: Vec<f64> = (0..200)
+            .map(|i| scale.grey(1e-4 * 1.1f64.powi(i)))
+            .collect();
         assert!(greys.windows(2).all(|w| w[0] <= w[1]));
     }
 

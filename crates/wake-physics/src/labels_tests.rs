@@ -56,7 +56,10 @@ fn eight_headings() {
         // On the screen, up is row 0: heading h moves (sin h, −cos h) in (column, row).
         let (sin, cos) = heading.to_radians().sin_cos();
         let wake = &labels.wake;
-        assert!(close(wake.apex_px.unwrap(), [100.0 + 10.0 * sin, 100.0 - 10.0 * cos]));
+        assert!(close(
+            wake.apex_px.unwrap(),
+            [100.0 + 10.0 * sin, 100.0 - 10.0 * cos]
+        ));
         let [from, to] = wake.centreline_px.unwrap();
         assert!(close(from, [100.0 - 10.0 * sin, 100.0 + 10.0 * cos]));
         for (arm, side) in wake.arms_px.iter().zip([1.0, -1.0]) {
@@ -64,7 +67,10 @@ fn eight_headings() {
             let bearing = (heading + 180.0).to_radians() + side * KELVIN_HALF_ANGLE;
             let [dx, dy] = [arm[1][0] - arm[0][0], arm[1][1] - arm[0][1]];
             let length = dx.hypot(dy);
-            assert!(close([dx / length, dy / length], [bearing.sin(), -bearing.cos()]));
+            assert!(close(
+                [dx / length, dy / length],
+                [bearing.sin(), -bearing.cos()]
+            ));
             assert!(on_edge(arm[1]), "{heading} {arm:?}");
         }
         assert!(on_edge(to));
@@ -209,7 +215,13 @@ fn json_has_the_stated_keys_and_empty_lists() {
         assert_eq!(value["wake"][key].as_array().unwrap().len(), length);
     }
     let empty = serde_json::to_value(Labels::default()).unwrap();
-    for key in ["apex_px", "arms_px", "centreline_px", "box_px", "oriented_box_px"] {
+    for key in [
+        "apex_px",
+        "arms_px",
+        "centreline_px",
+        "box_px",
+        "oriented_box_px",
+    ] {
         assert_eq!(empty["wake"][key], serde_json::json!([]));
     }
     assert_eq!(empty["ship"]["echo_px"], serde_json::json!([]));

@@ -45,9 +45,9 @@ pub struct Sources<'a> {
     pub raster: Raster,
     /// Backscatter σ⁰ [1].
     pub sigma0: &'a Field,
-    /// Velocity toward the radar u_r [m/s]: displaces in azimuth.
+    /// Velocity toward the radar `u_r` [m/s]: displaces in azimuth.
     pub radial_velocity: Option<&'a Field>,
-    /// Acceleration toward the radar a_r [m/s²]: defocuses.
+    /// Acceleration toward the radar `a_r` [m/s²]: defocuses.
     pub radial_acceleration: Option<&'a Field>,
     /// Elevation ζ [m]: displaces in range.
     pub elevation: Option<&'a Field>,
@@ -56,9 +56,9 @@ pub struct Sources<'a> {
 /// Largest absolute values of what displaces and defocuses.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Extremes {
-    /// Of the velocity toward the radar u_r [m/s].
+    /// Of the velocity toward the radar `u_r` [m/s].
     pub radial_velocity: f64,
-    /// Of the acceleration toward the radar a_r [m/s²].
+    /// Of the acceleration toward the radar `a_r` [m/s²].
     pub radial_acceleration: f64,
     /// Of the elevation ζ [m].
     pub elevation: f64,
@@ -123,12 +123,7 @@ struct Sum<'a> {
 }
 
 impl<'a> Sum<'a> {
-    fn new(
-        imaging: &Imaging,
-        sources: &'a Sources<'a>,
-        image: &'a Raster,
-        tolerance: f64,
-    ) -> Self {
+    fn new(imaging: &Imaging, sources: &'a Sources<'a>, image: &'a Raster, tolerance: f64) -> Self {
         let response = Response::new(imaging, &sources.raster, image);
         let steps = Steps::new(response.variance_at(0.0), tolerance);
         let (filling_first, filling) = steps.filling_taps();
@@ -150,9 +145,7 @@ impl<'a> Sum<'a> {
 
     /// Columns of a block: enough blocks for many threads, few sources looked at twice.
     fn block_width(&self) -> usize {
-        (self.image.columns / 16)
-            .clamp(8, 32)
-            .max(2 * self.lean)
+        (self.image.columns / 16).clamp(8, 32).max(2 * self.lean)
     }
 
     /// Columns of the sources that can reach these columns of the image.
@@ -209,7 +202,12 @@ impl<'a> Sum<'a> {
             let share = column - left as f32;
             let power = sigma0 * taps.scale;
             let target = first + j as i32 + left;
-            lines.add(target, from, &taps.values[..taps.count], power * (1.0 - share));
+            lines.add(
+                target,
+                from,
+                &taps.values[..taps.count],
+                power * (1.0 - share),
+            );
             if share > 0.0 {
                 lines.add(target + 1, from, &taps.values[..taps.count], power * share);
             }

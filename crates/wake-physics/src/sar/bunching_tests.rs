@@ -71,7 +71,12 @@ fn still(raster: Raster, sigma0: &Field) -> Sources<'_> {
 /// The tolerance is met at every level, for widths from half a pixel to many, sizes even, odd, prime and 1.
 #[test]
 fn fast_sum_is_the_dense_sum() {
-    let widths = [(0.0, 0.0, 0.0), (6.0, 0.0, 9.0), (12.0, 60.0, 50.0), (30.0, 150.0, 9.0)];
+    let widths = [
+        (0.0, 0.0, 0.0),
+        (6.0, 0.0, 9.0),
+        (12.0, 60.0, 50.0),
+        (30.0, 150.0, 9.0),
+    ];
     for (rows, columns) in [(61, 40), (128, 37), (1, 1), (7, 90)] {
         let image = Raster::image(rows, columns, 2.5);
         let scene = Scene::random(image.with_margin(20, 3), [0.3, 0.8, 0.7]);
@@ -91,7 +96,10 @@ fn fast_sum_is_the_dense_sum() {
                 let (_, rms) = fast.difference(&exact);
                 // Rounding of f32: places to 1e-6 of a pixel and sums of some hundred taps.
                 let allowed = (tolerance + 2e-6) * exact.mean();
-                assert!(rms <= allowed, "{rows}x{columns} {nominal} {tolerance}: {rms} {allowed}");
+                assert!(
+                    rms <= allowed,
+                    "{rows}x{columns} {nominal} {tolerance}: {rms} {allowed}"
+                );
             }
         }
     }
@@ -146,7 +154,7 @@ fn centre(image: &Field, raster: &Raster) -> [f64; 2] {
     [sums[0] / sums[2], sums[1] / sums[2]]
 }
 
-/// A patch that approaches is imaged (R/V)·u_r further along the flight: larger y, smaller row. One that is
+/// A patch that approaches is imaged (R/V)·`u_r` further along the flight: larger y, smaller row. One that is
 /// raised is imaged ζ cot θ nearer to the radar.
 #[test]
 fn a_moving_patch_is_displaced() {
@@ -168,7 +176,10 @@ fn a_moving_patch_is_displaced() {
             let moved = 78.0 * f64::from(velocity);
             let leaned = -f64::from(elevation) / 0.5585f64.tan();
             // What the tolerance leaves out lies at most some standard deviations (14 m) away.
-            assert!((y - moved).abs() < 1e-2 && (x - leaned).abs() < 1e-3, "{x} {y}");
+            assert!(
+                (y - moved).abs() < 1e-2 && (x - leaned).abs() < 1e-3,
+                "{x} {y}"
+            );
         }
     }
 }
@@ -306,7 +317,10 @@ fn monte_carlo_meets_the_quasi_linear_cutoff() {
         };
         let seen = amplitude(&imaging.image(&sources, &image, 1e-4), waves);
         // Every one of 65,536 sources has a random phase: standard error √(2·1.5/65,536) = 0.007 at most.
-        assert!((seen[0] - expected).abs() < 0.02, "{waves}: {seen:?} {expected}");
+        assert!(
+            (seen[0] - expected).abs() < 0.02,
+            "{waves}: {seen:?} {expected}"
+        );
         assert!(seen[1].abs() < 0.02);
 
         // A swell of velocity u cos(kr), r down the rows: y' = y + βu, so the row falls, dr = −βu. To first order
@@ -322,7 +336,10 @@ fn monte_carlo_meets_the_quasi_linear_cutoff() {
         };
         let seen = amplitude(&imaging.image(&sources, &image, 1e-4), waves);
         // J₁(0.2)·2 is 0.199; the rest is the same statistical error.
-        assert!((seen[1] + 0.199 * expected).abs() < 0.02, "{waves}: {seen:?}");
+        assert!(
+            (seen[1] + 0.199 * expected).abs() < 0.02,
+            "{waves}: {seen:?}"
+        );
         assert!(seen[0].abs() < 0.02);
     }
 }
@@ -357,5 +374,8 @@ fn coherence_is_bunching_by_unresolved_waves() {
     let bunched = spread(&at_rest.image(&resolved, &raster, 1e-5));
     let smeared = spread(&unresolved.image(&still(raster, &line), &raster, 1e-5));
     // A standard deviation from 400 samples: 1/√800 = 3.5 %; two of them and a half.
-    assert!((bunched / smeared - 1.0).abs() < 0.09, "{bunched} {smeared}");
+    assert!(
+        (bunched / smeared - 1.0).abs() < 0.09,
+        "{bunched} {smeared}"
+    );
 }

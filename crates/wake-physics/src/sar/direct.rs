@@ -79,7 +79,8 @@ fn place(response: &Response, sources: &Sources<'_>, i: usize, j: usize) -> (f64
     let at = |field: Option<&Field>| field.map_or(0.0, |f| f64::from(f.at(i, j)));
     let [rows, columns] = response.offset;
     let row = (i as i64 + rows) as f64 - response.rows_per_velocity * at(sources.radial_velocity);
-    let column = (j as i64 + columns) as f64 - response.columns_per_elevation * at(sources.elevation);
+    let column =
+        (j as i64 + columns) as f64 - response.columns_per_elevation * at(sources.elevation);
     let variance = response.variance_at(at(sources.radial_acceleration));
     let source = Source {
         row,

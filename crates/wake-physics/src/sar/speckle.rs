@@ -157,8 +157,14 @@ mod tests {
     fn seed_decides_and_threads_do_not() {
         assert_eq!(flat(4, 1), flat(4, 1));
         assert_ne!(flat(4, 1), flat(4, 2));
-        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let one = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap();
+        let three = rayon::ThreadPoolBuilder::new()
+            .num_threads(3)
+            .build()
+            .unwrap();
         assert_eq!(one.install(|| flat(9, 1)), three.install(|| flat(9, 1)));
     }
 

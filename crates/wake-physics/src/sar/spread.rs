@@ -109,10 +109,7 @@ mod tests {
         for i in 0..=12_700 {
             let x = -0.01 * i as f32;
             let exact = f64::from(x).max(-126.0).exp2();
-            assert!(
-                (f64::from(exp2(x)) / exact - 1.0).abs() < 3e-7,
-                "x {x}"
-            );
+            assert!((f64::from(exp2(x)) / exact - 1.0).abs() < 3e-7, "x {x}");
         }
     }
 
