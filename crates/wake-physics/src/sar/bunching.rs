@@ -45,9 +45,9 @@ pub struct Sources<'a> {
     pub raster: Raster,
     /// Backscatter σ⁰ [1].
     pub sigma0: &'a Field,
-    /// Velocity toward the radar u_r [m/s]: displaces in azimuth.
+    /// Velocity toward the radar `u_r` [m/s]: displaces in azimuth.
     pub radial_velocity: Option<&'a Field>,
-    /// Acceleration toward the radar a_r [m/s²]: defocuses.
+    /// Acceleration toward the radar `a_r` [m/s²]: defocuses.
     pub radial_acceleration: Option<&'a Field>,
     /// Elevation ζ [m]: displaces in range.
     pub elevation: Option<&'a Field>,
@@ -56,9 +56,9 @@ pub struct Sources<'a> {
 /// Largest absolute values of what displaces and defocuses.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Extremes {
-    /// Of the velocity toward the radar u_r [m/s].
+    /// Of the velocity toward the radar `u_r` [m/s].
     pub radial_velocity: f64,
-    /// Of the acceleration toward the radar a_r [m/s²].
+    /// Of the acceleration toward the radar `a_r` [m/s²].
     pub radial_acceleration: f64,
     /// Of the elevation ζ [m].
     pub elevation: f64,

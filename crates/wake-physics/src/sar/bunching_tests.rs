@@ -154,7 +154,7 @@ fn centre(image: &Field, raster: &Raster) -> [f64; 2] {
     [sums[0] / sums[2], sums[1] / sums[2]]
 }
 
-/// A patch that approaches is imaged (R/V)·u_r further along the flight: larger y, smaller row. One that is
+/// A patch that approaches is imaged (R/V)·`u_r` further along the flight: larger y, smaller row. One that is
 /// raised is imaged ζ cot θ nearer to the radar.
 #[test]
 fn a_moving_patch_is_displaced() {

@@ -43,7 +43,7 @@ pub struct Echo {
     pub beam: f64,
     /// Radar cross section [m²].
     pub cross_section: f64,
-    /// Azimuth displacement (R/V)·u_r [m], see [`crate::sar::geometry::azimuth_displacement`].
+    /// Azimuth displacement (R/V)·`u_r` [m], see [`crate::sar::geometry::azimuth_displacement`].
     pub displacement: f64,
 }
 

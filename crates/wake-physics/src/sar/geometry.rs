@@ -6,9 +6,9 @@
 /// u_r = v_z cos θ − v_x sin θ
 /// ```
 ///
-/// - `velocity_x` v_x [m/s], away from the radar; `velocity_z` v_z [m/s], upward
+/// - `velocity_x` `v_x` [m/s], away from the radar; `velocity_z` `v_z` [m/s], upward
 /// - `incidence` θ [rad]
-/// - returns u_r [m/s]; the same sum of two accelerations is the acceleration toward the radar [m/s²]
+/// - returns `u_r` [m/s]; the same sum of two accelerations is the acceleration toward the radar [m/s²]
 #[must_use]
 pub fn radial_velocity(velocity_x: f64, velocity_z: f64, incidence: f64) -> f64 {
     velocity_z * incidence.cos() - velocity_x * incidence.sin()
@@ -21,7 +21,7 @@ pub fn radial_velocity(velocity_x: f64, velocity_z: f64, incidence: f64) -> f64 
 /// ```
 ///
 /// - `speed` U [m/s]; `heading` where it moves to [deg clockwise from azimuth]; `incidence` θ [rad]
-/// - returns u_r [m/s], negative for a ship that moves away from the radar
+/// - returns `u_r` [m/s], negative for a ship that moves away from the radar
 #[must_use]
 pub fn ship_radial_velocity(speed: f64, heading: f64, incidence: f64) -> f64 {
     radial_velocity(speed * direction(heading)[0], 0.0, incidence)
@@ -33,7 +33,7 @@ pub fn ship_radial_velocity(speed: f64, heading: f64, incidence: f64) -> f64 {
 /// Δy = (R/V) u_r
 /// ```
 ///
-/// - `range_to_velocity` R/V [s]; `radial_velocity` u_r [m/s], toward the radar positive
+/// - `range_to_velocity` R/V [s]; `radial_velocity` `u_r` [m/s], toward the radar positive
 /// - returns Δy [m]: along the flight for a point that approaches
 ///
 /// # References
