@@ -85,6 +85,12 @@ impl Hull {
         self.length
     }
 
+    /// Beam B [m].
+    #[must_use]
+    pub fn beam(&self) -> f64 {
+        self.beam
+    }
+
     /// Draft T [m].
     #[must_use]
     pub fn draft(&self) -> f64 {

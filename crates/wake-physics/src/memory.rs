@@ -9,11 +9,12 @@ use crate::error::{Error, Result};
 /// # Errors
 ///
 /// [`Error::TooLarge`] with what is needed and what is free.
-pub(crate) fn check(rows: usize, columns: usize, needed: u64) -> Result<()> {
+pub(crate) fn check([rows, columns]: [usize; 2], margin: [usize; 2], needed: u64) -> Result<()> {
     match available() {
         Some(free) if needed > free => Err(Error::TooLarge {
             rows,
             columns,
+            margin,
             needed_gib: needed as f64 / GIB,
             available_gib: free as f64 / GIB,
         }),
@@ -48,9 +49,9 @@ mod tests {
 
     #[test]
     fn what_never_fits_is_refused_where_the_system_tells() {
-        assert!(check(1, 1, 0).is_ok());
+        assert!(check([1, 1], [0, 0], 0).is_ok());
         if available().is_some() {
-            let message = check(9, 9, u64::MAX).unwrap_err().to_string();
+            let message = check([9, 9], [0, 0], u64::MAX).unwrap_err().to_string();
             assert!(message.contains("grid.rows"), "{message}");
         }
     }

@@ -11,6 +11,7 @@ use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale};
 use crate::scene::{HullForm, Radar, Scene, Ship};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
 use crate::track::Track;
+use crate::turbulent::TurbulentWake;
 use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
 use num_complex::Complex64;
@@ -179,5 +180,15 @@ fn wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
         track: Track::new(ship.position, ship.heading, ship.speed * time),
         depth,
         filter_depth: ship.filter_depth,
+    }
+}
+
+/// The turbulent wake of the same ship.
+pub(crate) fn turbulent_wake(wake: &KelvinWake) -> TurbulentWake {
+    TurbulentWake {
+        track: wake.track,
+        speed: wake.speed,
+        length: wake.hull.length(),
+        beam: wake.hull.beam(),
     }
 }

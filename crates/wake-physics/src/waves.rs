@@ -1,5 +1,9 @@
 //! Plane waves, what each carries, and the slow sum of them that everything fast is checked against.
 
+mod matrix_product;
+
+pub use matrix_product::matrix_product;
+
 use crate::raster::{Field, Raster};
 use num_complex::Complex64;
 use rayon::prelude::*;

@@ -92,16 +92,8 @@ fn simpson(f: impl Fn(f64) -> Vec<f64>, count: usize, error: f64) -> Vec<f64> {
     for _ in 0..HALVINGS {
         let step = 1.0 / n as f64;
         let middle = sum(0.5 * step, step, n);
-        let finer: Vec<f64> = trapezoid
-            .iter()
-            .zip(&middle)
-            .map(|(t, m)| 0.5 * (t + m))
-            .collect();
-        let rule: Vec<f64> = finer
-            .iter()
-            .zip(&trapezoid)
-            .map(|(f, t)| (4.0 * f - t) / 3.0)
-            .collect();
+        let finer: Vec<f64> = trapezoid.iter().zip(&middle).map(|(t, m)| 0.5 * (t + m)).collect();
+        let rule: Vec<f64> = finer.iter().zip(&trapezoid).map(|(f, t)| (4.0 * f - t) / 3.0).collect();
         let settled = (0..count).all(|i| (rule[i] - old[i]).abs() <= error * rule[count + i]);
         (n, trapezoid, old) = (2 * n, finer, rule);
         if settled {

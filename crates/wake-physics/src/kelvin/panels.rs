@@ -128,17 +128,11 @@ impl KelvinWake {
 
 impl WakePlan {
     fn smallest_u(&self) -> f64 {
-        self.quadrature
-            .iter()
-            .map(|n| n.0.abs())
-            .fold(f64::INFINITY, f64::min)
+        self.quadrature.iter().map(|n| n.0.abs()).fold(f64::INFINITY, f64::min)
     }
 
     fn largest_u(&self) -> f64 {
-        self.quadrature
-            .iter()
-            .map(|n| n.0.abs())
-            .fold(0.0, f64::max)
+        self.quadrature.iter().map(|n| n.0.abs()).fold(0.0, f64::max)
     }
 }
 
@@ -233,8 +227,7 @@ impl<'a> Builder<'a> {
 pub(super) fn unwindowed(
     reach: &Reach,
     [from, to]: [f64; 2],
-    first: f64,
-    grading: i32,
+    (first, grading): (f64, i32),
     error: f64,
 ) -> Vec<(f64, f64)> {
     let mut builder = Builder::new(reach, error, 1.0);
@@ -245,6 +238,14 @@ pub(super) fn unwindowed(
         fall: 0.0,
     };
     builder.add(piece, first, grading);
+    builder.plan.quadrature
+}
+
+/// Nodes and weights of one piece, window included.
+#[cfg(test)]
+pub(super) fn nodes_of(reach: &Reach, piece: Piece, error: f64) -> Vec<(f64, f64)> {
+    let mut builder = Builder::new(reach, error, (-error.ln()).sqrt());
+    builder.add(piece, 0.0, 0);
     builder.plan.quadrature
 }
 

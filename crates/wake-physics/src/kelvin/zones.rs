@@ -139,8 +139,10 @@ impl Reach {
     }
 
     fn widen(&self, [low, high]: [f64; 2], [from, to]: [f64; 2], phase: f64) -> Piece {
-        let ([left, left_start], [right, right_start]) =
-            (self.end_of(low, from, phase), self.end_of(high, to, phase));
+        let ([left, left_start], [right, right_start]) = (
+            self.end_of(low, from, phase),
+            self.end_of(high, to, phase),
+        );
         Piece {
             from: left,
             to: right,

@@ -85,7 +85,7 @@ impl Plan {
         let margin = situation.margin(setup);
         let raster = setup.image.with_margin(margin[0], margin[1]);
         let needed = FIELDS_IN_MEMORY * 4 * raster.len() as u64;
-        memory::check(scene.grid.rows, scene.grid.columns, needed)?;
+        memory::check([scene.grid.rows, scene.grid.columns], margin, needed)?;
         let mut plan = Self {
             terms,
             sizes: Sizes {

@@ -7,8 +7,7 @@ use crate::raster::Raster;
 use crate::sar::AzimuthResolution;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::{Scene, Term};
-use crate::setup::Setup;
-use crate::turbulent::TurbulentWake;
+use crate::setup::{Setup, turbulent_wake};
 
 /// Step of the differences that give the slope of ln σ⁰ [1].
 const SLOPE_STEP: f64 = 0.05;
@@ -26,8 +25,6 @@ pub(crate) struct Situation {
     pub(crate) sea: Vec<WaveSample>,
     /// Resolved waves of the wake.
     pub(crate) wake: Vec<WaveSample>,
-    /// Mean square of the wake's waves close behind the ship over that in the image.
-    pub(crate) crowding: f64,
     /// How waves modulate the image.
     pub(crate) image: LinearImage,
     /// ½ ∂²ln σ⁰/∂slope² along x and y, absolute.
@@ -66,7 +63,6 @@ impl Situation {
         let mut situation = Self {
             sea,
             wake,
-            crowding,
             image: LinearImage {
                 transfer: setup.transfer,
                 tilt,
@@ -219,7 +215,7 @@ fn damping(setup: &Setup) -> f64 {
     let Some(wake) = setup.wake.as_ref().filter(|w| w.speed > 0.0) else {
         return 0.0;
     };
-    let turbulent = TurbulentWake::of(wake);
+    let turbulent = turbulent_wake(wake);
     let image = &setup.image;
     let (rows, columns) = (
         image.rows.min(DAMPING_POINTS),
@@ -232,7 +228,7 @@ fn damping(setup: &Setup) -> f64 {
                 image.x(j * image.columns / columns),
                 image.y(i * image.rows / rows),
             );
-            sum += turbulent.damping_at([x, y]).powi(2);
+            sum += turbulent.damping(wake.track.seen_from_ship([x, y])).powi(2);
         }
     }
     (sum / (rows * columns) as f64).sqrt()

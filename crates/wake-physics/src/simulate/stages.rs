@@ -14,9 +14,8 @@ use crate::sar::speckle::speckle;
 use crate::sar::{AzimuthResolution, Echo, Imaging, Sources};
 use crate::scattering::{BackscatterTable, FacetFields};
 use crate::scene::{Scene, Term};
-use crate::setup::Setup;
+use crate::setup::{Setup, turbulent_wake};
 use crate::surface::Surface;
-use crate::turbulent::TurbulentWake;
 use crate::waves::{Quantity, harmonic_fields};
 use rayon::prelude::*;
 
@@ -148,7 +147,11 @@ impl<'a> Run<'a> {
             .wake
             .as_ref()
             .filter(|_| plan.uses(Term::Turbulent))?;
-        Some(TurbulentWake::of(wake).remaining(&self.raster))
+        let mut field = turbulent_wake(wake).damping_field(&self.raster);
+        for damping in &mut field.values {
+            *damping = 1.0 - *damping;
+        }
+        Some(field)
     }
 
     /// σ⁰, and the size of its table.

@@ -110,14 +110,14 @@ fn ahead_of_the_ship_there_is_no_wake() {
             format!("ship.position={position}"),
             format!(
                 "ship.heading={}",
-                if position.starts_with("[-") { 270 } else { 90 }
+                90
             ),
         ];
         let refs: Vec<&str> = assignments.iter().map(String::as_str).collect();
         let simulation = run(&small(48, 48, &refs));
         let rms = simulation.elevation.rms();
         if position.starts_with("[-") {
-            assert_eq!(rms, 0.0, "the image lies astern of nothing");
+            assert_eq!(rms, 0.0, "the image lies ahead of the bow");
         } else {
             assert!(rms.is_finite());
         }
@@ -250,7 +250,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 24, max_shrink_iters: 10, ..ProptestConfig::default() })]
 
     #[test]
     fn random_scenes_are_sound_and_reproducible(scene in scenes()) {
