@@ -10,6 +10,7 @@ pub mod quadrature;
 mod raster;
 pub mod scene;
 pub mod track;
+pub mod turbulent;
 pub mod waves;
 
 pub use error::{Error, Result};

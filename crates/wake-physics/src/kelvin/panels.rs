@@ -227,8 +227,7 @@ impl<'a> Builder<'a> {
 pub(super) fn unwindowed(
     reach: &Reach,
     [from, to]: [f64; 2],
-    first: f64,
-    grading: i32,
+    (first, grading): (f64, i32),
     error: f64,
 ) -> Vec<(f64, f64)> {
     let mut builder = Builder::new(reach, error, 1.0);
@@ -239,6 +238,14 @@ pub(super) fn unwindowed(
         fall: 0.0,
     };
     builder.add(piece, first, grading);
+    builder.plan.quadrature
+}
+
+/// Nodes and weights of one piece, window included.
+#[cfg(test)]
+pub(super) fn nodes_of(reach: &Reach, piece: Piece, error: f64) -> Vec<(f64, f64)> {
+    let mut builder = Builder::new(reach, error, (-error.ln()).sqrt());
+    builder.add(piece, 0.0, 0);
     builder.plan.quadrature
 }
 

@@ -40,7 +40,7 @@ impl KelvinWake {
             2.0 * self.hull.draft(),
         );
         let range = [first, first + LAST_LAMBDA.acosh()];
-        let integral: f64 = unwindowed(&reach, range, first, self.grading(), ERROR)
+        let integral: f64 = unwindowed(&reach, range, (first, self.grading()), ERROR)
             .into_iter()
             .map(|(u, du)| {
                 let wave = steady.at(u);

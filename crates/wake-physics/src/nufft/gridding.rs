@@ -2,15 +2,14 @@
 
 use super::Size;
 use super::kernel::{Kernel, WIDEST};
-use crate::fft::fast_length;
 use crate::raster::Raster;
 
 /// Oversampling factors tried: finer lattices cost transforms, coarser ones wider kernels and rounding.
 const OVERSAMPLING: [f64; 5] = [1.2, 1.35, 1.5, 1.75, 2.0];
 
-/// Largest rounding error at a pixel in units of (machine epsilon · amplification² · rms of unrelated
-/// waves); measured, see the tests.
-const ROUNDING: f64 = 4.0;
+/// Largest rounding error at a pixel over (machine epsilon · root of the sum of squares of the strengths), as
+/// ROUNDING[0] + ROUNDING[1]·amplification²; measured, see the tests.
+const ROUNDING: [f64; 2] = [12.0, 0.8];
 
 /// Kernel, lattice and precision of one synthesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,10 +72,10 @@ impl Gridding {
         best
     }
 
-    fn new(error: f64, oversampling: f64, raster: &Raster, double_precision: bool) -> Self {
+    pub(crate) fn new(error: f64, oversampling: f64, raster: &Raster, double_precision: bool) -> Self {
         let lattice = [raster.rows, raster.columns].map(|n| {
             let half = (0.5 * oversampling * n as f64).ceil() as usize;
-            2 * fast_length(half.max(WIDEST))
+            lattice_length(2 * half.max(WIDEST))
         });
         let actual = (lattice[0] as f64 / raster.rows as f64)
             .min(lattice[1] as f64 / raster.columns as f64);
@@ -88,13 +87,13 @@ impl Gridding {
     }
 
     /// Largest rounding error over the root of the sum of squares of the strengths.
-    fn rounding(&self) -> f64 {
+    pub(crate) fn rounding(&self) -> f64 {
         let epsilon = if self.double_precision {
             f64::EPSILON
         } else {
             f64::from(f32::EPSILON)
         };
-        ROUNDING * epsilon * self.kernel.amplification.powi(2)
+        epsilon * (ROUNDING[0] + ROUNDING[1] * self.kernel.amplification.powi(2))
     }
 
     /// Bound on the error of a field at every pixel.
@@ -111,5 +110,32 @@ impl Gridding {
         let kernels = 40.0 * waves as f64 * width;
         let spreading = pairs * 2.0 * waves as f64 * width * width;
         kernels + precision * (0.4 * pairs * points * points.log2() + spreading)
+    }
+}
+
+/// The smallest length of at least `n` that is 8·2^a·3^b or five times that: even, as the lattice must be,
+/// and transformed in half the time a pixel of lengths with 5³ or 7.
+fn lattice_length(n: usize) -> usize {
+    let mut m = n.div_ceil(8).max(1);
+    loop {
+        let mut rest = m >> m.trailing_zeros();
+        while rest.is_multiple_of(3) {
+            rest /= 3;
+        }
+        if rest == 1 || rest == 5 {
+            return 8 * m;
+        }
+        m += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lattice_lengths_are_even_and_smooth() {
+        let lengths = [1, 8, 9, 641, 650, 700, 3600].map(lattice_length);
+        assert_eq!(lengths, [8, 8, 16, 648, 720, 720, 3840]);
     }
 }

@@ -27,6 +27,7 @@ use crate::raster::{Field, Raster};
 use crate::waves::{PlaneWaves, Quantity, Transfer, strengths};
 use gridding::Demand;
 use num_complex::{Complex, Complex64};
+use rayon::prelude::*;
 use spread::Footprints;
 use std::f64::consts::TAU;
 
@@ -74,9 +75,10 @@ pub fn synthesize(
         } else {
             sums.run::<f32>(&gridding, &todo, &mut fields);
         }
-        for &q in &todo {
-            // A field below its own error says nothing yet: halve the estimate at least.
-            rms[q] = fields[q].rms().max(1e-6 * rms[q]);
+        let measured: Vec<f64> = todo.par_iter().map(|&q| fields[q].rms()).collect();
+        for (&q, measured) in todo.iter().zip(measured) {
+            // A field below its own error says nothing yet; the estimate falls, but never to nothing.
+            rms[q] = measured.max(1e-6 * rms[q]);
         }
         let spare = attempt < ATTEMPTS;
         todo.retain(|&q| spare && gridding.error_bound(&sums.sizes[q]) > tolerance * rms[q]);

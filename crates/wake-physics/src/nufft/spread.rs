@@ -1,6 +1,6 @@
 //! Spreading: each wave adds its kernel to the lattice points around its wavenumber.
 
-use super::kernel::Kernel;
+use super::kernel::{Kernel, WIDEST};
 use crate::fft::Real;
 use num_complex::Complex;
 use rayon::prelude::*;
@@ -130,9 +130,12 @@ fn first_point(g: f64, width: usize) -> i64 {
 /// Kernel weights around g, with the sign (−1)^index that moves the field's origin to the middle.
 fn fill<T: Real>(out: &mut [T], g: f64, kernel: &Kernel) {
     let first = first_point(g, kernel.width);
-    for (i, v) in out.iter_mut().enumerate() {
-        let point = first + i as i64;
-        let value = kernel.value(point as f64 - g);
-        *v = <T as Real>::from_f64(if point.rem_euclid(2) == 0 { value } else { -value });
+    let mut values = [0.0; WIDEST];
+    let values = &mut values[..kernel.width];
+    kernel.values(first as f64 - g, values);
+    let mut sign = if first.rem_euclid(2) == 0 { 1.0 } else { -1.0 };
+    for (v, value) in out.iter_mut().zip(values) {
+        *v = <T as Real>::from_f64(sign * *value);
+        sign = -sign;
     }
 }

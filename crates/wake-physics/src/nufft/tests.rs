@@ -121,3 +121,29 @@ fn no_wave_is_a_flat_sea() {
     assert!(fields.iter().all(|f| f.values == vec![0.0; 20]));
     assert!(synthesize(&scattered(&raster, 3), &TRANSFER, &[], &raster, 1e-3).is_empty());
 }
+
+/// The rounding of the `f32` transform against the same in `f64`: below its stated bound, which is within a
+/// factor 20 of it.
+#[test]
+fn rounding_is_bounded() {
+    for (rows, columns) in [(64, 64), (300, 250), (45, 700)] {
+        let raster = Raster::image(rows, columns, 2.5);
+        let waves = scattered(&raster, 400);
+        let sums = CentredSums::new(&waves, &TRANSFER, &ALL, &raster);
+        for oversampling in [1.25, 1.5, 2.0] {
+            for error in [1e-3, 1e-5, 1e-7] {
+                let single = Gridding::new(error, oversampling, &raster, false);
+                let double = Gridding { double_precision: true, ..single };
+                let todo: Vec<usize> = (0..ALL.len()).collect();
+                let mut fields = vec![vec![Field::constant(&raster, 0.0); ALL.len()]; 2];
+                sums.run::<f32>(&single, &todo, &mut fields[0]);
+                sums.run::<f64>(&double, &todo, &mut fields[1]);
+                for &q in &todo {
+                    let (max, _) = fields[0][q].difference(&fields[1][q]);
+                    let bound = single.rounding() * sums.sizes[q].root;
+                    assert!(max <= bound && bound <= 20.0 * max, "{max:e} {bound:e} {single:?}");
+                }
+            }
+        }
+    }
+}
