@@ -183,7 +183,8 @@ impl Hull {
     /// Michell (1898), *Philosophical Magazine* 45, 106; in finite depth Sretensky (1936).
     #[must_use]
     pub fn michell_integral(&self, along: f64, wavenumber: f64, depth: f64) -> Complex64 {
-        let amplitude = 0.5 * self.beam * self.longitudinal(along) * self.vertical(wavenumber, depth);
+        let amplitude =
+            0.5 * self.beam * self.longitudinal(along) * self.vertical(wavenumber, depth);
         Complex64::new(0.0, amplitude)
     }
 
@@ -209,8 +210,7 @@ impl Hull {
             return below;
         }
         // e^{−2kh} ∫ v e^{kz} dz, counted from the keel upward so that nothing grows.
-        let from_keel =
-            bilge * rising(k * bilge) + (-k * bilge).exp() * side * decay(k * side);
+        let from_keel = bilge * rising(k * bilge) + (-k * bilge).exp() * side * decay(k * side);
         (below + (k * (draft - 2.0 * depth)).exp() * from_keel) / (1.0 + echo)
     }
 }
@@ -316,7 +316,10 @@ mod tests {
                         let closed = hull.michell_integral(along, k, depth);
                         // Relative to the integral without oscillation and decay: rounding of 1e3 terms.
                         let size = 4.0 * hull.beam * hull.draft * (along * hull.length).min(1.0);
-                        assert!((closed - exact).norm() < 1e-13 * size, "{hull:?} {k} {along}");
+                        assert!(
+                            (closed - exact).norm() < 1e-13 * size,
+                            "{hull:?} {k} {along}"
+                        );
                     }
                 }
             }
@@ -340,7 +343,10 @@ mod tests {
         for hull in hulls() {
             for k in [0.0, 1e-300, 1e-8, 1.0, 1e4, 1e300] {
                 for depth in [1.0, 1e3, f64::INFINITY] {
-                    assert!(hull.michell_integral(k, k, depth).is_finite(), "{k} {depth}");
+                    assert!(
+                        hull.michell_integral(k, k, depth).is_finite(),
+                        "{k} {depth}"
+                    );
                 }
             }
         }

@@ -139,10 +139,8 @@ impl Reach {
     }
 
     fn widen(&self, [low, high]: [f64; 2], [from, to]: [f64; 2], phase: f64) -> Piece {
-        let ([left, left_start], [right, right_start]) = (
-            self.end_of(low, from, phase),
-            self.end_of(high, to, phase),
-        );
+        let ([left, left_start], [right, right_start]) =
+            (self.end_of(low, from, phase), self.end_of(high, to, phase));
         Piece {
             from: left,
             to: right,
@@ -164,6 +162,9 @@ impl Reach {
             } else {
                 begin + step
             };
+            if end == begin {
+                break; // phases turn within the rounding of u: a ship too far to be resolved
+            }
             let more = rule.integrate([begin, end], |u| self.slowest(u)).abs();
             if more > 0.5 * phase {
                 step *= 0.5;
@@ -178,6 +179,9 @@ impl Reach {
                 return [begin, fall.unwrap_or(begin)];
             }
             step *= 1.3;
+        }
+        if turned > 0.0 && (limit - begin).abs() > span.abs() * 1e-12 {
+            return [begin, begin];
         }
         [limit, limit]
     }
