@@ -115,6 +115,7 @@ impl TurbulentWake {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact ends and symmetry")]
 mod tests {
     use super::*;
 

@@ -187,7 +187,9 @@ impl<'a> Builder<'a> {
         let mut start = from;
         while start < to {
             let end = self.panel_end(start, to).max(start.next_up());
-            let begins = first > 0.0 && (start == first || end == -first);
+            // A curve that begins off the axis has no point between ±first.
+            let begins =
+                first > 0.0 && (start > 0.0 && start <= first || end < 0.0 && end >= -first);
             for (t, w) in self.rule.on(0.0, 1.0) {
                 // Where the curve begins off the axis its points go as the square root of u: u ∝ t².
                 let (s, ds) = match (begins, start > 0.0) {

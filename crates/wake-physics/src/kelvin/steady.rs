@@ -123,6 +123,7 @@ fn dispersion_root(a: f64, excess: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "None and exact zeros")]
 mod tests {
     use super::*;
     use crate::constants::GRAVITY;

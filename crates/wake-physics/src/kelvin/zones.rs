@@ -162,8 +162,9 @@ impl Reach {
             } else {
                 begin + step
             };
-            if end == begin {
-                break; // phases turn within the rounding of u: a ship too far to be resolved
+            if (end - begin).abs() <= f64::EPSILON * begin.abs() {
+                // Phases turn within the rounding of u: a ship too far to be resolved.
+                return [begin, fall.unwrap_or(begin)];
             }
             let more = rule.integrate([begin, end], |u| self.slowest(u)).abs();
             if more > 0.5 * phase {
@@ -179,9 +180,6 @@ impl Reach {
                 return [begin, fall.unwrap_or(begin)];
             }
             step *= 1.3;
-        }
-        if turned > 0.0 && (limit - begin).abs() > span.abs() * 1e-12 {
-            return [begin, begin];
         }
         [limit, limit]
     }

@@ -227,4 +227,5 @@ fn pair_of<'f>(
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact zeros")]
 mod tests;
