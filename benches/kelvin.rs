@@ -43,16 +43,24 @@ fn six_fields(c: &mut Criterion) {
         group.bench_with_input(BenchmarkId::new("nodes", size), &raster, |b, raster| {
             b.iter(|| wake.waves(&wake.plan(black_box(raster), 1e-4)));
         });
-        group.bench_with_input(BenchmarkId::new("six_fields", size), &raster, |b, raster| {
-            b.iter(|| synthesize(black_box(&waves), &TRANSFER, &SIX, raster, 1e-4));
-        });
+        group.bench_with_input(
+            BenchmarkId::new("six_fields", size),
+            &raster,
+            |b, raster| {
+                b.iter(|| synthesize(black_box(&waves), &TRANSFER, &SIX, raster, 1e-4));
+            },
+        );
         group.bench_with_input(BenchmarkId::new("fade", size), &raster, |b, raster| {
             b.iter(|| fade_field(&wake.track, 195.0, black_box(raster)));
         });
         if size <= 512 {
-            group.bench_with_input(BenchmarkId::new("matrix_product", size), &raster, |b, raster| {
-                b.iter(|| matrix_product(black_box(&waves), &TRANSFER, &SIX, raster));
-            });
+            group.bench_with_input(
+                BenchmarkId::new("matrix_product", size),
+                &raster,
+                |b, raster| {
+                    b.iter(|| matrix_product(black_box(&waves), &TRANSFER, &SIX, raster));
+                },
+            );
         }
     }
     group.finish();

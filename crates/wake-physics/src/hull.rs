@@ -47,14 +47,14 @@ impl Hull {
 
     /// A fuller hull of a given block coefficient.
     ///
-    /// The family is joined to one parameter by b = 1 − (1 − m)³ (chosen: at C_B = 0.8 half of the length is
+    /// The family is joined to one parameter by b = 1 − (1 − m)³ (chosen: at `C_B` = 0.8 half of the length is
     /// parallel and the midship section has the coefficient 0.96, much like a tanker), so
     ///
     /// ```text
     /// C_B = (2 + m)/3 · (2 + b)/3
     /// ```
     ///
-    /// - `block_coefficient` C_B, 4/9 to below 1; brought into that range
+    /// - `block_coefficient` `C_B`, 4/9 to below 1; brought into that range
     ///
     /// # Validity
     ///
@@ -263,6 +263,7 @@ fn series(x: Complex64, coefficient: impl Fn(f64) -> f64) -> Complex64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact by construction")]
 mod tests {
     use super::*;
 

@@ -115,6 +115,7 @@ impl TurbulentWake {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact ends and symmetry")]
 mod tests {
     use super::*;
 
@@ -146,14 +147,20 @@ mod tests {
         let one_recovery = wake.damping([-97.5 - 1e4, 0.0]);
         assert!((one_recovery / STERN_DAMPING - (-1.0f64).exp()).abs() < 1e-12);
         let half_width = 0.5 * width(26.0, 900.0);
-        let (centre, side) = (wake.damping([-997.5, 0.0]), wake.damping([-997.5, half_width]));
+        let (centre, side) = (
+            wake.damping([-997.5, 0.0]),
+            wake.damping([-997.5, half_width]),
+        );
         assert!((side / centre - (-0.5f64).exp()).abs() < 1e-12);
         assert_eq!(wake.damping([-300.0, 15.0]), wake.damping([-300.0, -15.0]));
     }
 
     #[test]
     fn ship_at_rest_leaves_nothing() {
-        let still = TurbulentWake { speed: 0.0, ..wake() };
+        let still = TurbulentWake {
+            speed: 0.0,
+            ..wake()
+        };
         let raster = Raster::image(20, 30, 10.0);
         assert_eq!(still.damping_field(&raster), Field::constant(&raster, 0.0));
         assert_eq!(still.extent(0.1), 0.0);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 const COARSEST: usize = 256;
 const HALVINGS: usize = 14;
 
-/// Integrates the wake over the wave directions pixel by pixel, by Simpson's rule in the angle θ.
+/// Integrates the wake over the wave directions pixel by pixel, by Romberg's rule in the angle θ.
 ///
 /// ```text
 /// field(x, y) = Re ∫ T A(θ) e^{i k·(x − x_ship)} dθ,     |k| ≤ π/spacing
@@ -40,7 +40,7 @@ pub fn direct_quadrature(
         .map(|&[row, column]| {
             let seen = wake.track.seen_from_ship([raster.x(column), raster.y(row)]);
             let integrand = |v: f64| integrand(wake, (transfer, quantities), seen, range, v);
-            simpson(integrand, quantities.len(), error)
+            romberg(integrand, quantities.len(), error)
         })
         .collect();
     (0..quantities.len())
@@ -73,8 +73,9 @@ fn integrand(
     out
 }
 
-/// Simpson's rule on [0, 1] for `count` values, whose magnitudes follow them.
-fn simpson(f: impl Fn(f64) -> Vec<f64>, count: usize, error: f64) -> Vec<f64> {
+/// Romberg's rule on [0, 1] for `count` values, whose magnitudes follow them: trapezoids of halved intervals,
+/// extrapolated to none.
+fn romberg(f: impl Fn(f64) -> Vec<f64>, count: usize, error: f64) -> Vec<f64> {
     let sum = |start: f64, step: f64, n: usize| {
         let mut total = vec![0.0; 2 * count];
         for i in 0..n {
@@ -84,22 +85,34 @@ fn simpson(f: impl Fn(f64) -> Vec<f64>, count: usize, error: f64) -> Vec<f64> {
         }
         total
     };
-    let (mut n, mut trapezoid) = (COARSEST, sum(0.0, 1.0 / COARSEST as f64, COARSEST + 1));
-    for (t, (a, b)) in trapezoid.iter_mut().zip(f(0.0).into_iter().zip(f(1.0))) {
+    let (mut n, mut row) = (
+        COARSEST,
+        vec![sum(0.0, 1.0 / COARSEST as f64, COARSEST + 1)],
+    );
+    for (t, (a, b)) in row[0].iter_mut().zip(f(0.0).into_iter().zip(f(1.0))) {
         *t -= 0.5 * (a + b) / n as f64;
     }
-    let mut old = trapezoid.clone();
     for _ in 0..HALVINGS {
         let step = 1.0 / n as f64;
         let middle = sum(0.5 * step, step, n);
-        let finer: Vec<f64> = trapezoid.iter().zip(&middle).map(|(t, m)| 0.5 * (t + m)).collect();
-        let rule: Vec<f64> = finer.iter().zip(&trapezoid).map(|(f, t)| (4.0 * f - t) / 3.0).collect();
-        let settled = (0..count).all(|i| (rule[i] - old[i]).abs() <= error * rule[count + i]);
-        (n, trapezoid, old) = (2 * n, finer, rule);
+        let mut finer: Vec<Vec<f64>> = vec![mixed(&row[0], &middle, 0.5)];
+        for (order, coarse) in row.iter().enumerate().take(6) {
+            let weight = 1.0 / (4f64.powi(order as i32 + 1) - 1.0);
+            finer.push(mixed(&finer[order], coarse, -weight));
+        }
+        let (old, new) = (&row[row.len() - 1], &finer[finer.len() - 1]);
+        let settled = (0..count).all(|i| (new[i] - old[i]).abs() <= error * finer[0][count + i]);
+        (n, row) = (2 * n, finer);
         if settled {
             break;
         }
     }
-    old.truncate(count);
-    old
+    let mut best = row.pop().unwrap_or_default();
+    best.truncate(count);
+    best
+}
+
+/// (1 − part)·a + part·b.
+fn mixed(a: &[f64], b: &[f64], part: f64) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + part * (b - a)).collect()
 }

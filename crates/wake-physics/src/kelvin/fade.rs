@@ -33,6 +33,7 @@ pub fn fade_field(track: &Track, length: f64, raster: &Raster) -> Field {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact outside the passage")]
 mod tests {
     use super::*;
 

@@ -54,7 +54,7 @@ pub struct KelvinWake {
     pub track: Track,
     /// Water depth h [m], above 0, may be infinite.
     pub depth: f64,
-    /// Weights the spectrum with exp(−k·filter_depth) [m], at least 0.
+    /// Weights the spectrum with e^{−kd}, d this depth [m], at least 0.
     pub filter_depth: f64,
 }
 
@@ -93,7 +93,7 @@ impl KelvinWake {
         SteadyWaves::new(self.speed, self.depth)
     }
 
-    /// a = −w F̄ exp(−k·filter_depth) [m per unit u].
+    /// a = −w F̄ e^{−kd}, d the filter depth, [m per unit u].
     fn free_wave(&self, wave: &SteadyWave) -> Complex64 {
         let michell = self
             .hull
@@ -120,4 +120,5 @@ impl KelvinWake {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact zeros")]
 mod tests;

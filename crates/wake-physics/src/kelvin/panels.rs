@@ -128,11 +128,17 @@ impl KelvinWake {
 
 impl WakePlan {
     fn smallest_u(&self) -> f64 {
-        self.quadrature.iter().map(|n| n.0.abs()).fold(f64::INFINITY, f64::min)
+        self.quadrature
+            .iter()
+            .map(|n| n.0.abs())
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn largest_u(&self) -> f64 {
-        self.quadrature.iter().map(|n| n.0.abs()).fold(0.0, f64::max)
+        self.quadrature
+            .iter()
+            .map(|n| n.0.abs())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -180,8 +186,10 @@ impl<'a> Builder<'a> {
     fn add_smooth(&mut self, piece: Piece, [from, to]: [f64; 2], first: f64) {
         let mut start = from;
         while start < to {
-            let end = self.panel_end(start, to);
-            let begins = first > 0.0 && (start == first || end == -first);
+            let end = self.panel_end(start, to).max(start.next_up());
+            // A curve that begins off the axis has no point between ±first.
+            let begins =
+                first > 0.0 && (start > 0.0 && start <= first || end < 0.0 && end >= -first);
             for (t, w) in self.rule.on(0.0, 1.0) {
                 // Where the curve begins off the axis its points go as the square root of u: u ∝ t².
                 let (s, ds) = match (begins, start > 0.0) {

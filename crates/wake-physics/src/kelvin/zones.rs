@@ -139,10 +139,8 @@ impl Reach {
     }
 
     fn widen(&self, [low, high]: [f64; 2], [from, to]: [f64; 2], phase: f64) -> Piece {
-        let ([left, left_start], [right, right_start]) = (
-            self.end_of(low, from, phase),
-            self.end_of(high, to, phase),
-        );
+        let ([left, left_start], [right, right_start]) =
+            (self.end_of(low, from, phase), self.end_of(high, to, phase));
         Piece {
             from: left,
             to: right,
@@ -164,6 +162,10 @@ impl Reach {
             } else {
                 begin + step
             };
+            if (end - begin).abs() <= f64::EPSILON * begin.abs() {
+                // Phases turn within the rounding of u: a ship too far to be resolved.
+                return [begin, fall.unwrap_or(begin)];
+            }
             let more = rule.integrate([begin, end], |u| self.slowest(u)).abs();
             if more > 0.5 * phase {
                 step *= 0.5;

@@ -9,7 +9,7 @@ const OVERSAMPLING: [f64; 5] = [1.2, 1.35, 1.5, 1.75, 2.0];
 
 /// Largest rounding error at a pixel over (machine epsilon · root of the sum of squares of the strengths), as
 /// ROUNDING[0] + ROUNDING[1]·amplification²; measured, see the tests.
-const ROUNDING: [f64; 2] = [12.0, 0.8];
+const ROUNDING: [f64; 2] = [12.0, 1.2];
 
 /// Kernel, lattice and precision of one synthesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,13 +72,18 @@ impl Gridding {
         best
     }
 
-    pub(crate) fn new(error: f64, oversampling: f64, raster: &Raster, double_precision: bool) -> Self {
+    pub(crate) fn new(
+        error: f64,
+        oversampling: f64,
+        raster: &Raster,
+        double_precision: bool,
+    ) -> Self {
         let lattice = [raster.rows, raster.columns].map(|n| {
             let half = (0.5 * oversampling * n as f64).ceil() as usize;
             lattice_length(2 * half.max(WIDEST))
         });
-        let actual = (lattice[0] as f64 / raster.rows as f64)
-            .min(lattice[1] as f64 / raster.columns as f64);
+        let actual =
+            (lattice[0] as f64 / raster.rows as f64).min(lattice[1] as f64 / raster.columns as f64);
         Self {
             kernel: Kernel::new(error, actual.min(4.0)),
             lattice,

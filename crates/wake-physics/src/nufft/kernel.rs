@@ -101,7 +101,10 @@ impl Kernel {
     /// Factors that undo the kernel, one per pixel of a side of `pixels` on a lattice of `lattice` points.
     pub(crate) fn correction(&self, pixels: usize, lattice: usize) -> Vec<f64> {
         let half = pixels / 2;
-        let factor = |i: usize| self.transform(i.abs_diff(half) as f64 / lattice as f64).recip();
+        let factor = |i: usize| {
+            self.transform(i.abs_diff(half) as f64 / lattice as f64)
+                .recip()
+        };
         (0..pixels).map(factor).collect()
     }
 }
@@ -134,8 +137,16 @@ mod tests {
                     let p = i as f64 - (pixels / 2) as f64;
                     let turn = std::f64::consts::TAU * p / lattice as f64;
                     let wave = |l: usize| turn * (first - g + l as f64);
-                    let re: f64 = values.iter().enumerate().map(|(l, v)| v * wave(l).cos()).sum();
-                    let im: f64 = values.iter().enumerate().map(|(l, v)| v * wave(l).sin()).sum();
+                    let re: f64 = values
+                        .iter()
+                        .enumerate()
+                        .map(|(l, v)| v * wave(l).cos())
+                        .sum();
+                    let im: f64 = values
+                        .iter()
+                        .enumerate()
+                        .map(|(l, v)| v * wave(l).sin())
+                        .sum();
                     worst = worst.max((re * factor - 1.0).hypot(im * factor));
                 }
             }

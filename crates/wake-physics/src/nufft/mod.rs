@@ -193,7 +193,12 @@ impl<'a> CentredSums<'a> {
     fn paired<T: Real>(&self, pair: &[usize]) -> Vec<[Complex<T>; 2]> {
         let first = &self.strengths[pair[0]];
         let second = pair.get(1).map(|&q| &self.strengths[q]);
-        let round = |c: Complex64| Complex::new(<T as Real>::from_f64(0.5 * c.re), <T as Real>::from_f64(0.5 * c.im));
+        let round = |c: Complex64| {
+            Complex::new(
+                <T as Real>::from_f64(0.5 * c.re),
+                <T as Real>::from_f64(0.5 * c.im),
+            )
+        };
         (0..first.len())
             .map(|n| {
                 let (c, d) = (first[n], second.map_or(Complex64::ZERO, |s| s[n]));
@@ -222,4 +227,5 @@ fn pair_of<'f>(
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact zeros")]
 mod tests;

@@ -40,18 +40,33 @@ impl<T: Real> Footprints<T> {
                     let g = signed(waves[wave as usize][axis], mirrored);
                     first_point(g, width).rem_euclid(lattice[axis] as i64) as u32
                 });
-                Place { column, row, wave, mirrored }
+                Place {
+                    column,
+                    row,
+                    wave,
+                    mirrored,
+                }
             })
             .collect();
         places.sort_unstable_by_key(|p| (p.column, p.row));
         let mut weights = vec![T::zero(); 2 * width * places.len()];
-        weights.par_chunks_mut(2 * width).zip(&places).with_min_len(256).for_each(|(out, place)| {
-            let [along_y, along_x] = waves[place.wave as usize].map(|g| signed(g, place.mirrored));
-            let (x, y) = out.split_at_mut(width);
-            fill(x, along_x, kernel);
-            fill(y, along_y, kernel);
-        });
-        Self { width, lattice, places, weights }
+        weights
+            .par_chunks_mut(2 * width)
+            .zip(&places)
+            .with_min_len(256)
+            .for_each(|(out, place)| {
+                let [along_y, along_x] =
+                    waves[place.wave as usize].map(|g| signed(g, place.mirrored));
+                let (x, y) = out.split_at_mut(width);
+                fill(x, along_x, kernel);
+                fill(y, along_y, kernel);
+            });
+        Self {
+            width,
+            lattice,
+            places,
+            weights,
+        }
     }
 
     /// Clears the transposed lattice `[columns, rows]` and adds all waves.
@@ -59,19 +74,32 @@ impl<T: Real> Footprints<T> {
     /// `strengths` holds for each wave what its wavenumber k and what −k carries.
     pub(crate) fn spread(&self, strengths: &[[Complex<T>; 2]], lattice: &mut [Complex<T>]) {
         let rows = self.lattice[0];
-        lattice.par_chunks_mut(LINES * rows).enumerate().for_each(|(bin, lines)| {
-            lines.fill(Complex::new(T::zero(), T::zero()));
-            let first = bin * LINES;
-            let last = first + lines.len() / rows;
-            // Kernels that begin in the bin or up to width − 1 columns before it, around the end too.
-            let before = first as i64 - self.width as i64 + 1;
-            self.add(self.range(before.max(0), last as i64), first, strengths, lines);
-            if before < 0 {
-                let wrapped = before + self.lattice[1] as i64;
-                let from = wrapped.max(last as i64);
-                self.add(self.range(from, self.lattice[1] as i64), first, strengths, lines);
-            }
-        });
+        lattice
+            .par_chunks_mut(LINES * rows)
+            .enumerate()
+            .for_each(|(bin, lines)| {
+                lines.fill(Complex::new(T::zero(), T::zero()));
+                let first = bin * LINES;
+                let last = first + lines.len() / rows;
+                // Kernels that begin in the bin or up to width − 1 columns before it, around the end too.
+                let before = first as i64 - self.width as i64 + 1;
+                self.add(
+                    self.range(before.max(0), last as i64),
+                    first,
+                    strengths,
+                    lines,
+                );
+                if before < 0 {
+                    let wrapped = before + self.lattice[1] as i64;
+                    let from = wrapped.max(last as i64);
+                    self.add(
+                        self.range(from, self.lattice[1] as i64),
+                        first,
+                        strengths,
+                        lines,
+                    );
+                }
+            });
     }
 
     /// Places whose first column lies in [from, to).
@@ -96,7 +124,8 @@ impl<T: Real> Footprints<T> {
             let (along_x, along_y) = self.weights[2 * w * index..2 * w * (index + 1)].split_at(w);
             for (dx, &weight) in along_x.iter().enumerate() {
                 let column = (place.column as usize + dx) % columns;
-                let Some(line) = column.checked_sub(first).filter(|l| l * rows < lines.len()) else {
+                let Some(line) = column.checked_sub(first).filter(|l| l * rows < lines.len())
+                else {
                     continue;
                 };
                 let line = &mut lines[line * rows..(line + 1) * rows];
@@ -107,7 +136,12 @@ impl<T: Real> Footprints<T> {
 }
 
 /// Adds `strength` times the weights to a line from `start` on, around its end.
-fn add_wrapped<T: Real>(line: &mut [Complex<T>], start: usize, strength: Complex<T>, weights: &[T]) {
+fn add_wrapped<T: Real>(
+    line: &mut [Complex<T>],
+    start: usize,
+    strength: Complex<T>,
+    weights: &[T],
+) {
     let until_end = weights.len().min(line.len() - start);
     let (here, beyond) = weights.split_at(until_end);
     for (v, &w) in line[start..].iter_mut().zip(here) {

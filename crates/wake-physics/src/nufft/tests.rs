@@ -29,7 +29,13 @@ fn scattered(raster: &Raster, count: usize) -> PlaneWaves {
         waves.push(k, 3.0, Complex64::from_polar(0.2 + a, phase));
     }
     // The corners and edges of the band, the mean, and twice the same wave.
-    for k in [[band, band], [-band, 0.0], [0.0, band], [0.0, 0.0], [0.1 * band, 0.0]] {
+    for k in [
+        [band, band],
+        [-band, 0.0],
+        [0.0, band],
+        [0.0, 0.0],
+        [0.1 * band, 0.0],
+    ] {
         waves.push(k, 3.0, Complex64::new(0.7, -0.4));
     }
     waves
@@ -82,7 +88,10 @@ fn tolerance_is_met_at_every_level() {
         let waves = scattered(&raster, 150);
         for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
             for (error, q) in errors(&waves, &raster, tolerance).into_iter().zip(ALL) {
-                assert!(error <= tolerance, "{q:?} {error:e} > {tolerance:e} on {raster:?}");
+                assert!(
+                    error <= tolerance,
+                    "{q:?} {error:e} > {tolerance:e} on {raster:?}"
+                );
             }
         }
     }
@@ -133,7 +142,10 @@ fn rounding_is_bounded() {
         for oversampling in [1.25, 1.5, 2.0] {
             for error in [1e-3, 1e-5, 1e-7] {
                 let single = Gridding::new(error, oversampling, &raster, false);
-                let double = Gridding { double_precision: true, ..single };
+                let double = Gridding {
+                    double_precision: true,
+                    ..single
+                };
                 let todo: Vec<usize> = (0..ALL.len()).collect();
                 let mut fields = vec![vec![Field::constant(&raster, 0.0); ALL.len()]; 2];
                 sums.run::<f32>(&single, &todo, &mut fields[0]);
@@ -141,7 +153,10 @@ fn rounding_is_bounded() {
                 for &q in &todo {
                     let (max, _) = fields[0][q].difference(&fields[1][q]);
                     let bound = single.rounding() * sums.sizes[q].root;
-                    assert!(max <= bound && bound <= 20.0 * max, "{max:e} {bound:e} {single:?}");
+                    assert!(
+                        max <= bound && bound <= 20.0 * max,
+                        "{max:e} {bound:e} {single:?}"
+                    );
                 }
             }
         }

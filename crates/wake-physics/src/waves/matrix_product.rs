@@ -49,7 +49,11 @@ pub fn matrix_product(
                     raster,
                     first_row: block * ROWS,
                 };
-                arch.dispatch(Block { left, right: &right, out });
+                arch.dispatch(Block {
+                    left,
+                    right: &right,
+                    out,
+                });
             });
             field
         })
@@ -149,7 +153,7 @@ impl WithSimd for Block<'_> {
                 {
                     let sums = tile_product(simd, left, right);
                     for (row, sums) in out.chunks_mut(columns).zip(&sums) {
-                        let (lanes, _) = pulp_slice::<S>(sums);
+                        let lanes: &[f32] = pulp::bytemuck::cast_slice(sums);
                         for (v, s) in row[from..to].iter_mut().zip(lanes) {
                             *v += s;
                         }
@@ -158,11 +162,6 @@ impl WithSimd for Block<'_> {
             }
         }
     }
-}
-
-/// The lanes of two vectors, one after the other.
-fn pulp_slice<S: Simd>(vectors: &[S::f32s; 2]) -> (&[f32], ()) {
-    (pulp::bytemuck::cast_slice(vectors), ())
 }
 
 /// A register tile: `TILE` rows by two vectors, summed over the waves of a block.
@@ -203,7 +202,9 @@ mod tests {
         let quantities = [Quantity::Elevation, Quantity::VelocityZ, Quantity::SlopeX];
         for (rows, columns) in [(1, 1), (50, 37), (97, 16), (6, 130)] {
             let raster = Raster::image(rows, columns, 2.0);
-            let pixels: Vec<_> = (0..raster.len()).map(|n| [n / columns, n % columns]).collect();
+            let pixels: Vec<_> = (0..raster.len())
+                .map(|n| [n / columns, n % columns])
+                .collect();
             let exact = harmonic_sum(&waves, &transfer, &quantities, &raster, &pixels);
             let fields = matrix_product(&waves, &transfer, &quantities, &raster);
             for (field, exact) in fields.iter().zip(exact) {
