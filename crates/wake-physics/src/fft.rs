@@ -95,6 +95,24 @@ impl<T: Real> Synthesis<T> {
         &self,
         spectrum: &mut [Complex<T>],
         keep: [usize; 2],
+        out: (&mut [f32], &mut [f32]),
+        finish: F,
+    ) where
+        F: Fn(usize, &mut [Complex<T>]) + Sync,
+    {
+        self.run_window(spectrum, [0, 0], keep, out, finish);
+    }
+
+    /// [`Self::run`], keeping `keep` rows and columns from the row `start[0]` and the column `start[1]` on.
+    ///
+    /// # Panics
+    ///
+    /// If a length is another, or more is kept than there is.
+    pub fn run_window<F>(
+        &self,
+        spectrum: &mut [Complex<T>],
+        start: [usize; 2],
+        keep: [usize; 2],
         (re, im): (&mut [f32], &mut [f32]),
         finish: F,
     ) where
@@ -107,7 +125,7 @@ impl<T: Real> Synthesis<T> {
             "spectrum of another size"
         );
         assert!(
-            keep_rows <= self.rows && keep_columns <= self.columns,
+            start[0] + keep_rows <= self.rows && start[1] + keep_columns <= self.columns,
             "more kept than there is"
         );
         assert!(
@@ -128,13 +146,14 @@ impl<T: Real> Synthesis<T> {
                 |(block, scratch), (b, (re, im))| {
                     let first = b * BLOCK;
                     let rows = first..(first + BLOCK).min(keep_rows);
-                    self.gather(spectrum, rows.clone(), block);
+                    self.gather(spectrum, start[0] + rows.start..start[0] + rows.end, block);
                     let lines = block.chunks_exact_mut(self.columns);
                     let out = re.chunks_mut(keep_columns).zip(im.chunks_mut(keep_columns));
                     for ((i, row), (re, im)) in rows.zip(lines).zip(out) {
                         self.along_x.process_with_scratch(row, scratch);
-                        finish(i, &mut row[..keep_columns]);
-                        split(&row[..keep_columns], re, im);
+                        let kept = &mut row[start[1]..start[1] + keep_columns];
+                        finish(i, kept);
+                        split(kept, re, im);
                     }
                 },
             );
@@ -179,14 +198,16 @@ impl<T: Real> Synthesis<T> {
             first.len() == keep_rows * keep_columns && second.len() == first.len(),
             "output of another size"
         );
-        half.par_chunks_mut(2 * self.rows).enumerate().for_each_init(
-            || vec![Complex::new(T::zero(), T::zero()); self.along_y.get_inplace_scratch_len()],
-            |scratch, (b, lines)| {
-                let (one, two) = lines.split_at_mut(self.rows);
-                fill(b, one, two);
-                self.along_y.process_with_scratch(lines, scratch);
-            },
-        );
+        half.par_chunks_mut(2 * self.rows)
+            .enumerate()
+            .for_each_init(
+                || vec![Complex::new(T::zero(), T::zero()); self.along_y.get_inplace_scratch_len()],
+                |scratch, (b, lines)| {
+                    let (one, two) = lines.split_at_mut(self.rows);
+                    fill(b, one, two);
+                    self.along_y.process_with_scratch(lines, scratch);
+                },
+            );
         let half = &*half;
         let block_len = BLOCK * keep_columns.max(1);
         first
@@ -201,7 +222,9 @@ impl<T: Real> Synthesis<T> {
                     self.gather_real(half, rows, block);
                     self.along_x.process_with_scratch(block, scratch);
                     let rows = block.chunks_exact(self.columns);
-                    let out = first.chunks_mut(keep_columns).zip(second.chunks_mut(keep_columns));
+                    let out = first
+                        .chunks_mut(keep_columns)
+                        .zip(second.chunks_mut(keep_columns));
                     for (row, (re, im)) in rows.zip(out) {
                         split(&row[..keep_columns], re, im);
                     }
@@ -358,7 +381,8 @@ mod tests {
             // Fewer rows and columns kept, and a workspace that is not clean.
             let keep = [rows.div_ceil(2), columns.div_ceil(2)];
             let mut half = vec![Complex::new(f64::NAN, 1.0); plan.half_len()];
-            let (mut first, mut second) = (vec![0.0; keep[0] * keep[1]], vec![0.0; keep[0] * keep[1]]);
+            let (mut first, mut second) =
+                (vec![0.0; keep[0] * keep[1]], vec![0.0; keep[0] * keep[1]]);
             plan.run_real(&mut half, keep, (&mut first, &mut second), |b, one, two| {
                 for a in 0..rows {
                     one[a] = value(b, a, 0.1);

@@ -40,7 +40,9 @@ mod tests {
     fn neighbouring_lines_are_uncorrelated() {
         let count = 20_000;
         let (mut one, mut two) = (line_generator(3, 10), line_generator(3, 11));
-        let same = (0..count).filter(|_| (one.next_u64() ^ two.next_u64()) >> 63 == 0).count();
+        let same = (0..count)
+            .filter(|_| (one.next_u64() ^ two.next_u64()) >> 63 == 0)
+            .count();
         let excess = 2.0 * same as f64 / f64::from(count) - 1.0;
         assert!(excess.abs() < 5.0 / f64::from(count).sqrt());
     }

@@ -112,8 +112,14 @@ impl DirectionalSpectrum {
         if self.flat || wavenumber <= 0.0 {
             return 0.0;
         }
-        let curvature = self.spectrum.curvature(deep_equivalent(wavenumber, self.depth));
-        if curvature > 0.0 { curvature / wavenumber.powi(3) } else { 0.0 }
+        let curvature = self
+            .spectrum
+            .curvature(deep_equivalent(wavenumber, self.depth));
+        if curvature > 0.0 {
+            curvature / wavenumber.powi(3)
+        } else {
+            0.0
+        }
     }
 
     /// Density Ψ(kx, ky) [m⁴] of waves travelling along +k.
@@ -125,7 +131,10 @@ impl DirectionalSpectrum {
             return 0.0;
         }
         let cos_angle = (kx * self.wind[0] + ky * self.wind[1]) / k;
-        s / k * self.spreading.density(deep_equivalent(k, self.depth), cos_angle)
+        s / k
+            * self
+                .spreading
+                .density(deep_equivalent(k, self.depth), cos_angle)
     }
 
     /// Variances of the waves from `low` to `high` seen at an incidence.
@@ -263,7 +272,9 @@ mod tests {
                         .norm_sqr();
                     let [x, y] = vector;
                     for (sum, factor) in
-                        expected.iter_mut().zip([1.0, x * x, x * y, y * y, radial, acceleration])
+                        expected
+                            .iter_mut()
+                            .zip([1.0, x * x, x * y, y * y, radial, acceleration])
                     {
                         *sum += v * factor;
                     }
@@ -281,7 +292,10 @@ mod tests {
             for (g, e) in got.iter().zip(expected) {
                 // The sum's own error: the cusp of small exponents at δ = π costs up to one angle step, 1/720,
                 // of the little that runs there; the kink of the JONSWAP peak a step² of 1e-4.
-                assert!((g - e).abs() < 1e-3 * e.abs(), "{model:?} {got:?} {expected:?}");
+                assert!(
+                    (g - e).abs() < 1e-3 * e.abs(),
+                    "{model:?} {got:?} {expected:?}"
+                );
             }
         }
     }
@@ -321,9 +335,15 @@ mod tests {
         let cut = 30.0;
         let m = spectrum.moments(0.0, cut, 0.0);
         let sigma = (m.radial_velocity + 0.5 * 0.0081 * GRAVITY / cut).sqrt();
-        assert!((sigma / (0.0646 * 1.026 * 6.0) - 1.0).abs() < 2e-3, "{sigma}");
+        assert!(
+            (sigma / (0.0646 * 1.026 * 6.0) - 1.0).abs() < 2e-3,
+            "{sigma}"
+        );
         let parts = [(0.0, 0.2), (0.2, 3.0), (3.0, cut), (5.0, 4.0)];
-        let sum: f64 = parts.map(|(a, b)| spectrum.moments(a, b, 0.0).radial_velocity).iter().sum();
+        let sum: f64 = parts
+            .map(|(a, b)| spectrum.moments(a, b, 0.0).radial_velocity)
+            .iter()
+            .sum();
         assert!((sum / m.radial_velocity - 1.0).abs() < 1e-6);
     }
 

@@ -1,20 +1,21 @@
 //! The unified spectrum of Elfouhaily et al. (1997): long gravity waves and the short waves a radar sees.
 //!
 //! Public codes of this model differ. This one follows the author's own programme in: log10 in the peak
-//! enhancement, α_p = 0.006 √Ω, the factor L_PM·J_p on long and short waves alike, and a spreading that is even
-//! over the full circle. It follows the paper in the slope 1 of α_m below c_m (the programme has 0.9).
+//! enhancement, `α_p` = 0.006 √Ω, the factor `L_PM·J_p` on long and short waves alike, and a spreading that is even
+//! over the full circle. It follows the paper in the slope 1 of `α_m` below `c_m` (the programme has 0.9).
 //! The one variant offered is the drag law, see [`DragLaw`].
 
 use crate::constants::GRAVITY;
+use crate::quadrature::GaussLegendre;
 use std::f64::consts::{LN_2, PI};
 
-/// Wavenumber of the slowest wave k_m [rad/m], as the paper rounds it.
+/// Wavenumber of the slowest wave `k_m` [rad/m], as the paper rounds it.
 pub const SLOWEST_WAVENUMBER: f64 = 370.0;
 
-/// Phase speed of the slowest wave c_m [m/s], as the paper rounds it.
+/// Phase speed of the slowest wave `c_m` [m/s], as the paper rounds it.
 pub const SLOWEST_SPEED: f64 = 0.23;
 
-/// Inverse wave age of a fully developed sea Ω_c [1].
+/// Inverse wave age of a fully developed sea `Ω_c` [1].
 pub const FULLY_DEVELOPED: f64 = 0.84;
 
 /// Dimensionless fetch at which a sea is developed, X₀ [1].
@@ -54,7 +55,7 @@ pub fn friction_velocity(wind_speed: f64, drag: DragLaw) -> f64 {
 /// ```
 ///
 /// - `wind_speed` U₁₀ [m/s], at least 0; `fetch` F [m], above 0
-/// - returns Ω_c [1], at least 0.84
+/// - returns `Ω_c` [1], at least 0.84
 ///
 /// # References
 ///
@@ -82,8 +83,8 @@ pub fn inverse_wave_age(wind_speed: f64, fetch: f64) -> f64 {
 ///
 /// # Validity
 ///
-/// Deep water, Ω from 0.84 to 5. For younger seas γ keeps its value at Ω = 5. α_m turns negative for
-/// u* < c_m/e (wind below 2.7 m/s with the drag of Wu) and is then set to 0: see [`Self::lacks_short_waves`].
+/// Deep water, Ω from 0.84 to 5. For younger seas γ keeps its value at Ω = 5. `α_m` turns negative for
+/// u* < `c_m`/e (wind below 2.7 m/s with the drag of Wu) and is then set to 0: see [`Self::lacks_short_waves`].
 /// Without wind every value is 0.
 ///
 /// # References
@@ -148,13 +149,13 @@ impl Elfouhaily {
         self.friction_velocity
     }
 
-    /// Wavenumber k_p of the spectral peak [rad/m]; infinite without wind.
+    /// Wavenumber `k_p` of the spectral peak [rad/m]; infinite without wind.
     #[must_use]
     pub fn peak_wavenumber(&self) -> f64 {
         self.peak_wavenumber
     }
 
-    /// Whether the wind is too low for the short-wave part B_h, so that only the tail of the long waves is left.
+    /// Whether the wind is too low for the short-wave part `B_h`, so that only the tail of the long waves is left.
     #[must_use]
     pub fn lacks_short_waves(&self) -> bool {
         self.short_level <= 0.0
@@ -174,7 +175,13 @@ impl Elfouhaily {
             return 0.0;
         }
         let age = (k / self.peak_wavenumber).sqrt() - 1.0;
-        let peak = (-0.5 * (age / self.peak_width).powi(2)).exp();
+        let distance = age / self.peak_width;
+        // Nine widths from the peak Γ is below rounding; no exponential for the short waves of a radar.
+        let peak = if distance < 9.0 {
+            (-0.5 * distance * distance).exp()
+        } else {
+            0.0
+        };
         let shape = (self.ln_enhancement * peak - 1.25 * (self.peak_wavenumber / k).powi(2)).exp();
         let long =
             self.long_level * self.peak_speed * (-self.inverse_wave_age / 10f64.sqrt() * age).exp();
@@ -241,13 +248,15 @@ impl Elfouhaily {
         if low >= high || self.peak_wavenumber.is_infinite() {
             return [0.0; 2];
         }
+        let rule = GaussLegendre::new(5);
         let panels = ((high / low).ln() / 0.5).ceil();
         let width = (high / low).ln() / panels;
         let mut sum = [0.0; 2];
         for panel in 0..panels as usize {
-            for (node, weight) in GAUSS_5 {
-                let k = low * (width * (panel as f64 + 0.5 + 0.5 * node)).exp();
-                let share = 0.5 * width * weight * 0.5 * self.curvature(k);
+            let from = low.ln() + width * panel as f64;
+            for (log, weight) in rule.on(from, from + width) {
+                let k = log.exp();
+                let share = weight * 0.5 * self.curvature(k);
                 let half = 0.5 * self.anisotropy(k);
                 sum[0] += share * (1.0 + half);
                 sum[1] += share * (1.0 - half);
@@ -257,16 +266,7 @@ impl Elfouhaily {
     }
 }
 
-/// Nodes and weights of Gauss–Legendre quadrature over [−1, 1] (Abramowitz and Stegun, table 25.4).
-const GAUSS_5: [(f64, f64); 5] = [
-    (-0.906179845938664, 0.236926885056189),
-    (-0.538469310105683, 0.478628670499366),
-    (0.0, 0.568888888888889),
-    (0.538469310105683, 0.478628670499366),
-    (0.906179845938664, 0.236926885056189),
-];
-
-/// Level α_m of the short waves [1], at least 0.
+/// Level `α_m` of the short waves [1], at least 0.
 fn short_level(friction_velocity: f64) -> f64 {
     let log = (friction_velocity / SLOWEST_SPEED).ln();
     let slope = if log <= 0.0 { 1.0 } else { 3.0 };
@@ -274,6 +274,10 @@ fn short_level(friction_velocity: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
 mod tests {
     use super::*;
 

@@ -56,7 +56,11 @@ impl Jonswap {
         let maturity = (xi / MATURING_FETCH).ln() / (developed_fetch / MATURING_FETCH).ln();
         let m = maturity.max(0.0);
         let level = law(xi.min(MATURING_FETCH)).powf(1.0 - m) * LEVEL.powf(m);
-        Self::with(level, growth * xi.powf(-0.33), ENHANCEMENT.powf(1.0 - m.powf(1.25)))
+        Self::with(
+            level,
+            growth * xi.powf(-0.33),
+            ENHANCEMENT.powf(1.0 - m.powf(1.25)),
+        )
     }
 
     /// The spectrum of given level α [1], peak frequency ω_p [rad/s] and peak enhancement γ [1].

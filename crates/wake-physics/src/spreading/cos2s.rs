@@ -97,8 +97,8 @@ fn gamma_ratio(s: f64) -> f64 {
         .map(|n| (s + n + 0.5) / (s + n + 1.0))
         .product();
     let z = s + 10.5;
-    let series = 1.0
-        + (-1.0 / 8.0 + (1.0 / 128.0 + (5.0 / 1024.0 - 21.0 / (32_768.0 * z)) / z) / z) / z;
+    let series =
+        1.0 + (-1.0 / 8.0 + (1.0 / 128.0 + (5.0 / 1024.0 - 21.0 / (32_768.0 * z)) / z) / z) / z;
     // The next term, 399/(262144 z⁵), is below 1.3e-8 · 0.9 at z = 10.5.
     let next = -399.0 / (262_144.0 * z.powi(5));
     lowered * z.sqrt() * (series + next)

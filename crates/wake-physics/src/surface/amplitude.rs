@@ -41,12 +41,22 @@ impl<'a> Amplitudes<'a> {
         let nodes = (first..last + 2)
             .into_par_iter()
             .with_min_len(64)
-            .map(|bits| node(spectrum, cell, f64::from(f32::from_bits(bits << SHIFT)).sqrt()))
+            .map(|bits| {
+                node(
+                    spectrum,
+                    cell,
+                    f64::from(f32::from_bits(bits << SHIFT)).sqrt(),
+                )
+            })
             .collect();
         Self {
             spectrum,
             cell,
-            averaged: if sampled { 0.0 } else { AVERAGED_RADIUS * coarse },
+            averaged: if sampled {
+                0.0
+            } else {
+                AVERAGED_RADIUS * coarse
+            },
             wind: spectrum.wind().map(|v| v as f32),
             first,
             nodes,
@@ -60,7 +70,9 @@ impl<'a> Amplitudes<'a> {
             [*along, *against] = self.interpolate(x * x + y * y);
         }
         let [wind_x, wind_y] = self.wind;
-        let directions = ky.iter().map(|&y| (x * wind_x + y * wind_y) / (x * x + y * y).sqrt());
+        let directions = ky
+            .iter()
+            .map(|&y| (x * wind_x + y * wind_y) / (x * x + y * y).sqrt());
         let waves = directions.zip(along.iter_mut().zip(against.iter_mut()));
         match self.spectrum.spreading() {
             Spreading::Cos2s(_) => waves.for_each(|(cos, (along, against))| {

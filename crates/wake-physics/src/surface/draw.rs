@@ -113,7 +113,9 @@ impl<'a> Draw<'a> {
             work.mirror(&self.lattice);
         }
         for range in self.lattice.disk(line) {
-            let waves = work.waves[0][range.clone()].iter().zip(&work.waves[1][range.clone()]);
+            let waves = work.waves[0][range.clone()]
+                .iter()
+                .zip(&work.waves[1][range.clone()]);
             let parts = even[range.clone()].iter_mut().zip(&mut odd[range]);
             for ((&c, &mirrored), (even, odd)) in waves.zip(parts) {
                 *even = (c + mirrored.conj()) * 0.5;
@@ -127,7 +129,8 @@ impl<'a> Draw<'a> {
         let [along, against] = &mut work.level;
         let ky = &self.ky[range.clone()];
         let kx = self.lattice.kx(line);
-        self.amplitudes.fill(kx, ky, &mut along[range.clone()], &mut against[range]);
+        self.amplitudes
+            .fill(kx, ky, &mut along[range.clone()], &mut against[range]);
         if line == 0 {
             (along[0], against[0]) = (0.0, 0.0);
         }
@@ -151,7 +154,9 @@ impl<'a> Draw<'a> {
         let [by_index, by_line] = &self.place;
         for (side, sign) in [1u32, u32::MAX].into_iter().enumerate() {
             let bits = work.bits[side][range.clone()].iter();
-            let shifts = work.motion[range.clone()].iter().zip(&by_index[range.clone()]);
+            let shifts = work.motion[range.clone()]
+                .iter()
+                .zip(&by_index[range.clone()]);
             let levels = work.level[side][range.clone()].iter();
             let waves = work.waves[side][range.clone()].iter_mut();
             for (((c, level), &[modulus, phase]), (&motion, &place)) in
@@ -193,7 +198,10 @@ impl Workspace {
     fn variance(&self, line: usize, range: Range<usize>) -> f64 {
         let sides = if line == 0 { 1 } else { 2 };
         let squares = |level: &Vec<f32>| -> f64 {
-            level[range.clone()].iter().map(|&v| 0.5 * f64::from(v * v)).sum()
+            level[range.clone()]
+                .iter()
+                .map(|&v| 0.5 * f64::from(v * v))
+                .sum()
         };
         self.level[..sides].iter().map(squares).sum()
     }
@@ -215,5 +223,7 @@ fn words(bits: u64) -> [u32; 2] {
 fn turns(shift: i64, period: usize) -> Vec<u32> {
     let step = shift.rem_euclid(period as i64) as u64;
     let period = period as u64;
-    (0..period).map(|n| ((((n * step) % period) << 32) / period) as u32).collect()
+    (0..period)
+        .map(|n| ((((n * step) % period) << 32) / period) as u32)
+        .collect()
 }

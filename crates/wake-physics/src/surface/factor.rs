@@ -33,8 +33,13 @@ impl<'a, T: Lane> Factors<'a, T> {
     pub(super) fn new(lattice: &'a Lattice, transfer: &Transfer) -> Self {
         Self {
             lattice,
-            ky: (0..lattice.rows).map(|a| T::constant(lattice.ky(a))).collect(),
-            depth: transfer.depth.is_finite().then(|| T::constant(transfer.depth)),
+            ky: (0..lattice.rows)
+                .map(|a| T::constant(lattice.ky(a)))
+                .collect(),
+            depth: transfer
+                .depth
+                .is_finite()
+                .then(|| T::constant(transfer.depth)),
             sin: T::constant(transfer.incidence.sin()),
             cos: T::constant(transfer.incidence.cos()),
             rate: T::constant(transfer.relaxation_rate),
@@ -44,14 +49,22 @@ impl<'a, T: Lane> Factors<'a, T> {
     /// Frequencies of the waves of a line.
     pub(super) fn waves(&self, line: usize) -> LineWaves<T> {
         let kx = T::constant(self.lattice.kx(line));
-        let (mut omega, mut orbital) = (vec![T::zero(); self.ky.len()], vec![T::zero(); self.ky.len()]);
+        let (mut omega, mut orbital) = (
+            vec![T::zero(); self.ky.len()],
+            vec![T::zero(); self.ky.len()],
+        );
         for range in self.lattice.disk(line) {
-            let out = omega[range.clone()].iter_mut().zip(&mut orbital[range.clone()]);
+            let out = omega[range.clone()]
+                .iter_mut()
+                .zip(&mut orbital[range.clone()]);
             let waves = self.ky[range].iter().zip(out);
             match self.depth {
-                None => waves.for_each(|(&ky, out)| frequency(kx * kx + ky * ky, |_| T::one(), out)),
-                Some(depth) => waves
-                    .for_each(|(&ky, out)| frequency(kx * kx + ky * ky, |k| (k * depth).tanh(), out)),
+                None => {
+                    waves.for_each(|(&ky, out)| frequency(kx * kx + ky * ky, |_| T::one(), out))
+                }
+                Some(depth) => waves.for_each(|(&ky, out)| {
+                    frequency(kx * kx + ky * ky, |k| (k * depth).tanh(), out)
+                }),
             }
         }
         if line == 0 {

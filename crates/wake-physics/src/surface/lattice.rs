@@ -44,7 +44,11 @@ impl Lattice {
         let period = |pixels: usize| {
             let guard = (GUARD_WAVELENGTHS * peak).min(0.25 * pixels as f64).ceil() as usize;
             let stretch = (PERIOD_WAVELENGTHS * peak).min(LONGEST_STRETCH).ceil() as usize;
-            fast_length((pixels + guard.max(LEAST_GUARD)).max(stretch).max(LEAST_PERIOD))
+            fast_length(
+                (pixels + guard.max(LEAST_GUARD))
+                    .max(stretch)
+                    .max(LEAST_PERIOD),
+            )
         };
         Self {
             rows: period(raster.rows),

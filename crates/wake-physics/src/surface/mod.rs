@@ -78,7 +78,11 @@ impl Surface {
             even,
             odd,
             carried,
-            left_out: if band > 0.0 { (1.0 - carried / band).max(0.0) } else { 0.0 },
+            left_out: if band > 0.0 {
+                (1.0 - carried / band).max(0.0)
+            } else {
+                0.0
+            },
         }
     }
 
@@ -132,7 +136,11 @@ impl Surface {
     fn pair(&self, line: usize, index: usize) -> [Complex64; 2] {
         let n = line * self.lattice.rows + index;
         let [even, odd] = [self.even[n], self.odd[n]].map(widen);
-        let mirrored = if line == 0 { Complex64::ZERO } else { (even - odd).conj() };
+        let mirrored = if line == 0 {
+            Complex64::ZERO
+        } else {
+            (even - odd).conj()
+        };
         [even + odd, mirrored]
     }
 
@@ -142,9 +150,8 @@ impl Surface {
         let k = [sign * self.lattice.kx(line), sign * self.lattice.ky(index)];
         // Whole turns are taken off in integers: the phase is right for any origin.
         let by_column = (line as i64 * self.raster.origin_column.rem_euclid(columns)) % columns;
-        let by_row = signed_index(index, self.lattice.rows)
-            * self.raster.origin_row.rem_euclid(rows)
-            % rows;
+        let by_row =
+            signed_index(index, self.lattice.rows) * self.raster.origin_row.rem_euclid(rows) % rows;
         let turns = by_column as f64 / columns as f64 - by_row as f64 / rows as f64;
         let omega = angular_frequency(k[0].hypot(k[1]), self.depth);
         waves.push(k, omega, c * Complex64::cis(sign * TAU * turns));
@@ -220,9 +227,14 @@ impl Surface {
                 }
                 _ => continue,
             };
-            plan.run_real(&mut half, [self.raster.rows, self.raster.columns], out, |line, one, two| {
-                self.half_spectra(&factors, line, quantities, [one, two]);
-            });
+            plan.run_real(
+                &mut half,
+                [self.raster.rows, self.raster.columns],
+                out,
+                |line, one, two| {
+                    self.half_spectra(&factors, line, quantities, [one, two]);
+                },
+            );
         }
         fields
     }

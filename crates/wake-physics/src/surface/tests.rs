@@ -38,7 +38,12 @@ fn surface(sea: &WindSea, raster: &Raster) -> Surface {
 
 /// The sea whose every amplitude has its mean modulus.
 fn steady(sea: &WindSea, raster: &Raster) -> Surface {
-    Surface::draw(&DirectionalSpectrum::new(sea), (7, 0.0), raster, Scatter::Phase)
+    Surface::draw(
+        &DirectionalSpectrum::new(sea),
+        (7, 0.0),
+        raster,
+        Scatter::Phase,
+    )
 }
 
 /// Σ½|T c|² of the modes.
@@ -61,7 +66,9 @@ fn fields_are_the_harmonic_sum() {
         origin_row: 1003,
         origin_column: -58,
     };
-    let pixels: Vec<[usize; 2]> = (0..150).map(|n| [(17 * n) % 47, (29 * n + n / 47) % 70]).collect();
+    let pixels: Vec<[usize; 2]> = (0..150)
+        .map(|n| [(17 * n) % 47, (29 * n + n / 47) % 70])
+        .collect();
     for (depth, time) in [(f64::INFINITY, 0.0), (2.0, 77.7)] {
         let spectrum = DirectionalSpectrum::new(&WindSea { depth, ..SEA });
         let sea = Surface::new(&spectrum, 3, time, &raster);
@@ -72,7 +79,10 @@ fn fields_are_the_harmonic_sum() {
                 let rms = field.rms();
                 for (&[i, j], exact) in pixels.iter().zip(exact) {
                     let error = (f64::from(field.at(i, j)) - exact).abs();
-                    assert!(error <= tolerance * rms, "{quantity:?} {tolerance} {error} {rms}");
+                    assert!(
+                        error <= tolerance * rms,
+                        "{quantity:?} {tolerance} {error} {rms}"
+                    );
                 }
             }
         }
@@ -85,7 +95,11 @@ fn fields_do_not_depend_on_their_company() {
     let raster = Raster::image(30, 20, 2.0);
     let sea = surface(&SEA, &raster);
     let all = sea.fields(&transfer(SEA.depth), &ALL, 1e-3);
-    let some = [Quantity::VelocityZ, Quantity::Elevation, Quantity::VelocityZ];
+    let some = [
+        Quantity::VelocityZ,
+        Quantity::Elevation,
+        Quantity::VelocityZ,
+    ];
     let fields = sea.fields(&transfer(SEA.depth), &some, 1e-3);
     for (field, n) in fields.iter().zip([5, 0, 5]) {
         // Rounding of the partner in the same FFT.
@@ -98,11 +112,20 @@ fn fields_do_not_depend_on_their_company() {
 /// lattice's first wave to beyond the smallest wave of a pixel.
 #[test]
 fn variance_is_that_of_the_spectrum() {
-    for model in [SpectrumModel::Elfouhaily, SpectrumModel::Jonswap, SpectrumModel::PiersonMoskowitz] {
+    for model in [
+        SpectrumModel::Elfouhaily,
+        SpectrumModel::Jonswap,
+        SpectrumModel::PiersonMoskowitz,
+    ] {
         for (rows, columns) in [(1, 1), (9, 200), (128, 128)] {
-            for (spacing, wind_speed) in
-                [(2.5, 3.0), (2.5, 5.0), (2.5, 12.0), (2.5, 30.0), (10.0, 7.0), (0.5, 4.0)]
-            {
+            for (spacing, wind_speed) in [
+                (2.5, 3.0),
+                (2.5, 5.0),
+                (2.5, 12.0),
+                (2.5, 30.0),
+                (10.0, 7.0),
+                (0.5, 4.0),
+            ] {
                 let sea = WindSea {
                     wind_speed,
                     fetch: 1e5,
@@ -142,12 +165,17 @@ fn slopes_and_velocities_have_the_variance_of_the_band() {
                 (of(Quantity::SlopeX), band.slope_xx),
                 (of(Quantity::SlopeY), band.slope_yy),
                 (of(Quantity::RadialAcceleration), band.radial_acceleration),
-                (mode_variance(&modes, |k, omega| t.radial(k, omega)), band.radial_velocity),
+                (
+                    mode_variance(&modes, |k, omega| t.radial(k, omega)),
+                    band.radial_velocity,
+                ),
             ] {
                 assert!((sum / integral - 1.0).abs() < 5e-3);
             }
             // ⟨u_z²⟩ = ∫ω²S: seen straight from above.
-            let vertical = spectrum.moments(0.0, raster.nyquist_wavenumber(), 0.0).radial_velocity;
+            let vertical = spectrum
+                .moments(0.0, raster.nyquist_wavenumber(), 0.0)
+                .radial_velocity;
             assert!((of(Quantity::VelocityZ) / vertical - 1.0).abs() < 5e-3);
         }
     }
@@ -183,7 +211,10 @@ fn mean_square_is_the_sum_over_waves() {
                 None => 0.5 * c.norm_sqr(),
             })
             .sum();
-        assert!((field.rms().powi(2) / sum - 1.0).abs() < 1e-6, "{quantity:?}");
+        assert!(
+            (field.rms().powi(2) / sum - 1.0).abs() < 1e-6,
+            "{quantity:?}"
+        );
     }
 }
 
@@ -191,10 +222,14 @@ fn mean_square_is_the_sum_over_waves() {
 #[test]
 fn amplitudes_are_gaussian() {
     let raster = Raster::image(200, 200, 2.5);
-    let (random, mean) = (surface(&SEA, &raster).modes(), steady(&SEA, &raster).modes());
+    let (random, mean) = (
+        surface(&SEA, &raster).modes(),
+        steady(&SEA, &raster).modes(),
+    );
     // Waves so weak that rounding of their opposite wave covers them are left aside.
-    let means: HashMap<_, _> =
-        (0..mean.len()).map(|n| (key(mean.kx[n], mean.ky[n]), mean.amplitude[n].norm())).collect();
+    let means: HashMap<_, _> = (0..mean.len())
+        .map(|n| (key(mean.kx[n], mean.ky[n]), mean.amplitude[n].norm()))
+        .collect();
     let largest = means.values().fold(0.0, |a: f64, &b| a.max(b));
     let g: Vec<Complex64> = (0..random.len())
         .filter_map(|n| {
@@ -213,7 +248,10 @@ fn amplitudes_are_gaussian() {
         (moment(&|g| g.re * g.im), 0.0, 0.5),
         (moment(&|g| g.re * g.re), 0.5, 0.5f64.sqrt()),
     ] {
-        assert!((value - expected).abs() < 5.0 * deviation / n.sqrt(), "{value} {expected}");
+        assert!(
+            (value - expected).abs() < 5.0 * deviation / n.sqrt(),
+            "{value} {expected}"
+        );
     }
 }
 
@@ -233,17 +271,27 @@ fn height_does_not_depend_on_the_size() {
 fn waves_travel_along_their_wavenumber() {
     let (raster, spectrum) = (Raster::image(40, 40, 1.0), DirectionalSpectrum::new(&SEA));
     let start = Surface::new(&spectrum, 5, 0.0, &raster).modes();
-    let largest = start.amplitude.iter().fold(0.0, |a: f64, c| a.max(c.norm()));
+    let largest = start
+        .amplitude
+        .iter()
+        .fold(0.0, |a: f64, c| a.max(c.norm()));
     for time in [0.3, 1234.5, 1e5] {
         let later = Surface::new(&spectrum, 5, time, &raster).modes();
-        let amplitudes: HashMap<_, _> =
-            (0..later.len()).map(|n| (key(later.kx[n], later.ky[n]), later.amplitude[n])).collect();
+        let amplitudes: HashMap<_, _> = (0..later.len())
+            .map(|n| (key(later.kx[n], later.ky[n]), later.amplitude[n]))
+            .collect();
         for n in 0..start.len() {
             let expected = start.amplitude[n] * Complex64::cis(-start.omega[n] * time);
-            let wave = amplitudes.get(&key(start.kx[n], start.ky[n])).copied().unwrap_or_default();
+            let wave = amplitudes
+                .get(&key(start.kx[n], start.ky[n]))
+                .copied()
+                .unwrap_or_default();
             let error = (wave - expected).norm();
             // Even and odd parts are rounded to 6e-8 of the larger of the waves k and −k.
-            assert!(error < 1e-6 * expected.norm() + 1.2e-7 * largest, "{time} {error}");
+            assert!(
+                error < 1e-6 * expected.norm() + 1.2e-7 * largest,
+                "{time} {error}"
+            );
         }
     }
     // The strongest wave alone: its field moves by the phase speed along k.
@@ -252,9 +300,12 @@ fn waves_travel_along_their_wavenumber() {
     assert_eq!(wave.len(), 1);
     let [kx, ky, omega] = [wave.kx[0], wave.ky[0], wave.omega[0]];
     let time = 2.0;
-    let moved = Surface::new(&spectrum, 5, time, &raster).strongest(1).modes();
+    let moved = Surface::new(&spectrum, 5, time, &raster)
+        .strongest(1)
+        .modes();
     let shift = omega * time / (kx * kx + ky * ky);
-    let value = |w: &PlaneWaves, x: f64, y: f64| (w.amplitude[0] * Complex64::cis(kx * x + ky * y)).re;
+    let value =
+        |w: &PlaneWaves, x: f64, y: f64| (w.amplitude[0] * Complex64::cis(kx * x + ky * y)).re;
     for (x, y) in [(0.0, 0.0), (3.0, -8.0)] {
         let difference = value(&moved, x + kx * shift, y + ky * shift) - value(&wave, x, y);
         assert!(difference.abs() < 1e-5 * wave.amplitude[0].norm());
@@ -269,12 +320,19 @@ fn mirrored_wind_makes_mirrored_waves() {
         wind_toward: -SEA.wind_toward,
         ..SEA
     };
-    let (one, two) = (steady(&SEA, &raster).modes(), steady(&mirrored, &raster).modes());
-    let amplitudes: HashMap<_, _> =
-        (0..two.len()).map(|n| (key(two.kx[n], two.ky[n]), two.amplitude[n].norm())).collect();
+    let (one, two) = (
+        steady(&SEA, &raster).modes(),
+        steady(&mirrored, &raster).modes(),
+    );
+    let amplitudes: HashMap<_, _> = (0..two.len())
+        .map(|n| (key(two.kx[n], two.ky[n]), two.amplitude[n].norm()))
+        .collect();
     let largest = amplitudes.values().fold(0.0, |a: f64, &b| a.max(b));
     for n in 0..one.len() {
-        let mirror = amplitudes.get(&key(-one.kx[n], one.ky[n])).copied().unwrap_or(0.0);
+        let mirror = amplitudes
+            .get(&key(-one.kx[n], one.ky[n]))
+            .copied()
+            .unwrap_or(0.0);
         assert!((one.amplitude[n].norm() - mirror).abs() < 1e-5 * largest);
     }
     // And a wind given with whole turns more is the same wind.
@@ -282,9 +340,8 @@ fn mirrored_wind_makes_mirrored_waves() {
         wind_toward: SEA.wind_toward + 3.0 * TAU,
         ..SEA
     };
-    let fields = [SEA, turned].map(|sea| {
-        surface(&sea, &raster).fields(&transfer(SEA.depth), &[Quantity::SlopeX], 1e-3)
-    });
+    let fields = [SEA, turned]
+        .map(|sea| surface(&sea, &raster).fields(&transfer(SEA.depth), &[Quantity::SlopeX], 1e-3));
     assert!(fields[0][0].difference(&fields[1][0]).0 < 1e-5 * fields[0][0].rms());
 }
 
@@ -297,7 +354,8 @@ fn the_sea_belongs_to_the_plane() {
         origin_column: raster.origin_column - 11,
         ..raster
     };
-    let field = |raster| surface(&SEA, raster).fields(&transfer(SEA.depth), &[Quantity::Elevation], 1e-3);
+    let field =
+        |raster| surface(&SEA, raster).fields(&transfer(SEA.depth), &[Quantity::Elevation], 1e-3);
     let (one, two) = (field(&raster), field(&shifted));
     for (i, j) in [(0, 11), (20, 30), (32, 59)] {
         let [column, row] = shifted.pixel(raster.x(j), raster.y(i));
@@ -332,7 +390,10 @@ fn opposite_edges_are_strangers() {
 fn threads_do_not_change_the_sea() {
     let raster = Raster::image(90, 70, 2.5);
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| {
             let sea = Surface::new(&DirectionalSpectrum::new(&SEA), 11, 5.0, &raster);
             let fields = sea.fields(&transfer(SEA.depth), &ALL, 1e-3);
@@ -355,11 +416,18 @@ fn strongest_waves_are_the_strongest() {
     assert_eq!(modes.len(), 100);
     for n in 0..100 {
         assert_eq!((modes.kx[n], modes.ky[n]), (expected.kx[n], expected.ky[n]));
-        assert!((modes.amplitude[n] - expected.amplitude[n]).norm() < 1e-6 * expected.amplitude[n].norm());
+        assert!(
+            (modes.amplitude[n] - expected.amplitude[n]).norm()
+                < 1e-6 * expected.amplitude[n].norm()
+        );
     }
     let pixels = [[0, 0], [13, 41], [39, 49]];
     let exact = harmonic_sum(&modes, &transfer(SEA.depth), &ALL, &raster, &pixels);
-    for (field, exact) in some.fields(&transfer(SEA.depth), &ALL, 1e-6).iter().zip(exact) {
+    for (field, exact) in some
+        .fields(&transfer(SEA.depth), &ALL, 1e-6)
+        .iter()
+        .zip(exact)
+    {
         for ([i, j], exact) in pixels.into_iter().zip(exact) {
             assert!((f64::from(field.at(i, j)) - exact).abs() < 1e-6 * field.rms());
         }
@@ -380,7 +448,9 @@ fn corners_are_finite() {
         (30.0, 1e7, f64::INFINITY),
     ] {
         for spectrum in [SpectrumModel::Elfouhaily, SpectrumModel::Jonswap] {
-            for (rows, columns, spacing) in [(1, 1, 0.1), (7, 19, 0.1), (16, 3, 100.0), (31, 37, 2.5)] {
+            for (rows, columns, spacing) in
+                [(1, 1, 0.1), (7, 19, 0.1), (16, 3, 100.0), (31, 37, 2.5)]
+            {
                 let sea = WindSea {
                     wind_speed,
                     fetch,
@@ -399,6 +469,12 @@ fn corners_are_finite() {
             }
         }
     }
-    let flat = surface(&WindSea { wind_speed: 0.0, ..SEA }, &Raster::image(8, 8, 1.0));
+    let flat = surface(
+        &WindSea {
+            wind_speed: 0.0,
+            ..SEA
+        },
+        &Raster::image(8, 8, 1.0),
+    );
     assert!(flat.is_flat() && flat.modes().is_empty() && flat.strongest(5).modes().is_empty());
 }

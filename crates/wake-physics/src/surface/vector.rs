@@ -78,7 +78,11 @@ pub(super) fn exp(x: f32) -> f32 {
     let r = x - n * HIGH - n * LOW;
     let high = 1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0 + r * (1.0 / 5040.0)));
     let series = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * high)));
-    let power = shifted.to_bits().wrapping_sub(ROUND.to_bits()).wrapping_add(127) << 23;
+    let power = shifted
+        .to_bits()
+        .wrapping_sub(ROUND.to_bits())
+        .wrapping_add(127)
+        << 23;
     series * f32::from_bits(power)
 }
 
@@ -91,7 +95,8 @@ pub(super) fn cos_sin(turns: u32) -> [f32; 2] {
     let rest = turns.wrapping_sub(quarter << 30) as i32;
     let x = rest as f32 * (TAU / 4_294_967_296.0);
     let x2 = x * x;
-    let sin = x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 / 362_880.0))));
+    let sin =
+        x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 / 362_880.0))));
     let cos = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 / 40_320.0)));
     let swap = quarter & 1 == 1;
     let (c, s) = if swap { (sin, cos) } else { (cos, sin) };
@@ -110,9 +115,14 @@ fn tanh(x: f32) -> f32 {
     let x2 = x * x;
     let series = 1.0
         + x2 * (-1.0 / 3.0
-            + x2 * (2.0 / 15.0 + x2 * (-17.0 / 315.0 + x2 * (62.0 / 2835.0 - x2 * 1382.0 / 155_925.0))));
+            + x2 * (2.0 / 15.0
+                + x2 * (-17.0 / 315.0 + x2 * (62.0 / 2835.0 - x2 * 1382.0 / 155_925.0))));
     let e = exp(-2.0 * x);
-    if x < 0.3 { x * series } else { (1.0 - e) / (1.0 + e) }
+    if x < 0.3 {
+        x * series
+    } else {
+        (1.0 - e) / (1.0 + e)
+    }
 }
 
 #[cfg(test)]
@@ -120,7 +130,11 @@ mod tests {
     use super::*;
 
     /// Largest relative difference over points spaced evenly in x or in ln x.
-    fn worst(points: impl Iterator<Item = f32>, fast: fn(f32) -> f32, exact: fn(f64) -> f64) -> f64 {
+    fn worst(
+        points: impl Iterator<Item = f32>,
+        fast: fn(f32) -> f32,
+        exact: fn(f64) -> f64,
+    ) -> f64 {
         points
             .map(|x| (f64::from(fast(x)) / exact(f64::from(x)) - 1.0).abs())
             .fold(0.0, f64::max)
