@@ -52,9 +52,9 @@ pub struct Moments {
     pub slope_xy: f64,
     /// ⟨(∂ζ/∂y)²⟩ [1].
     pub slope_yy: f64,
-    /// ⟨v_r²⟩ [m²/s²], the velocity toward the radar squared.
+    /// `⟨v_r²⟩` [m²/s²], the velocity toward the radar squared.
     pub radial_velocity: f64,
-    /// ⟨a_r²⟩ [m²/s⁴], the acceleration toward the radar squared.
+    /// `⟨a_r²⟩` [m²/s⁴], the acceleration toward the radar squared.
     pub radial_acceleration: f64,
 }
 
@@ -212,6 +212,7 @@ pub(crate) const GAUSS_8: [(f64, f64); 4] = [
 ];
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "nothing is exactly 0")]
 mod tests {
     use super::*;
     use crate::constants::GRAVITY;
@@ -323,7 +324,7 @@ mod tests {
         }
     }
 
-    /// σ_v = 0.0646 U₁₉.₅ from above (closed form), and parts that add up.
+    /// `σ_v` = 0.0646 U₁₉.₅ from above (closed form), and parts that add up.
     #[test]
     fn vertical_velocity_of_the_developed_sea() {
         let spectrum = DirectionalSpectrum::new(&sea(

@@ -20,8 +20,8 @@ const ENHANCEMENT: f64 = 3.3;
 ///
 /// # Validity
 ///
-/// The growth laws hold for growing seas. Beyond the fetch ξ_d ≈ 1.88·10⁴, where their peak reaches that of
-/// Pierson and Moskowitz, the spectrum *is* that of Pierson and Moskowitz. From ξ₁ = 1.1·10⁴ to ξ_d, ω_p follows
+/// The growth laws hold for growing seas. Beyond the fetch `ξ_d` ≈ 1.88·10⁴, where their peak reaches that of
+/// Pierson and Moskowitz, the spectrum *is* that of Pierson and Moskowitz. From ξ₁ = 1.1·10⁴ to `ξ_d`, `ω_p` follows
 /// its law while α and γ go to those of the developed sea (0.0081 and 1):
 ///
 /// ```text
@@ -63,7 +63,7 @@ impl Jonswap {
         )
     }
 
-    /// The spectrum of given level α [1], peak frequency ω_p [rad/s] and peak enhancement γ [1].
+    /// The spectrum of given level α [1], peak frequency `ω_p` [rad/s] and peak enhancement γ [1].
     #[must_use]
     pub fn with(level: f64, peak_frequency: f64, enhancement: f64) -> Self {
         Self {
@@ -88,13 +88,13 @@ impl Jonswap {
         0.5 * self.level * self.shape((wavenumber / self.peak_wavenumber()).sqrt())
     }
 
-    /// Wavenumber of the peak frequency, ω_p²/g [rad/m]; infinite without wind.
+    /// Wavenumber of the peak frequency, `ω_p²/g` [rad/m]; infinite without wind.
     #[must_use]
     pub fn peak_wavenumber(&self) -> f64 {
         self.peak_frequency.powi(2) / GRAVITY
     }
 
-    /// exp[−(5/4)x⁻⁴] γ^r at x = ω/ω_p.
+    /// exp[−(5/4)x⁻⁴] γ^r at `x = ω/ω_p`.
     fn shape(&self, x: f64) -> f64 {
         let width = if x <= 1.0 { 0.07 } else { 0.09 };
         let r = (-0.5 * ((x - 1.0) / width).powi(2)).exp();
@@ -103,6 +103,7 @@ impl Jonswap {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "nothing is exactly 0")]
 mod tests {
     use super::*;
 
@@ -117,7 +118,7 @@ mod tests {
             .sum()
     }
 
-    /// m₀ω_p⁴/(αg²) is 0.2 for γ = 1 (exactly) and 0.305 for γ = 3.3.
+    /// `m₀ω_p⁴/(αg²)` is 0.2 for γ = 1 (exactly) and 0.305 for γ = 3.3.
     #[test]
     fn two_numbers() {
         for (gamma, expected, digits) in [(1.0, 0.2, 1e-6), (3.3, 0.305, 5e-4)] {

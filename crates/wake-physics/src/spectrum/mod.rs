@@ -116,7 +116,7 @@ pub fn from_deep_equivalent(deep: f64, depth: f64) -> f64 {
     k
 }
 
-/// Depth factor Φ of Kitaigorodskii on a frequency spectrum: S_h(ω) = Φ S_∞(ω) [1].
+/// Depth factor Φ of Kitaigorodskii on a frequency spectrum: `S_h(ω) = Φ S_∞(ω)` [1].
 ///
 /// ```text
 /// Φ = [k⁻³ ∂k/∂ω]_h / [k⁻³ ∂k/∂ω]_∞ = (k_∞/k)³ · (g/2ω)/c_g,   gravity waves

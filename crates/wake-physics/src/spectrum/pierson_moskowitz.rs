@@ -58,13 +58,13 @@ impl PiersonMoskowitz {
         0.5 * LEVEL * (-CUT * ratio * ratio).exp()
     }
 
-    /// Peak frequency ω_p [rad/s].
+    /// Peak frequency `ω_p` [rad/s].
     #[must_use]
     pub fn peak_frequency(&self) -> f64 {
         (0.8 * CUT).powf(0.25) * GRAVITY / self.wind
     }
 
-    /// Wavenumber of the peak frequency, ω_p²/g [rad/m]; infinite without wind.
+    /// Wavenumber of the peak frequency, `ω_p²/g` [rad/m]; infinite without wind.
     #[must_use]
     pub fn peak_wavenumber(&self) -> f64 {
         self.peak_frequency().powi(2) / GRAVITY
@@ -72,6 +72,7 @@ impl PiersonMoskowitz {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "nothing is exactly 0")]
 mod tests {
     use super::*;
     use crate::spectrum::to_wavenumber;
@@ -88,7 +89,7 @@ mod tests {
             .sum()
     }
 
-    /// Hs = 0.02133 U², σ_v = 0.0646 U (closed forms, three digits), and the table's heights.
+    /// Hs = 0.02133 U², `σ_v` = 0.0646 U (closed forms, three digits), and the table's heights.
     #[test]
     fn moments_are_the_closed_forms() {
         for (wind, height) in [(3.0, 0.202), (5.0, 0.561), (7.0, 1.100)] {

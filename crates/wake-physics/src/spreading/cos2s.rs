@@ -11,12 +11,12 @@ use std::f64::consts::PI;
 /// Mitsuyasu   s = s_max · min[x⁵, x^−2.5],      s_max = 11.5 (U/c_p)^−2.5
 /// ```
 ///
-/// with x = f/f_p = √(k/k_p) and c_p = √(g/k_p). Hasselmann et al. change branches at 1.05 f_p; the
-/// branches cross between f_p and 1.06 f_p, and taking the smaller one makes s continuous.
+/// with `x = f/f_p = √(k/k_p)` and `c_p = √(g/k_p)`. Hasselmann et al. change branches at 1.05 `f_p`; the
+/// branches cross between `f_p` and 1.06 `f_p`, and taking the smaller one makes s continuous.
 ///
 /// # Validity
 ///
-/// U/c_p from about 1 to 2 and frequencies up to a few f_p; far above, s goes to 0 and the waves spread evenly
+/// `U/c_p` from about 1 to 2 and frequencies up to a few `f_p`; far above, s goes to 0 and the waves spread evenly
 /// over the circle.
 ///
 /// # References
@@ -33,7 +33,7 @@ pub struct Cos2s {
 }
 
 impl Cos2s {
-    /// Exponents of Hasselmann et al. for a wind U₁₀ [m/s] and a deep-water peak k_p [rad/m].
+    /// Exponents of Hasselmann et al. for a wind U₁₀ [m/s] and a deep-water peak `k_p` [rad/m].
     #[must_use]
     pub fn hasselmann(wind_speed: f64, peak_wavenumber: f64) -> Self {
         let age = inverse_wave_age(wind_speed, peak_wavenumber);
@@ -44,7 +44,7 @@ impl Cos2s {
         }
     }
 
-    /// Exponents of Mitsuyasu et al. for a wind U₁₀ [m/s] and a deep-water peak k_p [rad/m].
+    /// Exponents of Mitsuyasu et al. for a wind U₁₀ [m/s] and a deep-water peak `k_p` [rad/m].
     #[must_use]
     pub fn mitsuyasu(wind_speed: f64, peak_wavenumber: f64) -> Self {
         let top = 11.5 * inverse_wave_age(wind_speed, peak_wavenumber).powf(-2.5);
@@ -84,7 +84,7 @@ impl Cos2s {
     }
 }
 
-/// Inverse wave age U/c_p = U √(k_p/g) [1].
+/// Inverse wave age `U/c_p = U √(k_p/g)` [1].
 fn inverse_wave_age(wind_speed: f64, peak_wavenumber: f64) -> f64 {
     wind_speed * (peak_wavenumber / GRAVITY).sqrt()
 }

@@ -19,7 +19,7 @@ pub enum Spreading {
 }
 
 impl Spreading {
-    /// The spreading around a wind U₁₀ [m/s] of a sea with deep-water peak k_p [rad/m].
+    /// The spreading around a wind U₁₀ [m/s] of a sea with deep-water peak `k_p` [rad/m].
     ///
     /// The even spreading is that of Elfouhaily's own sea of this wind and fetch [m].
     #[must_use]

@@ -144,6 +144,7 @@ fn node(spectrum: &DirectionalSpectrum, cell: [f64; 2], k: f64) -> [f32; 2] {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "an unused radius is exactly 0")]
 mod tests {
     use super::*;
     use crate::scene::{SpectrumModel, SpreadingModel};

@@ -170,12 +170,12 @@ impl<'a> Draw<'a> {
         }
     }
 
-    /// √E from 31 random bits: E = −ln u, u from 2⁻³² to 1.
+    /// √E from 31 random bits n: E = −ln u, u = (n + ½) 2⁻³¹.
     #[inline(always)]
     fn modulus(&self, bits: u32) -> f32 {
         match self.scatter {
             Scatter::Gaussian => {
-                let u = ((bits >> 1) as i32 as f32 + 0.5) * (0.5 / 1_073_741_824.0);
+                let u = ((bits >> 1) as i32 as f32 + 0.5) * f32::from_bits((127 - 31) << 23);
                 (-ln(u)).max(0.0).sqrt()
             }
             #[cfg(test)]

@@ -60,10 +60,10 @@ impl<'a, T: Lane> Factors<'a, T> {
             let waves = self.ky[range].iter().zip(out);
             match self.depth {
                 None => {
-                    waves.for_each(|(&ky, out)| frequency(kx * kx + ky * ky, |_| T::one(), out))
+                    waves.for_each(|(&ky, out)| frequency(kx * kx + ky * ky, |_| T::one(), out));
                 }
                 Some(depth) => waves.for_each(|(&ky, out)| {
-                    frequency(kx * kx + ky * ky, |k| (k * depth).tanh(), out)
+                    frequency(kx * kx + ky * ky, |k| (k * depth).tanh(), out);
                 }),
             }
         }

@@ -93,7 +93,7 @@ pub(super) fn exp(x: f32) -> f32 {
 pub(super) fn cos_sin(turns: u32) -> [f32; 2] {
     let quarter = turns.wrapping_add(1 << 29) >> 30;
     let rest = turns.wrapping_sub(quarter << 30) as i32;
-    let x = rest as f32 * (TAU / 4_294_967_296.0);
+    let x = rest as f32 * (TAU * f32::from_bits((127 - 32) << 23));
     let x2 = x * x;
     let sin =
         x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 / 362_880.0))));
@@ -126,6 +126,7 @@ fn tanh(x: f32) -> f32 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "the ends of the ranges are exact")]
 mod tests {
     use super::*;
 
