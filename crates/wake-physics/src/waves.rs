@@ -8,9 +8,7 @@ use crate::raster::{Field, Raster};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-mod matrix_product;
 
-pub use matrix_product::matrix_product;
 
 /// Plane waves of the sea surface at one instant:
 ///
