@@ -1,0 +1,101 @@
+//! What can go wrong, by whose fault it is.
+
+use std::path::PathBuf;
+
+/// Why a scene could not be read or simulated.
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message names every field")]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A parameter lies outside its closed range.
+    #[error("{name} is {value}, outside {min} to {max} {unit}")]
+    OutOfRange {
+        name: String,
+        value: f64,
+        min: f64,
+        max: f64,
+        unit: &'static str,
+    },
+    /// A parameter is not a finite number.
+    #[error("{name} is {value}, but must be a finite number of {unit}")]
+    NotFinite {
+        name: String,
+        value: f64,
+        unit: &'static str,
+    },
+    /// Two parameters contradict each other.
+    #[error("{name} is {value}, {requirement}")]
+    Conflict {
+        name: String,
+        value: String,
+        requirement: String,
+    },
+    /// The text of a scene is not what a scene file holds.
+    #[error("cannot read the scene: {message}")]
+    Parse { message: String },
+    /// An assignment `key=value` does not name a parameter or has no value.
+    #[error(
+        "cannot set '{assignment}': {message}; write KEY=VALUE with a key of the scene file, such as ship.speed=10"
+    )]
+    Assignment { assignment: String, message: String },
+    /// A file could not be read or written.
+    #[error("cannot {action} {}: {message}", path.display())]
+    File {
+        action: &'static str,
+        path: PathBuf,
+        message: String,
+    },
+    /// The fields would not fit in memory.
+    #[error(
+        "a grid of {rows} x {columns} pixels needs about {needed_gib:.1} GiB, but {available_gib:.1} GiB are free; lower grid.rows or grid.columns"
+    )]
+    TooLarge {
+        rows: usize,
+        columns: usize,
+        needed_gib: f64,
+        available_gib: f64,
+    },
+}
+
+/// Result of this crate's fallible functions.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Checks that `value` lies in the closed range `[min, max]`; NaN does not.
+///
+/// # Errors
+///
+/// [`Error::OutOfRange`] with the name, the value and the range.
+pub(crate) fn in_range(
+    name: &str,
+    value: f64,
+    min: f64,
+    max: f64,
+    unit: &'static str,
+) -> Result<()> {
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::OutOfRange {
+        name: name.to_owned(),
+        value,
+        min,
+        max,
+        unit,
+    })
+}
+
+/// Checks that `value` is finite.
+///
+/// # Errors
+///
+/// [`Error::NotFinite`] with the name and the value.
+pub(crate) fn finite(name: &str, value: f64, unit: &'static str) -> Result<()> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::NotFinite {
+        name: name.to_owned(),
+        value,
+        unit,
+    })
+}

@@ -1,0 +1,227 @@
+//! Pixels and their places: the raster every stage works on, and the fields that live on it.
+
+use rayon::prelude::*;
+
+/// A grid of square pixels over the sea.
+///
+/// Row 0 is the largest azimuth y, column 0 the smallest ground range x; the pixel
+/// `[origin_row, origin_column]` is the origin:
+///
+/// ```text
+/// x(j) = (j − origin_column)·spacing        y(i) = (origin_row − i)·spacing
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Raster {
+    /// Number of rows, along azimuth, at least 1.
+    pub rows: usize,
+    /// Number of columns, along ground range, at least 1.
+    pub columns: usize,
+    /// Pixel size [m], above 0.
+    pub spacing: f64,
+    /// Row of the origin; may lie outside the raster.
+    pub origin_row: i64,
+    /// Column of the origin; may lie outside the raster.
+    pub origin_column: i64,
+}
+
+impl Raster {
+    /// The raster of an image: the origin is the pixel `[rows/2, columns/2]`.
+    #[must_use]
+    pub fn image(rows: usize, columns: usize, spacing: f64) -> Self {
+        Self {
+            rows,
+            columns,
+            spacing,
+            origin_row: (rows / 2) as i64,
+            origin_column: (columns / 2) as i64,
+        }
+    }
+
+    /// The same pixels with `rows` more above and below and `columns` more left and right.
+    #[must_use]
+    pub fn with_margin(&self, rows: usize, columns: usize) -> Self {
+        Self {
+            rows: self.rows + 2 * rows,
+            columns: self.columns + 2 * columns,
+            spacing: self.spacing,
+            origin_row: self.origin_row + rows as i64,
+            origin_column: self.origin_column + columns as i64,
+        }
+    }
+
+    /// Number of pixels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows * self.columns
+    }
+
+    /// Whether there is no pixel.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Ground range of a column [m].
+    #[must_use]
+    pub fn x(&self, column: usize) -> f64 {
+        (column as i64 - self.origin_column) as f64 * self.spacing
+    }
+
+    /// Azimuth of a row [m].
+    #[must_use]
+    pub fn y(&self, row: usize) -> f64 {
+        (self.origin_row - row as i64) as f64 * self.spacing
+    }
+
+    /// Pixel coordinates (column, row), with fractions, of the point (x, y) [m].
+    #[must_use]
+    pub fn pixel(&self, x: f64, y: f64) -> [f64; 2] {
+        [
+            self.origin_column as f64 + x / self.spacing,
+            self.origin_row as f64 - y / self.spacing,
+        ]
+    }
+
+    /// Largest wavenumber a pixel carries, π/spacing [rad/m]; "resolved" means |k| at most this.
+    #[must_use]
+    pub fn nyquist_wavenumber(&self) -> f64 {
+        std::f64::consts::PI / self.spacing
+    }
+}
+
+/// One value a pixel, row after row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// The values `[rows, columns]`, row after row.
+    pub values: Vec<f32>,
+}
+
+impl Field {
+    /// A field with the same value everywhere.
+    #[must_use]
+    pub fn constant(raster: &Raster, value: f32) -> Self {
+        Self {
+            rows: raster.rows,
+            columns: raster.columns,
+            values: vec![value; raster.len()],
+        }
+    }
+
+    /// A field from a function of (row, column), computed row by row in parallel.
+    #[must_use]
+    pub fn from_fn(raster: &Raster, value: impl Fn(usize, usize) -> f32 + Sync) -> Self {
+        let mut field = Self::constant(raster, 0.0);
+        field
+            .values
+            .par_chunks_mut(raster.columns.max(1))
+            .enumerate()
+            .for_each(|(i, row)| {
+                for (j, v) in row.iter_mut().enumerate() {
+                    *v = value(i, j);
+                }
+            });
+        field
+    }
+
+    /// The value at `[row, column]`.
+    ///
+    /// # Panics
+    ///
+    /// If the pixel lies outside the field.
+    #[must_use]
+    pub fn at(&self, row: usize, column: usize) -> f32 {
+        self.values[row * self.columns + column]
+    }
+
+    /// The middle of the field: without `rows` above and below and `columns` left and right.
+    ///
+    /// # Panics
+    ///
+    /// If the margins are larger than the field.
+    #[must_use]
+    pub fn crop(&self, rows: usize, columns: usize) -> Self {
+        let (height, width) = (self.rows - 2 * rows, self.columns - 2 * columns);
+        let mut values = Vec::with_capacity(height * width);
+        for i in rows..rows + height {
+            let start = i * self.columns + columns;
+            values.extend_from_slice(&self.values[start..start + width]);
+        }
+        Self {
+            rows: height,
+            columns: width,
+            values,
+        }
+    }
+
+    /// Mean of the values, summed in double precision.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.values.iter().map(|&v| f64::from(v)).sum::<f64>() / self.values.len().max(1) as f64
+    }
+
+    /// Root of the mean square of the values.
+    #[must_use]
+    pub fn rms(&self) -> f64 {
+        let sum: f64 = self.values.iter().map(|&v| f64::from(v).powi(2)).sum();
+        (sum / self.values.len().max(1) as f64).sqrt()
+    }
+
+    /// Largest and root-mean-square absolute difference to another field.
+    ///
+    /// # Panics
+    ///
+    /// If the sizes differ.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> (f64, f64) {
+        assert_eq!(
+            (self.rows, self.columns),
+            (other.rows, other.columns),
+            "fields of different size"
+        );
+        let (mut max, mut sum) = (0.0f64, 0.0);
+        for (&a, &b) in self.values.iter().zip(&other.values) {
+            let d = (f64::from(a) - f64::from(b)).abs();
+            max = max.max(d);
+            sum += d * d;
+        }
+        (max, (sum / self.values.len().max(1) as f64).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn origin_is_the_middle_pixel() {
+        for (rows, columns) in [(1, 1), (4, 6), (5, 7)] {
+            let r = Raster::image(rows, columns, 2.5);
+            assert_eq!(r.x(columns / 2), 0.0);
+            assert_eq!(r.y(rows / 2), 0.0);
+            assert_eq!(r.pixel(0.0, 0.0), [(columns / 2) as f64, (rows / 2) as f64]);
+        }
+    }
+
+    #[test]
+    fn up_is_azimuth_and_right_is_range() {
+        let r = Raster::image(8, 8, 2.0);
+        assert!(r.y(0) > r.y(7));
+        assert!(r.x(7) > r.x(0));
+        assert_eq!(r.pixel(r.x(6), r.y(3)), [6.0, 3.0]);
+    }
+
+    #[test]
+    fn a_margin_moves_no_pixel_and_crop_takes_it_away() {
+        let r = Raster::image(3, 5, 1.5);
+        let wide = r.with_margin(2, 1);
+        assert_eq!(wide.x(1), r.x(0));
+        assert_eq!(wide.y(2), r.y(0));
+        let inner = Field::from_fn(&r, |i, j| (10.0 * r.y(i) + r.x(j)) as f32);
+        let outer = Field::from_fn(&wide, |i, j| (10.0 * wide.y(i) + wide.x(j)) as f32);
+        assert_eq!(outer.crop(2, 1), inner);
+    }
+}

@@ -1,0 +1,293 @@
+//! Cleaning: what happens to a prompt before it is split into words.
+//!
+//! Stable Diffusion v1.4 feeds its prompts through `ftfy` and lower case. Of `ftfy`'s repairs those that
+//! need no guess are made here, in this order:
+//!
+//! | rule | example |
+//! | --- | --- |
+//! | HTML entities become characters, repeatedly, up to the line of the first `<` | `&amp;lt;` → `<` |
+//! | C1 control characters (U+0080–009F) are read as Windows-1252 | U+0085 → `…` |
+//! | Latin ligatures become letters | `ﬁn` → `fin` |
+//! | full-width and half-width forms become the usual ones | `ＳＡＲ１` → `SAR1` |
+//! | curly quotes become straight | `“it’s”` → `"it's"` |
+//! | terminal colour codes go | `ESC [31m` |
+//! | control characters (U+0000–0008, 000B, 000E–001F, 007F, 206A–206F, FEFF, FFF9–FFFC) go | `a\0b` → `ab` |
+//! | Unicode form NFC | `e` + U+0301 → `é` |
+//! | lower case, by Unicode's default rules | `SAR` → `sar` |
+//!
+//! White space of any kind and length only separates words. Not done: undoing text that was decoded with
+//! the wrong encoding (`Ã©` for `é`), removing accents, spacing out Chinese characters.
+//!
+//! A prompt of printable ASCII without `&` only becomes lower case, as with every CLIP tokenizer.
+
+use unicode_normalization::{
+    IsNormalized, UnicodeNormalization, char::canonical_combining_class, is_nfc_quick,
+};
+
+/// A cleaned prompt that remembers where its bytes came from.
+#[derive(Debug)]
+pub(crate) struct Cleaned {
+    pub(crate) text: String,
+    /// Byte in the prompt of each byte of `text`; `None`: the same.
+    origin: Option<Vec<usize>>,
+}
+
+impl Cleaned {
+    /// The byte offset in the prompt that the byte `at` of the text came from.
+    pub(crate) fn origin(&self, at: usize) -> usize {
+        match &self.origin {
+            Some(origin) => origin.get(at).copied().unwrap_or(at),
+            None => at,
+        }
+    }
+}
+
+/// A character and the byte offset in the prompt that it came from.
+type Traced = (char, usize);
+
+/// Cleans a prompt by the rules of this module.
+pub(crate) fn clean(prompt: &str) -> Cleaned {
+    if prompt.bytes().all(is_plain) {
+        return Cleaned {
+            text: prompt.to_ascii_lowercase(),
+            origin: None,
+        };
+    }
+    let traced = decode_entities(prompt);
+    let traced = replace_forms(&traced);
+    let mut traced = drop_terminal_codes(&traced);
+    traced.retain(|&(c, _)| !is_control(c));
+    let traced = compose(&traced);
+    collect(lower(&traced))
+}
+
+/// Whether no rule but lower case changes this byte.
+fn is_plain(byte: u8) -> bool {
+    matches!(byte, b' '..=b'%' | b'\''..=b'~' | b'\t' | b'\n' | b'\r' | b'\x0C')
+}
+
+/// Decodes HTML entities until none is left, from the right, so that `&amp;lt;` takes one pass.
+///
+/// From the line of the first `<` on the text is markup, whose entities stay.
+fn decode_entities(prompt: &str) -> Vec<Traced> {
+    let line_of = |at: usize| prompt[..at].rfind('\n').map_or(0, |end| end + 1);
+    let markup = prompt.find('<').map_or(prompt.len(), line_of);
+    // The text so far, backwards: its last element is the leftmost character.
+    let mut stack: Vec<Traced> = Vec::with_capacity(prompt.len());
+    for (at, c) in prompt.char_indices().rev() {
+        stack.push((c, at));
+        while at < markup
+            && let Some((length, decoded)) = entity_on_top(&stack)
+        {
+            stack.truncate(stack.len() - length);
+            stack.extend(decoded.chars().rev().map(|c| (c, at)));
+        }
+    }
+    stack.reverse();
+    stack
+}
+
+/// The entity that starts with the leftmost character, if one does: its length and what it stands for.
+fn entity_on_top(stack: &[Traced]) -> Option<(usize, String)> {
+    const LONGEST: usize = 27; // '&', '#', 24 letters or digits, ';'
+    if stack.last()?.0 != '&' {
+        return None;
+    }
+    let front: String = stack.iter().rev().take(LONGEST).map(|&(c, _)| c).collect();
+    let entity = &front[..=front.find(';')?];
+    let name = entity[1..].trim_end_matches(';');
+    let name = name.strip_prefix('#').unwrap_or(name);
+    if name.is_empty() || !name.bytes().all(|b| b.is_ascii_alphanumeric()) {
+        return None;
+    }
+    let decoded = html_escape::decode_html_entities(entity);
+    (decoded != entity).then(|| (entity.len(), decoded.into_owned()))
+}
+
+/// What a C1 control character (U+0080 to U+009F) is in Windows-1252; five are nothing there.
+fn from_windows_1252(c: char) -> char {
+    const MEANT: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8D}Ž\u{8F}\u{90}‘’“”•–—˜™š›œ\u{9D}žŸ";
+    match u32::from(c) {
+        code @ 0x80..=0x9F => MEANT.chars().nth(code as usize - 0x80).unwrap_or(c),
+        _ => c,
+    }
+}
+
+/// Replaces C1 control characters, ligatures, width forms and quotes.
+fn replace_forms(text: &[Traced]) -> Vec<Traced> {
+    let mut out = Vec::with_capacity(text.len());
+    for &(c, at) in text {
+        let c = from_windows_1252(c);
+        if has_usual_form(c) {
+            out.extend(c.nfkc().map(|c| (straight(c), at)));
+        } else {
+            out.push((straight(c), at));
+        }
+    }
+    out
+}
+
+/// Latin ligatures and letter pairs, ideographic space, full and half width.
+fn has_usual_form(c: char) -> bool {
+    matches!(c, '\u{132}' | '\u{133}' | '\u{149}' | '\u{1C4}'..='\u{1CC}' | '\u{1F1}'..='\u{1F3}'
+        | '\u{FB00}'..='\u{FB06}' | '\u{3000}' | '\u{FF01}'..='\u{FFEF}')
+}
+
+/// A curly quote straightened.
+fn straight(c: char) -> char {
+    match c {
+        '\u{2BC}' | '\u{2018}'..='\u{201B}' => '\'',
+        '\u{201C}'..='\u{201F}' => '"',
+        _ => c,
+    }
+}
+
+/// Drops what sets colours in a terminal: escape, `[`, digits and semicolons, a letter.
+fn drop_terminal_codes(text: &[Traced]) -> Vec<Traced> {
+    let mut out = Vec::with_capacity(text.len());
+    let mut rest = text;
+    while let [first, after @ ..] = rest {
+        rest = match terminal_code(rest) {
+            Some(length) => &rest[length..],
+            None => {
+                out.push(*first);
+                after
+            }
+        };
+    }
+    out
+}
+
+/// Length of the terminal code that a text starts with.
+fn terminal_code(text: &[Traced]) -> Option<usize> {
+    let [('\x1B', _), ('[', _), after @ ..] = text else {
+        return None;
+    };
+    let numbers = after
+        .iter()
+        .take_while(|(c, _)| c.is_ascii_digit() || *c == ';')
+        .count();
+    let (last, _) = after.get(numbers)?;
+    last.is_ascii_alphabetic().then_some(numbers + 3)
+}
+
+/// Control characters without a use in a prompt.
+fn is_control(c: char) -> bool {
+    matches!(c, '\0'..='\x08' | '\x0B' | '\x0E'..='\x1F' | '\x7F' | '\u{206A}'..='\u{206F}'
+        | '\u{FEFF}' | '\u{FFF9}'..='\u{FFFC}')
+}
+
+/// Unicode form NFC; what is composed comes from where its first character came from.
+fn compose(text: &[Traced]) -> Vec<Traced> {
+    if is_nfc_quick(text.iter().map(|&(c, _)| c)) == IsNormalized::Yes {
+        return text.to_vec();
+    }
+    // Between two such groups nothing is composed or reordered.
+    text.chunk_by(|_, &(next, _)| !starts_group(next))
+        .flat_map(|group| {
+            let at = group[0].1;
+            group.iter().map(|&(c, _)| c).nfc().map(move |c| (c, at))
+        })
+        .collect()
+}
+
+/// Whether this character never joins with what stands before it.
+fn starts_group(c: char) -> bool {
+    canonical_combining_class(c) == 0 && is_nfc_quick(std::iter::once(c)) == IsNormalized::Yes
+}
+
+/// Lower case of the whole text: a final sigma depends on its neighbours.
+fn lower(text: &[Traced]) -> impl Iterator<Item = Traced> {
+    let whole: String = text.iter().map(|&(c, _)| c).collect();
+    let lower: Vec<char> = whole.to_lowercase().chars().collect();
+    let origins = text
+        .iter()
+        .flat_map(|&(c, at)| c.to_lowercase().map(move |_| at));
+    lower.into_iter().zip(origins)
+}
+
+fn collect(text: impl Iterator<Item = Traced>) -> Cleaned {
+    let mut out = String::new();
+    let mut origin = Vec::new();
+    for (c, at) in text {
+        out.push(c);
+        origin.resize(out.len(), at);
+    }
+    Cleaned {
+        text: out,
+        origin: Some(origin),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn each_rule_does_what_its_table_says() {
+        let cases = [
+            ("&amp;lt; &#39;x&#x27; &nosuch; &;", "< 'x' &nosuch; &;"),
+            ("&amp;\na < b &amp; c\n&amp;", "&\na < b &amp; c\n&amp;"),
+            ("\x1B[1;31mred\x1B[m \x1B[31 \x1B[;", "red [31 [;"),
+            ("it\u{92}s \u{80}\u{81}\u{9F}\u{A0}", "it's €\u{81}ÿ\u{A0}"),
+            ("a\0b\u{B}c\x1B\x7F\u{FEFF}d", "abcd"),
+            ("\u{201C}it\u{2019}s\u{201D} \u{2BC}", "\"it's\" '"),
+            ("\u{FB01}n \u{FB04}", "fin ffl"),
+            ("\u{FF33}\u{FF21}\u{FF32}\u{3000}\u{FF11}", "sar 1"),
+            ("e\u{301}", "\u{E9}"),
+            ("\u{1100}\u{1161}\u{11A8}", "\u{AC01}"),
+            ("\u{39F}\u{394}\u{39F}\u{3A3} \u{3A3}", "οδος σ"),
+            ("\u{130}", "i\u{307}"),
+        ];
+        for (prompt, expected) in cases {
+            assert_eq!(clean(prompt).text, expected, "{prompt:?}");
+        }
+    }
+
+    #[test]
+    fn nested_entities_are_decoded_in_linear_time() {
+        let prompt = format!("&{}", "amp;".repeat(100_000));
+        assert_eq!(clean(&prompt).text, "&");
+    }
+
+    #[test]
+    fn the_origin_is_where_a_byte_came_from() {
+        let cleaned = clean("&amp; e\u{301}\u{FB01}x");
+        assert_eq!(cleaned.text, "& \u{E9}fix");
+        let origins: Vec<usize> = (0..=cleaned.text.len())
+            .map(|at| cleaned.origin(at))
+            .collect();
+        // '&' 0, ' ' 5, the two bytes of 'é' 6, 'f' and 'i' 9, 'x' 12; past the end the number itself.
+        assert_eq!(origins, [0, 5, 6, 6, 9, 9, 12, 7]);
+    }
+
+    proptest! {
+        #[test]
+        fn composing_by_groups_is_composing_at_once(
+            text in "(\\PC|[\u{300}-\u{330}\u{1100}-\u{11FF}\u{9BE}\u{9C7}\u{9D7}]){0,40}"
+        ) {
+            let traced: Vec<Traced> = text.char_indices().map(|(at, c)| (c, at)).collect();
+            let composed: String = compose(&traced).iter().map(|&(c, _)| c).collect();
+            prop_assert_eq!(composed, text.nfc().collect::<String>());
+        }
+
+        #[test]
+        fn plain_ascii_becomes_lower_case_only(text in "[ -%'-~\t\n\r]{0,80}") {
+            let slow = collect(lower(&compose(&replace_forms(&decode_entities(&text)))));
+            let fast = clean(&text);
+            prop_assert_eq!(&fast.text, &text.to_lowercase());
+            prop_assert_eq!(&slow.text, &fast.text);
+            prop_assert!((0..text.len()).all(|at| slow.origin(at) == at && fast.origin(at) == at));
+        }
+
+        #[test]
+        fn origins_rise_and_are_character_boundaries(prompt in any::<String>()) {
+            let cleaned = clean(&prompt);
+            let origins: Vec<usize> =
+                (0..cleaned.text.len()).map(|at| cleaned.origin(at)).collect();
+            prop_assert!(origins.is_sorted());
+            prop_assert!(origins.iter().all(|&at| prompt.is_char_boundary(at)));
+        }
+    }
+}

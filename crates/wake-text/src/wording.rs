@@ -1,0 +1,380 @@
+//! Scene → prompt.
+
+use crate::error::Result;
+use crate::statement::PartialScene;
+use wake_physics::Scene;
+
+/// One way to say a scene in words.
+///
+/// All state the same values, and [`PartialScene::read`] reads all of them back. Different words for the
+/// same scene keep a text encoder from learning one sentence by heart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Wording {
+    /// The words of Kamirul, Pappas and Achim:
+    ///
+    /// ```text
+    /// Simulated SAR image of wakes from a ship moving at 10 mps toward 135 degrees. Ocean waves are shaped
+    /// by 3 mps wind directing toward 90 degrees and 10000 meter fetch. Captured at 32 degree incidence.
+    /// ```
+    #[default]
+    Paper,
+    /// Wind first:
+    ///
+    /// ```text
+    /// Wind of 3 mps blows toward 90 degrees over a fetch of 10000 meter. A ship moves toward 135 degrees
+    /// at 10 mps and leaves a wake. Simulated SAR image at 32 degree incidence.
+    /// ```
+    WindFirst,
+    /// Radar first:
+    ///
+    /// ```text
+    /// SAR simulation at an incidence of 32 degrees. The wake of a ship with speed 10 mps and heading 135
+    /// degrees. Sea under a wind of 3 mps toward 90 degrees, fetch 10000 meter.
+    /// ```
+    RadarFirst,
+    /// As few words as possible:
+    ///
+    /// ```text
+    /// SAR ship wake, ship 10 mps toward 135 degrees, wind 3 mps toward 90 degrees, fetch 10000 meter,
+    /// incidence 32 degrees.
+    /// ```
+    Brief,
+}
+
+impl Wording {
+    /// Every wording, the paper's first.
+    pub const ALL: [Self; 4] = [Self::Paper, Self::WindFirst, Self::RadarFirst, Self::Brief];
+
+    /// The prompt of a scene: ASCII, at most 77 tokens.
+    ///
+    /// Numbers are rounded as in [`PartialScene::of`]. Without a ship the prompt speaks of "open sea without
+    /// a ship"; where the wind rounds to 0 m/s, of "no wind", and states neither direction nor fetch.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`](crate::Error::Scene) if the scene is not valid.
+    pub fn prompt(self, scene: &Scene) -> Result<String> {
+        scene.validate()?;
+        let said = PartialScene::of(scene);
+        let ship = said.ship_speed.zip(said.ship_heading);
+        let wind = said.wind_toward.zip(said.fetch);
+        let wind = said.wind_speed.zip(wind);
+        let wind = wind.map(|(speed, (toward, fetch))| [speed, toward, fetch]);
+        let incidence = said.incidence.unwrap_or_default();
+        Ok(match self {
+            Self::Paper => paper(ship, wind, incidence),
+            Self::WindFirst => wind_first(ship, wind, incidence),
+            Self::RadarFirst => radar_first(ship, wind, incidence),
+            Self::Brief => brief(ship, wind, incidence),
+        })
+    }
+}
+
+/// The prompt of a scene in the paper's words, [`Wording::Paper`].
+///
+/// # Errors
+///
+/// [`Error::Scene`](crate::Error::Scene) if the scene is not valid.
+///
+/// # Examples
+///
+/// ```
+/// let mut scene = wake_physics::Scene::default();
+/// scene.ship = None;
+/// assert_eq!(
+///     wake_text::prompt(&scene)?,
+///     "Simulated SAR image of open sea without a ship. Ocean waves are shaped by 5 mps wind directing \
+///      toward 90 degrees and 40000 meter fetch. Captured at 32 degree incidence."
+/// );
+/// # Ok::<(), wake_text::Error>(())
+/// ```
+pub fn prompt(scene: &Scene) -> Result<String> {
+    Wording::Paper.prompt(scene)
+}
+
+/// Speed and heading, if there is a ship.
+type Ship = Option<(f64, f64)>;
+/// Speed, direction and fetch, if there is wind.
+type Wind = Option<[f64; 3]>;
+
+fn paper(ship: Ship, wind: Wind, incidence: f64) -> String {
+    let ship = match ship {
+        Some((speed, heading)) => {
+            format!("wakes from a ship moving at {speed} mps toward {heading} degrees")
+        }
+        None => "open sea without a ship".to_owned(),
+    };
+    let wind = match wind {
+        Some([speed, toward, fetch]) => format!(
+            "Ocean waves are shaped by {speed} mps wind directing toward {toward} degrees and {fetch} meter fetch"
+        ),
+        None => "The ocean is flat without wind".to_owned(),
+    };
+    format!("Simulated SAR image of {ship}. {wind}. Captured at {incidence} degree incidence.")
+}
+
+fn wind_first(ship: Ship, wind: Wind, incidence: f64) -> String {
+    let wind = match wind {
+        Some([speed, toward, fetch]) => format!(
+            "Wind of {speed} mps blows toward {toward} degrees over a fetch of {fetch} meter"
+        ),
+        None => "No wind blows".to_owned(),
+    };
+    let ship = match ship {
+        Some((speed, heading)) => {
+            format!("A ship moves toward {heading} degrees at {speed} mps and leaves a wake")
+        }
+        None => "Open sea without a ship".to_owned(),
+    };
+    format!("{wind}. {ship}. Simulated SAR image at {incidence} degree incidence.")
+}
+
+fn radar_first(ship: Ship, wind: Wind, incidence: f64) -> String {
+    let ship = match ship {
+        Some((speed, heading)) => {
+            format!("The wake of a ship with speed {speed} mps and heading {heading} degrees")
+        }
+        None => "Open sea without a ship".to_owned(),
+    };
+    let wind = match wind {
+        Some([speed, toward, fetch]) => {
+            format!("Sea under a wind of {speed} mps toward {toward} degrees, fetch {fetch} meter")
+        }
+        None => "Flat sea without wind".to_owned(),
+    };
+    format!("SAR simulation at an incidence of {incidence} degrees. {ship}. {wind}.")
+}
+
+fn brief(ship: Ship, wind: Wind, incidence: f64) -> String {
+    let ship = match ship {
+        Some((speed, heading)) => {
+            format!("SAR ship wake, ship {speed} mps toward {heading} degrees")
+        }
+        None => "SAR open sea, no ship".to_owned(),
+    };
+    let wind = match wind {
+        Some([speed, toward, fetch]) => {
+            format!("wind {speed} mps toward {toward} degrees, fetch {fetch} meter")
+        }
+        None => "no wind".to_owned(),
+    };
+    format!("{ship}, {wind}, incidence {incidence} degrees.")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{TOKENS, Tokenizer};
+    use proptest::prelude::*;
+    use wake_physics::scene::{Ship, paper_grid};
+
+    /// Any valid ship, sea and radar, as far as a prompt speaks of them.
+    fn scenes() -> impl Strategy<Value = Scene> {
+        let angle = || prop_oneof![-720.0..720.0_f64, prop::num::f64::NORMAL];
+        let ship = prop::option::of((0.0..=40.0_f64, angle()));
+        let wind = prop_oneof![4 => 0.0..=30.0_f64, 1 => 0.0..0.1_f64];
+        let fetch = (2.0..=7.0_f64).prop_map(|power| 10_f64.powf(power).clamp(100.0, 1e7));
+        (ship, wind, angle(), fetch, 5.0..=75.0_f64).prop_map(
+            |(ship, wind, toward, fetch, incidence)| {
+                let mut scene = Scene {
+                    ship: ship.map(|(speed, heading)| Ship {
+                        speed,
+                        heading,
+                        ..Ship::default()
+                    }),
+                    ..Scene::default()
+                };
+                (scene.sea.wind_speed, scene.sea.wind_toward) = (wind, toward);
+                (scene.sea.fetch, scene.radar.incidence) = (fetch, incidence);
+                scene
+            },
+        )
+    }
+
+    /// Degrees between two directions, 0 to 180.
+    fn turn(a: f64, b: f64) -> f64 {
+        let turn = (a - b.rem_euclid(360.0)).rem_euclid(360.0);
+        turn.min(360.0 - turn)
+    }
+
+    /// Whether a value is what is left of another after rounding to a step: half a step away, and the few
+    /// units in the last place that the arithmetic itself may lose.
+    fn is_rounded(stated: f64, value: f64, step: f64) -> bool {
+        (stated - value).abs() <= 0.5 * step * (1.0 + 1e-12) + 1e-12 * value.abs()
+    }
+
+    fn assert_states(said: &PartialScene, scene: &Scene) {
+        assert_eq!(said.ship, Some(scene.ship.is_some()));
+        match &scene.ship {
+            Some(ship) => {
+                assert!(
+                    is_rounded(said.ship_speed.unwrap(), ship.speed, 0.1),
+                    "{said:?}"
+                );
+                assert!(
+                    turn(said.ship_heading.unwrap(), ship.heading) <= 0.5,
+                    "{said:?}"
+                );
+            }
+            None => assert_eq!((said.ship_speed, said.ship_heading), (None, None)),
+        }
+        let wind_speed = said.wind_speed.unwrap();
+        assert!(
+            is_rounded(wind_speed, scene.sea.wind_speed, 0.1),
+            "{said:?}"
+        );
+        assert_eq!(
+            wind_speed > 0.0,
+            said.wind_toward.is_some() && said.fetch.is_some()
+        );
+        if wind_speed > 0.0 {
+            assert!(
+                turn(said.wind_toward.unwrap(), scene.sea.wind_toward) <= 0.5,
+                "{said:?}"
+            );
+            assert!(
+                is_rounded(said.fetch.unwrap(), scene.sea.fetch, 1.0),
+                "{said:?}"
+            );
+        }
+        assert!(
+            is_rounded(said.incidence.unwrap(), scene.radar.incidence, 1.0),
+            "{said:?}"
+        );
+    }
+
+    fn assert_round_trip(scene: &Scene) {
+        for wording in Wording::ALL {
+            let prompt = wording.prompt(scene).unwrap();
+            assert!(prompt.is_ascii() && !prompt.contains('&'), "{prompt}");
+            let tokens = Tokenizer::clip().encode(&prompt);
+            assert!(
+                tokens.token_count <= TOKENS,
+                "{} tokens: {prompt}",
+                tokens.token_count
+            );
+            let said = PartialScene::read(&prompt).unwrap();
+            assert_eq!(said, PartialScene::of(scene), "{prompt}");
+            assert_states(&said, scene);
+            let again = said.onto(&Scene::default()).unwrap();
+            assert_eq!(PartialScene::of(&again), said, "{prompt}");
+        }
+    }
+
+    #[test]
+    fn the_paper_grid_goes_round_in_every_wording() {
+        let scenes: Vec<Scene> = paper_grid().collect();
+        assert_eq!(scenes.len(), 3456);
+        scenes.iter().for_each(assert_round_trip);
+    }
+
+    #[test]
+    fn the_grid_is_stated_exactly() {
+        for scene in paper_grid() {
+            let ship = scene.ship.as_ref().unwrap();
+            let expected = PartialScene {
+                ship: Some(true),
+                ship_speed: Some(ship.speed),
+                ship_heading: Some(ship.heading),
+                wind_speed: Some(scene.sea.wind_speed),
+                wind_toward: Some(scene.sea.wind_toward),
+                fetch: Some(scene.sea.fetch),
+                incidence: Some(scene.radar.incidence),
+            };
+            assert_eq!(PartialScene::read(&prompt(&scene).unwrap()), Ok(expected));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn random_scenes_go_round(scene in scenes()) {
+            assert_round_trip(&scene);
+        }
+
+        /// Spelling, spacing and the order of the sentences do not matter.
+        #[test]
+        fn the_same_words_otherwise_spelt_state_the_same(
+            scene in scenes(), swap in 0..6_usize, upper in any::<bool>()
+        ) {
+            let prompt = prompt(&scene).unwrap();
+            let mut sentences: Vec<&str> = prompt.split_inclusive(". ").collect();
+            sentences.rotate_left(swap % 3);
+            sentences.swap(0, swap / 3);
+            let text = sentences.join(". ").replace(" mps", "m/s").replace("degrees", "deg").replace(' ', " \t ");
+            let text = if upper { text.to_uppercase() } else { text };
+            prop_assert_eq!(PartialScene::read(&text), Ok(PartialScene::of(&scene)), "{}", text);
+        }
+    }
+
+    fn scene(assignments: &[&str]) -> Scene {
+        Scene::default().with_assignments(assignments).unwrap()
+    }
+
+    #[test]
+    fn the_papers_example_is_word_for_word() {
+        let scene = scene(&["ship.heading=135", "sea.wind_speed=3", "sea.fetch=10000"]);
+        let expected = "Simulated SAR image of wakes from a ship moving at 10 mps toward 135 degrees. Ocean \
+                        waves are shaped by 3 mps wind directing toward 90 degrees and 10000 meter fetch. \
+                        Captured at 32 degree incidence.";
+        assert_eq!(prompt(&scene).unwrap(), expected);
+        assert_eq!(Tokenizer::clip().encode(expected).token_count, 50);
+    }
+
+    #[test]
+    fn no_ship_and_no_wind_have_their_own_words() {
+        let mut scene = scene(&["sea.wind_speed=0.04"]);
+        scene.ship = None;
+        let expected = "Simulated SAR image of open sea without a ship. The ocean is flat without wind. \
+                        Captured at 32 degree incidence.";
+        assert_eq!(prompt(&scene).unwrap(), expected);
+        assert_round_trip(&scene);
+    }
+
+    #[test]
+    fn numbers_are_short_and_rounded() {
+        let cases = [
+            ("ship.speed=10", "at 10 mps"),
+            ("ship.speed=7.25", "at 7.3 mps"),
+            ("ship.speed=0.04", "at 0 mps"),
+            ("sea.wind_speed=2.999", "by 3 mps"),
+            ("ship.heading=359.7", "toward 0 degrees. "),
+            ("ship.heading=-1e-20", "toward 0 degrees. "),
+            ("ship.heading=-90", "toward 270 degrees. "),
+            ("ship.heading=719.4", "toward 359 degrees. "),
+            ("sea.fetch=1e7", "and 10000000 meter"),
+            ("radar.incidence=31.5", "at 32 degree"),
+        ];
+        for (assignment, words) in cases {
+            let prompt = prompt(&scene(&[assignment])).unwrap();
+            assert!(prompt.contains(words), "{assignment}: {prompt}");
+        }
+    }
+
+    #[test]
+    fn the_longest_numbers_fit() {
+        let longest = [
+            "ship.speed=39.9",
+            "ship.heading=359",
+            "sea.wind_speed=29.9",
+            "sea.fetch=1e7",
+        ];
+        let mut scene = scene(&longest);
+        scene.sea.wind_toward = 359.0;
+        let counts = Wording::ALL.map(|wording| {
+            Tokenizer::clip()
+                .encode(&wording.prompt(&scene).unwrap())
+                .token_count
+        });
+        // The paper's example has 50; these numbers are nine digits or points longer.
+        assert_eq!(counts[0], 59);
+        assert!(counts.iter().all(|&count| count <= TOKENS), "{counts:?}");
+    }
+
+    #[test]
+    fn an_invalid_scene_has_no_prompt() {
+        let mut scene = Scene::default();
+        scene.sea.wind_speed = f64::NAN;
+        let message = prompt(&scene).unwrap_err().to_string();
+        assert!(message.starts_with("sea.wind_speed is NaN"), "{message}");
+    }
+}
