@@ -32,8 +32,8 @@ const CACHED_PROMPTS: usize = 256;
 /// What a pipeline is made of.
 #[derive(Debug)]
 pub struct PipelineParts {
-    /// Turns prompts into token ids.
-    pub tokenizer: Tokenizer,
+    /// Turns prompts into token ids; `None`: CLIP's own.
+    pub tokenizer: Option<Tokenizer>,
     /// Turns token ids into embeddings.
     pub text_encoder: ClipText,
     /// Predicts the noise.
@@ -69,7 +69,7 @@ pub struct PipelineParts {
 /// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models".
 #[derive(Debug)]
 pub struct Pipeline {
-    tokenizer: Tokenizer,
+    tokenizer: Option<Tokenizer>,
     text_encoder: ClipText,
     unet: UNet,
     autoencoder: AutoencoderKl,
@@ -129,7 +129,8 @@ impl Pipeline {
         if let Some(known) = cache.get(prompt) {
             return known.clone();
         }
-        let ids: Vec<i32> = self.tokenizer.encode(prompt).ids.iter().map(|&id| id as i32).collect();
+        let tokenizer = self.tokenizer.as_ref().unwrap_or_else(|| Tokenizer::clip());
+        let ids: Vec<i32> = tokenizer.encode(prompt).ids.iter().map(|&id| id as i32).collect();
         let length = ids.len();
         let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(ids, [1, length]), &self.device);
         let embedding = self.text_encoder.forward(ids).last_hidden_state;
@@ -244,12 +245,16 @@ impl Pipeline {
         }
     }
 
-    fn check_pixels(&self, pixels: &Tensor<4>) -> Result<()> {
-        let (found, expected) = (pixels.dims()[1], self.autoencoder.image_channels());
+    /// Checks that pixels fit latent images of a shape.
+    fn check_pixels(&self, pixels: &Tensor<4>, [_, rows, columns]: [usize; 3]) -> Result<()> {
+        let [_, channels, pixel_rows, pixel_columns] = pixels.dims();
+        let down = self.autoencoder.downsampling();
+        let found = [channels, pixel_rows, pixel_columns];
+        let expected = [self.autoencoder.image_channels(), rows * down, columns * down];
         if found == expected {
             return Ok(());
         }
-        Err(invalid("channels of the start image", found, expected.to_string()))
+        Err(invalid("shape of the start image", format!("{found:?}"), format!("{expected:?}")))
     }
 }
 

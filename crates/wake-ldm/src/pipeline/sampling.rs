@@ -218,10 +218,8 @@ fn start_latents(
         StartImage::Latents(latents) => latents.clone(),
         StartImage::Pixels(pixels) => {
             let pixels = one_each("number of start images", pixels.clone(), images)?;
-            pipeline.check_pixels(&pixels)?;
-            let [channels, rows, columns] = shape;
-            let noise =
-                normal_batch(sources, POSTERIOR_STREAM, [channels, rows, columns], &pipeline.device);
+            pipeline.check_pixels(&pixels, shape)?;
+            let noise = normal_batch(sources, POSTERIOR_STREAM, shape, &pipeline.device);
             pipeline.encode(pixels, noise)
         }
     };
