@@ -1,0 +1,97 @@
+"""What the benches measure, in PyTorch: run it on the same machine, at the same time of day.
+
+    pip install torch diffusers transformers
+    python benches/torch_reference.py [quick]
+
+f32, random weights, as many threads as cores; seconds, median of the runs after one to warm up. `quick` leaves
+out Stable Diffusion's U-Net and decoder.
+"""
+
+import os
+import resource
+import statistics
+import sys
+import time
+
+import torch
+import torch.nn.functional as F
+from diffusers import AutoencoderKL, UNet2DConditionModel
+from diffusers.models.resnet import ResnetBlock2D
+from transformers import CLIPTextConfig, CLIPTextModel
+
+
+def measure(name, call, runs):
+    with torch.no_grad():
+        call()
+        seconds = []
+        for _ in range(runs):
+            begin = time.perf_counter()
+            call()
+            seconds.append(time.perf_counter() - begin)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    print(f"{name:45} {statistics.median(seconds):10.4f} s   peak {peak} MiB", flush=True)
+
+
+def blocks():
+    for batch, channels, size in [(2, 320, 64), (4, 64, 32), (2, 128, 16), (2, 192, 8)]:
+        block = ResnetBlock2D(in_channels=channels, temb_channels=4 * channels, groups=32, eps=1e-5).eval()
+        x, time_embedding = torch.randn(batch, channels, size, size), torch.randn(batch, 4 * channels)
+        measure(f"residual_block {batch}x{channels}x{size}x{size}", lambda: block(x, time_embedding), 20)
+    query = torch.randn(1, 8, 4096, 40)
+    for tokens in (4096, 77):
+        context = torch.randn(1, 8, tokens, 40)
+        measure(
+            f"attention 8 heads of 40, 4096x{tokens}",
+            lambda: F.scaled_dot_product_attention(query, context, context),
+            10,
+        )
+
+
+def unet(name, batch, size, runs, **config):
+    model = UNet2DConditionModel(**config).eval()
+    channels, width = config.get("in_channels", 4), config["cross_attention_dim"]
+    sample, context = torch.randn(batch, channels, size, size), torch.randn(batch, 77, width)
+    measure(name, lambda: model(sample, 500, context), runs)
+
+
+SMALL = {
+    "in_channels": 16,
+    "out_channels": 16,
+    "block_out_channels": (64, 128, 192),
+    "layers_per_block": 1,
+    "attention_head_dim": (4, 4, 6),
+    "cross_attention_dim": 256,
+    "norm_num_groups": 16,
+    "down_block_types": ("DownBlock2D", "CrossAttnDownBlock2D", "CrossAttnDownBlock2D"),
+    "up_block_types": ("CrossAttnUpBlock2D", "CrossAttnUpBlock2D", "UpBlock2D"),
+}
+
+
+def main():
+    torch.set_num_threads(os.cpu_count())
+    print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")
+    blocks()
+    for batch in (1, 2):
+        unet(f"small U-Net 32x32, batch {batch}", batch, 32, 20, **SMALL)
+    text = CLIPTextModel(
+        CLIPTextConfig(hidden_size=768, intermediate_size=3072, num_hidden_layers=12, num_attention_heads=12)
+    ).eval()
+    ids = torch.full((2, 77), 320)
+    measure("text encoder, batch 2", lambda: text(ids), 5)
+    if "quick" in sys.argv:
+        return
+    vae = AutoencoderKL(
+        block_out_channels=(128, 256, 512, 512),
+        down_block_types=("DownEncoderBlock2D",) * 4,
+        up_block_types=("UpDecoderBlock2D",) * 4,
+        layers_per_block=2,
+        latent_channels=4,
+    ).eval()
+    latents = torch.randn(1, 4, 64, 64)
+    measure("decoder to 512x512", lambda: vae.decode(latents), 3)
+    del vae
+    unet("stable-diffusion U-Net, batch 2, 64x64", 2, 64, 3, cross_attention_dim=768, attention_head_dim=8)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+//! The U-Net and what it spends its time in, f32, random weights.
+//!
+//! ```text
+//! cargo bench --bench unet                       # blocks, small U-Net, Stable Diffusion's U-Net
+//! cargo bench --bench unet -- attention          # some of the blocks only
+//! python benches/torch_reference.py              # the same in PyTorch
+//! ```
+//!
+//! Stable Diffusion's U-Net takes many seconds and 4 GB: it runs three times, and only where no filter
+//! is given or the filter names it (`stable-diffusion`).
+#![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use burn::tensor::{Device, Distribution, Tensor};
+use criterion::{Criterion, criterion_group};
+use wake_ldm::nn::attention::attention;
+use wake_ldm::nn::resnet::{ResnetBlock, ResnetShape};
+use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
+
+fn random<const D: usize>(shape: [usize; D], device: &Device) -> Tensor<D> {
+    Tensor::random(shape, Distribution::Normal(0.0, 1.0), device)
+}
+
+/// Residual blocks: twice group norm, SiLU and a 3 × 3 convolution.
+fn residual_blocks(criterion: &mut Criterion) {
+    let device = Device::flex();
+    let mut group = criterion.benchmark_group("residual_block");
+    group.sample_size(10);
+    for (batch, channels, size) in [(2, 320, 64), (4, 64, 32), (2, 128, 16), (2, 192, 8)] {
+        let shape = ResnetShape {
+            channels_in: channels,
+            channels_out: channels,
+            time_channels: Some(4 * channels),
+            groups: 32,
+            epsilon: 1e-5,
+        };
+        let block = ResnetBlock::new(shape, &device);
+        let x = random([batch, channels, size, size], &device);
+        let time: Tensor<2> = random([batch, 4 * channels], &device);
+        group.bench_function(format!("{batch}x{channels}x{size}x{size}"), |b| {
+            b.iter(|| black_box(block.forward(x.clone(), Some(time.clone()))));
+        });
+    }
+}
+
+/// Attention within an image and to a prompt, at Stable Diffusion's finest level.
+fn attentions(criterion: &mut Criterion) {
+    let device = Device::flex();
+    let mut group = criterion.benchmark_group("attention_8_heads_of_40");
+    group.sample_size(10);
+    let query: Tensor<3> = random([1, 4096, 320], &device);
+    for tokens in [4096, 77] {
+        let context: Tensor<3> = random([1, tokens, 320], &device);
+        group.bench_function(format!("4096x{tokens}"), |b| {
+            b.iter(|| {
+                let (query, context) = (query.clone(), context.clone());
+                black_box(attention(query, context.clone(), context, 8, false))
+            });
+        });
+    }
+}
+
+fn input(config: &UNetConfig, batch: usize, size: usize, device: &Device) -> UNetInput {
+    UNetInput {
+        sample: random([batch, config.in_channels, size, size], device),
+        timesteps: Tensor::full([batch], 500.0, device),
+        context: random([batch, 77, config.cross_attention_dim], device),
+        condition: None,
+    }
+}
+
+fn call(unet: &UNet, input: &UNetInput) {
+    black_box(unet.forward(input.clone()).into_data());
+}
+
+/// The small U-Net on 32 × 32 latents.
+fn small_unet(criterion: &mut Criterion) {
+    let device = Device::flex();
+    let config = UNetConfig::small(16, 256, None);
+    let unet = config.init(&device);
+    let mut group = criterion.benchmark_group("small_unet_32x32");
+    group.sample_size(10);
+    for batch in [1, 2] {
+        let input = input(&config, batch, 32, &device);
+        group.bench_function(format!("batch {batch}"), |b| b.iter(|| call(&unet, &input)));
+    }
+}
+
+/// Stable Diffusion v1.4's U-Net: one guided step is batch 2.
+fn stable_diffusion_unet() {
+    let device = Device::flex();
+    let config = UNetConfig::new();
+    let unet = config.init(&device);
+    let input = input(&config, 2, 64, &device);
+    call(&unet, &input);
+    let mut seconds: Vec<f64> = (0..3)
+        .map(|_| {
+            let begin = Instant::now();
+            call(&unet, &input);
+            begin.elapsed().as_secs_f64()
+        })
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    println!("stable-diffusion U-Net, batch 2, 64x64: {seconds:.2?} s, peak memory {}", peak_memory());
+}
+
+/// The most memory that this process has held, where the system tells.
+fn peak_memory() -> String {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.map_or_else(|| "unknown".to_owned(), |line| line.trim().to_owned())
+}
+
+criterion_group!(benches, residual_blocks, attentions, small_unet);
+
+fn main() {
+    benches();
+    let filters: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
+    let named = |filter: &String| "stable-diffusion".contains(filter.as_str());
+    if filters.is_empty() || filters.iter().any(named) {
+        stable_diffusion_unet();
+    }
+    Criterion::default().configure_from_args().final_summary();
+}

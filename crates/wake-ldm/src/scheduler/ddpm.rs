@@ -1,0 +1,141 @@
+//! Denoising diffusion probabilistic models: the ancestral sampler.
+
+use burn::tensor::Tensor;
+
+use super::prediction::{Clipping, Prediction};
+use super::schedule::{DEFAULTS, ScheduleDefaults, check_timestep};
+use super::spacing::Steps;
+use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required};
+use crate::error::Result;
+use crate::options::Options;
+
+/// How much fresh noise a step adds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Variance {
+    /// β̃ₜ = (1 − ᾱₜ₋₁)/(1 − ᾱₜ) βₜ, with √β̃ₜ as the noise's factor.
+    Small,
+    /// βₜ.
+    Large,
+}
+
+/// Options of [`Ddpm`].
+#[derive(Debug, Clone)]
+pub(super) struct DdpmConfig {
+    pub(super) schedule: NoiseSchedule,
+    steps: Steps,
+    prediction: Prediction,
+    clipping: Clipping,
+    variance: Variance,
+}
+
+impl DdpmConfig {
+    pub(super) fn take(options: &mut Options) -> Result<Self> {
+        let defaults = ScheduleDefaults {
+            further: Some("sigmoid"),
+            rescaled: Some(TerminalSnr::Zero),
+            ..DEFAULTS
+        };
+        let schedule = NoiseSchedule::take(options, &defaults)?;
+        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let name = options.string("variance_type", "fixed_small")?;
+        let variance = match name.as_str() {
+            "fixed_small" | "fixed_small_log" => Variance::Small,
+            "fixed_large" => Variance::Large,
+            other => {
+                let supported = "fixed_small, fixed_small_log, fixed_large";
+                return Err(options.unsupported("variance_type", &other.into(), supported));
+            }
+        };
+        Ok(Self {
+            steps: Steps::take(options, schedule.steps(), "leading")?,
+            prediction: Prediction::take(options, &known)?,
+            clipping: Clipping::take(options, true)?,
+            variance,
+            schedule,
+        })
+    }
+
+    pub(super) fn init(&self, n: usize) -> Result<Ddpm> {
+        let steps = self.steps.whole(n)?;
+        let train = self.schedule.steps();
+        let visited: Vec<usize> =
+            steps.iter().map(|&t| check_timestep(t, train)).collect::<Result<_>>()?;
+        self.prediction.check_signal(self.schedule.noise_level(visited[0]).signal)?;
+        Ok(Ddpm {
+            config: self.clone(),
+            timesteps: steps.iter().map(|&t| t as f64).collect(),
+            visited,
+        })
+    }
+}
+
+/// The sampler of the diffusion model's own reverse chain.
+///
+/// | here | paper |
+/// | --- | --- |
+/// | `now`, `next` | ᾱₜ, ᾱₜ₋₁ |
+/// | `added` | βₜ = 1 − ᾱₜ/ᾱₜ₋₁ |
+///
+/// # References
+///
+/// Ho et al. (2020), "Denoising Diffusion Probabilistic Models", Eqs. 6, 7 and 15, algorithm 2.
+#[derive(Debug)]
+pub(super) struct Ddpm {
+    config: DdpmConfig,
+    timesteps: Vec<f64>,
+    visited: Vec<usize>,
+}
+
+impl Ddpm {
+    /// ᾱ at a step and at the one after it (1 after the last).
+    fn alphas(&self, index: usize) -> (f64, f64) {
+        let schedule = &self.config.schedule;
+        let next = self.visited.get(index + 1).map_or(1.0, |&t| schedule.alpha_cumprod(t));
+        (schedule.alpha_cumprod(self.visited[index]), next)
+    }
+
+    /// The standard deviation of the noise that a step adds.
+    fn deviation(&self, now: f64, next: f64) -> f64 {
+        let added = 1.0 - now / next;
+        let variance = match self.config.variance {
+            Variance::Small => ((1.0 - next) / (1.0 - now) * added).max(1e-20),
+            Variance::Large => added,
+        };
+        variance.sqrt()
+    }
+}
+
+impl Scheduler for Ddpm {
+    fn timesteps(&self) -> &[f64] {
+        &self.timesteps
+    }
+
+    fn noise_level(&self, index: usize) -> NoiseLevel {
+        self.config.schedule.noise_level(self.visited[index])
+    }
+
+    fn needs_noise(&self, index: usize) -> bool {
+        self.visited[index] > 0
+    }
+
+    fn step(&mut self, input: StepInput) -> StepOutput {
+        let StepInput { index, prediction, sample, noise } = input;
+        let (now, next) = self.alphas(index);
+        let added = 1.0 - now / next;
+        // 1. The clean image, Eq. 15, limited.
+        let level = self.noise_level(index);
+        let denoised = self.config.prediction.denoised(level, sample.clone(), prediction);
+        let denoised = self.config.clipping.apply(denoised);
+        // 2. The mean of the step back, Eq. 7.
+        let of_clean = next.sqrt() * added / (1.0 - now);
+        let of_sample = (now / next).sqrt() * (1.0 - next) / (1.0 - now);
+        let mean: Tensor<4> = denoised.clone() * of_clean + sample * of_sample;
+        // 3. Fresh noise, except on arrival.
+        let sample = if self.needs_noise(index) {
+            mean + required(noise) * self.deviation(now, next)
+        } else {
+            mean
+        };
+        StepOutput { sample, denoised }
+    }
+}

@@ -1,0 +1,293 @@
+//! DPM-Solver and DPM-Solver++, multistep, of orders 1 to 3, and their stochastic variants.
+
+use burn::tensor::Tensor;
+
+use super::multistep::{LogSnrPath, PathOptions};
+use super::prediction::{Clipping, Prediction};
+use super::schedule::{BetaCurve, DEFAULTS};
+use super::sigmas::{SigmaOptions, Spread, take_final_zero};
+use super::spacing::{Spacing, Steps};
+use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
+use crate::error::Result;
+use crate::options::Options;
+
+/// Runs shorter than this end at lower order.
+const SHORT_RUN: usize = 15;
+
+/// Which equation is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Algorithm {
+    /// In terms of the clean image (the "++"), or else of the noise.
+    data: bool,
+    /// With noise added at every step.
+    stochastic: bool,
+}
+
+/// Options of [`DpmSolver`].
+#[derive(Debug, Clone)]
+pub(super) struct DpmSolverConfig {
+    pub(super) schedule: NoiseSchedule,
+    path: PathOptions,
+    prediction: Prediction,
+    clipping: Clipping,
+    algorithm: Algorithm,
+    order: usize,
+    /// The slope of the second order from the midpoint rule, or else from Heun's.
+    midpoint: bool,
+    lower_order_final: bool,
+    euler_at_final: bool,
+}
+
+impl DpmSolverConfig {
+    pub(super) fn take(options: &mut Options) -> Result<Self> {
+        let schedule = NoiseSchedule::take(options, &DEFAULTS)?;
+        let known = [Spread::Karras, Spread::Exponential, Spread::Lu, Spread::Flow];
+        let sigmas = SigmaOptions::take(options, &known)?;
+        let path = PathOptions {
+            steps: take_steps(options, &schedule)?,
+            sigmas,
+            end_at_zero: take_final_zero(options)?,
+            round_steps: *schedule.curve() != BetaCurve::SquaredCosine,
+        };
+        options.only("variance_type", &["fixed_small", "fixed_small_log", "fixed_large"])?;
+        options.only("use_dynamic_shifting", &[false])?;
+        let algorithm = take_algorithm(options, path.end_at_zero)?;
+        let order = take_order(options, algorithm)?;
+        Ok(Self {
+            prediction: take_prediction(options, sigmas.spread, algorithm)?,
+            clipping: Clipping::take_dynamic(options)?,
+            midpoint: take_midpoint(options)?,
+            lower_order_final: options.bool("lower_order_final", true)?,
+            euler_at_final: options.bool("euler_at_final", false)?,
+            path,
+            algorithm,
+            order,
+            schedule,
+        })
+    }
+
+    pub(super) fn init(&self, n: usize) -> Result<DpmSolver> {
+        let path = self.path.path(&self.schedule, n)?;
+        Ok(DpmSolver { config: self.clone(), path, history: Vec::new() })
+    }
+}
+
+/// The visited steps, of which the noisiest may be cut off at a signal-to-noise ratio.
+fn take_steps(options: &mut Options, schedule: &NoiseSchedule) -> Result<Steps> {
+    let clip = options.f64("lambda_min_clipped", f64::MIN)?;
+    let clipped = schedule.sigmas().iter().filter(|&&sigma| -f64::from(sigma.ln()) < clip).count();
+    let steps = Steps::take(options, schedule.steps() - clipped, "linspace")?;
+    if clipped > 0 && steps.spacing == Spacing::Trailing {
+        let supported = "linspace or leading spacing";
+        return Err(options.unsupported("lambda_min_clipped", &clip.into(), supported));
+    }
+    Ok(steps)
+}
+
+fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<Algorithm> {
+    let name = options.string("algorithm_type", "dpmsolver++")?;
+    let algorithm = match name.as_str() {
+        "dpmsolver++" | "deis" => Algorithm { data: true, stochastic: false },
+        "sde-dpmsolver++" => Algorithm { data: true, stochastic: true },
+        "dpmsolver" => Algorithm { data: false, stochastic: false },
+        "sde-dpmsolver" => Algorithm { data: false, stochastic: true },
+        other => {
+            let supported = "dpmsolver++, sde-dpmsolver++, dpmsolver, sde-dpmsolver";
+            return Err(options.unsupported("algorithm_type", &other.into(), supported));
+        }
+    };
+    if end_at_zero && !algorithm.data {
+        let supported = "sigma_min with this algorithm_type";
+        return Err(options.unsupported("final_sigmas_type", &"zero".into(), supported));
+    }
+    Ok(algorithm)
+}
+
+fn take_order(options: &mut Options, algorithm: Algorithm) -> Result<usize> {
+    let order = options.usize("solver_order", 2)?;
+    // diffusers' third order with noise does not converge, so there is nothing to agree with.
+    let most = if algorithm.stochastic { 2 } else { 3 };
+    if (1..=most).contains(&order) {
+        return Ok(order);
+    }
+    Err(options.unsupported("solver_order", &order.into(), &format!("1 to {most}")))
+}
+
+fn take_midpoint(options: &mut Options) -> Result<bool> {
+    let name = options.string("solver_type", "midpoint")?;
+    match name.as_str() {
+        "heun" => Ok(false),
+        // UniPC's names, which diffusers takes for its default here.
+        "midpoint" | "logrho" | "bh1" | "bh2" => Ok(true),
+        other => Err(options.unsupported("solver_type", &other.into(), "midpoint, heun")),
+    }
+}
+
+fn take_prediction(
+    options: &mut Options,
+    spread: Spread,
+    algorithm: Algorithm,
+) -> Result<Prediction> {
+    if spread != Spread::Flow {
+        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        return Prediction::take(options, &known);
+    }
+    if algorithm.data {
+        return Prediction::take(options, &[Prediction::Flow]);
+    }
+    Err(options.unsupported("use_flow_sigmas", &true.into(), "dpmsolver++ and sde-dpmsolver++"))
+}
+
+/// An exponential integrator: the linear part of the equation is solved exactly in λ = ln(α/σ),
+/// the rest by a polynomial through the last predictions.
+///
+/// | here | paper |
+/// | --- | --- |
+/// | `h` | hᵢ = λᵢ₊₁ − λᵢ |
+/// | `slope`, `curvature` | D₁, D₂: divided differences of the predictions |
+///
+/// A level that is visited twice ends the history, which would divide by zero.
+///
+/// # References
+///
+/// Lu et al. (2022), "DPM-Solver", Eqs. 3.7 and B.2 to B.4. Lu et al. (2022), "DPM-Solver++",
+/// algorithm 2, Eqs. 4.1 and 4.2, appendix (stochastic).
+#[derive(Debug)]
+pub(super) struct DpmSolver {
+    config: DpmSolverConfig,
+    path: LogSnrPath,
+    /// Clean images (or noises), newest first.
+    history: Vec<Tensor<4>>,
+}
+
+/// Factors of one update x' = a x + b₀ D₀ + b₁ D₁ + b₂ D₂ + c n.
+#[derive(Debug)]
+struct Factors {
+    sample: f64,
+    value: f64,
+    slope: f64,
+    curvature: f64,
+    noise: f64,
+}
+
+impl DpmSolver {
+    /// The clean image and what the history holds of a prediction.
+    fn convert(&self, level: NoiseLevel, sample: &Tensor<4>, prediction: Tensor<4>) -> [Tensor<4>; 2] {
+        let DpmSolverConfig { prediction: kind, clipping, algorithm, .. } = self.config;
+        let denoised = kind.denoised(level, sample.clone(), prediction.clone());
+        let denoised = clipping.apply(denoised);
+        let kept = if algorithm.data {
+            denoised.clone()
+        } else if clipping == Clipping::Off {
+            kind.noise(level, sample.clone(), prediction)
+        } else {
+            Prediction::Sample.noise(level, sample.clone(), denoised.clone())
+        };
+        [denoised, kept]
+    }
+
+    /// The order of a step: as much as history, end of the run and repeated levels allow.
+    fn order(&self, index: usize) -> usize {
+        let DpmSolverConfig { lower_order_final, euler_at_final, ref path, .. } = self.config;
+        let left = self.path.len() - index;
+        let short = lower_order_final && self.path.len() < SHORT_RUN;
+        let wanted = match left {
+            1 if euler_at_final || short || path.end_at_zero => 1,
+            2 if short => self.config.order.min(2),
+            _ => self.config.order,
+        };
+        let standing = self.path.log_snr(index + 1) <= self.path.log_snr(index);
+        let older = if standing { 0 } else { wanted.min(self.history.len()) - 1 };
+        1 + self.path.usable_before(index, older)
+    }
+
+    /// The factors of Eqs. 4.1 and 4.2 (in terms of the clean image) or B.2 to B.4 (of the noise):
+    /// the same functions of z = −h and z = h; of twice that with noise.
+    fn factors(&self, index: usize, order: usize) -> Factors {
+        let h = self.path.log_snr(index + 1) - self.path.log_snr(index);
+        let (now, next) = (self.path.level(index), self.path.level(index + 1));
+        let Algorithm { data, stochastic } = self.config.algorithm;
+        let twice = if stochastic { 2.0 } else { 1.0 };
+        let (amplitude, z, sample) = match (data, stochastic) {
+            (true, false) => (next.signal, -h, next.noise / now.noise),
+            (true, true) => (next.signal, -2.0 * h, next.noise / now.noise * (-h).exp()),
+            (false, _) => (twice * next.noise, h, next.signal / now.signal),
+        };
+        // The variance that noise has gathered: 1 − e^{−2h}, or e^{2h} − 1.
+        let spread = match (data, stochastic) {
+            (_, false) => 0.0,
+            (true, true) => -2.0 * h,
+            (false, true) => 2.0 * h,
+        };
+        let value = z.exp_m1();
+        let midpoint = self.config.midpoint && order < 3;
+        let slope = if midpoint { 0.5 * value } else { over(value, z) - 1.0 };
+        Factors {
+            sample,
+            value: -amplitude * value,
+            slope: -amplitude * slope,
+            curvature: -amplitude * (over(over(value - z, z), z) - 0.5),
+            noise: next.noise * spread.exp_m1().abs().sqrt(),
+        }
+    }
+
+    /// Divided differences D₁ and D₂ of the history, as many as the order needs.
+    fn differences(&self, index: usize, order: usize) -> Vec<Tensor<4>> {
+        let lambda = |back: usize| self.path.log_snr(index - back);
+        let h = self.path.log_snr(index + 1) - lambda(0);
+        let difference = |i: usize| {
+            let ratio = (lambda(i) - lambda(i + 1)) / h;
+            (self.history[i].clone() - self.history[i + 1].clone()) / ratio
+        };
+        match order {
+            1 => vec![],
+            2 => vec![difference(0)],
+            _ => {
+                let [r0, r1] = [0, 1].map(|i| (lambda(i) - lambda(i + 1)) / h);
+                let newer = difference(0);
+                let bend = newer.clone() - difference(1);
+                vec![newer + bend.clone() * (r0 / (r0 + r1)), bend / (r0 + r1)]
+            }
+        }
+    }
+}
+
+/// x/z, and 0 for a step of no length.
+fn over(x: f64, z: f64) -> f64 {
+    if z == 0.0 { 0.0 } else { x / z }
+}
+
+impl Scheduler for DpmSolver {
+    fn timesteps(&self) -> &[f64] {
+        &self.path.timesteps
+    }
+
+    fn noise_level(&self, index: usize) -> NoiseLevel {
+        self.path.level(index)
+    }
+
+    fn needs_noise(&self, _index: usize) -> bool {
+        self.config.algorithm.stochastic
+    }
+
+    fn step(&mut self, input: StepInput) -> StepOutput {
+        let StepInput { index, prediction, sample, noise } = input;
+        // 1. The clean image, or the noise.
+        let [denoised, kept] = self.convert(self.path.level(index), &sample, prediction);
+        self.history.insert(0, kept.clone());
+        self.history.truncate(self.config.order);
+        // 2. The exact part, and the polynomial as far as history goes.
+        let order = self.order(index);
+        let factors = self.factors(index, order);
+        let mut next = sample * factors.sample + kept * factors.value;
+        let weights = [factors.slope, factors.curvature];
+        for (difference, weight) in self.differences(index, order).into_iter().zip(weights) {
+            next = next + difference * weight;
+        }
+        // 3. Fresh noise.
+        if self.config.algorithm.stochastic {
+            next = next + required(noise) * factors.noise;
+        }
+        StepOutput { sample: next, denoised }
+    }
+}

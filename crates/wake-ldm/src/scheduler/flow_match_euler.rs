@@ -1,0 +1,120 @@
+//! Euler's method on straight paths from noise to image.
+
+use super::prediction::Prediction;
+use super::sigmas::{SigmaOptions, Spread, check_positive, round};
+use super::spacing::linspace;
+use super::{NoiseLevel, Scheduler, StepInput, StepOutput, required};
+use crate::error::{Result, check_range};
+use crate::options::Options;
+
+/// Options of [`FlowMatchEuler`].
+#[derive(Debug, Clone)]
+pub(super) struct FlowMatchEulerConfig {
+    train: usize,
+    shift: f64,
+    /// The noise level to stretch the last step to.
+    terminal: Option<f64>,
+    sigmas: SigmaOptions,
+    /// From image to noise.
+    inverted: bool,
+    /// Every step denoises fully and adds fresh noise.
+    stochastic: bool,
+}
+
+impl FlowMatchEulerConfig {
+    pub(super) fn take(options: &mut Options) -> Result<Self> {
+        let train = options.usize("num_train_timesteps", 1000)?;
+        check_range("num_train_timesteps", train as f64, 2.0, 1e5)?;
+        let shift = options.f64("shift", 1.0)?;
+        check_range("shift", shift, 1e-3, 1e3)?;
+        let terminal = options.optional_f64("shift_terminal")?.filter(|&sigma| sigma > 0.0);
+        check_range("shift_terminal", terminal.unwrap_or(0.0), 0.0, 0.999)?;
+        options.only("use_dynamic_shifting", &[false])?;
+        Ok(Self {
+            train,
+            shift,
+            terminal,
+            sigmas: SigmaOptions::take(options, &[Spread::Karras, Spread::Exponential])?,
+            inverted: options.bool("invert_sigmas", false)?,
+            stochastic: options.bool("stochastic_sampling", false)?,
+        })
+    }
+
+    pub(super) fn init(&self, n: usize) -> Result<FlowMatchEuler> {
+        check_range("steps", n as f64, 1.0, self.train as f64)?;
+        let mut sigmas = self.levels(n);
+        check_positive(&sigmas)?;
+        if self.inverted {
+            sigmas.iter_mut().for_each(|sigma| *sigma = round(1.0 - *sigma));
+        }
+        let timesteps = sigmas.iter().map(|sigma| round(sigma * self.train as f64)).collect();
+        sigmas.push(if self.inverted { 1.0 } else { 0.0 });
+        Ok(FlowMatchEuler { timesteps, sigmas, stochastic: self.stochastic })
+    }
+
+    /// Noise levels from 1 down. diffusers shifts twice: the ends of its range, then every level.
+    fn levels(&self, n: usize) -> Vec<f64> {
+        let train = self.train as f64;
+        let (first, last) = (round(self.shifted(1.0)), round(self.shifted(round(1.0 / train))));
+        let even = linspace(first * train, last * train, n);
+        let mut sigmas: Vec<f64> = even.into_iter().map(|t| self.shifted(t / train)).collect();
+        if let Some(terminal) = self.terminal {
+            stretch(&mut sigmas, terminal);
+        }
+        self.sigmas.respread(&sigmas, n).into_iter().map(round).collect()
+    }
+
+    /// σ' = k σ/(1 + (k − 1) σ).
+    fn shifted(&self, sigma: f64) -> f64 {
+        self.shift * sigma / (1.0 + (self.shift - 1.0) * sigma)
+    }
+}
+
+/// Stretches 1 − σ so that the last level becomes `terminal`.
+fn stretch(sigmas: &mut [f64], terminal: f64) {
+    let scale = (1.0 - sigmas[sigmas.len() - 1]) / (1.0 - terminal);
+    if scale > 0.0 {
+        sigmas.iter_mut().for_each(|sigma| *sigma = 1.0 - (1.0 - *sigma) / scale);
+    }
+}
+
+/// Follows the velocity v = n − x₀ along x = (1 − σ) x₀ + σ n.
+///
+/// # References
+///
+/// Lipman et al. (2023), "Flow Matching for Generative Modeling", Eq. 20. Esser et al. (2024),
+/// "Scaling Rectified Flow Transformers for High-Resolution Image Synthesis", Eq. 23 (shift).
+#[derive(Debug)]
+pub(super) struct FlowMatchEuler {
+    timesteps: Vec<f64>,
+    sigmas: Vec<f64>,
+    stochastic: bool,
+}
+
+impl Scheduler for FlowMatchEuler {
+    fn timesteps(&self) -> &[f64] {
+        &self.timesteps
+    }
+
+    fn noise_level(&self, index: usize) -> NoiseLevel {
+        let sigma = self.sigmas[index];
+        NoiseLevel { signal: 1.0 - sigma, noise: sigma }
+    }
+
+    fn needs_noise(&self, _index: usize) -> bool {
+        self.stochastic
+    }
+
+    fn step(&mut self, input: StepInput) -> StepOutput {
+        let StepInput { index, prediction, sample, noise } = input;
+        let (sigma, next) = (self.sigmas[index], self.sigmas[index + 1]);
+        let level = self.noise_level(index);
+        let denoised = Prediction::Flow.denoised(level, sample.clone(), prediction.clone());
+        let sample = if self.stochastic {
+            NoiseLevel { signal: 1.0 - next, noise: next }.mix(denoised.clone(), required(noise))
+        } else {
+            sample + prediction * (next - sigma)
+        };
+        StepOutput { sample, denoised }
+    }
+}

@@ -1,0 +1,112 @@
+//! Latent consistency models: a few large jumps straight to the clean image.
+
+use super::prediction::{Clipping, Prediction};
+use super::schedule::{DEFAULTS, ScheduleDefaults};
+use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required};
+use crate::error::{Result, check_range};
+use crate::options::Options;
+
+/// The standard deviation of the data that the boundary condition assumes.
+const SIGMA_DATA: f64 = 0.5;
+
+/// Options of [`Lcm`].
+#[derive(Debug, Clone)]
+pub(super) struct LcmConfig {
+    pub(super) schedule: NoiseSchedule,
+    prediction: Prediction,
+    clipping: Clipping,
+    original_steps: usize,
+    timestep_scaling: f64,
+}
+
+impl LcmConfig {
+    pub(super) fn take(options: &mut Options) -> Result<Self> {
+        let defaults = ScheduleDefaults {
+            curve: "scaled_linear",
+            ends: (0.00085, 0.012),
+            rescaled: Some(TerminalSnr::Zero),
+            ..DEFAULTS
+        };
+        let schedule = NoiseSchedule::take(options, &defaults)?;
+        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let original_steps = options.usize("original_inference_steps", 50)?;
+        check_range(
+            "original_inference_steps",
+            original_steps as f64,
+            1.0,
+            schedule.steps() as f64,
+        )?;
+        Ok(Self {
+            prediction: Prediction::take(options, &known)?,
+            clipping: Clipping::take(options, false)?,
+            timestep_scaling: options.f64("timestep_scaling", 10.0)?,
+            original_steps,
+            schedule,
+        })
+    }
+
+    pub(super) fn init(&self, n: usize) -> Result<Lcm> {
+        check_range("steps", n as f64, 1.0, self.original_steps as f64)?;
+        let visited = visited(self.schedule.steps(), self.original_steps, n);
+        self.prediction.check_signal(self.schedule.noise_level(visited[0]).signal)?;
+        let timesteps = visited.iter().map(|&t| t as f64).collect();
+        Ok(Lcm { config: self.clone(), timesteps, visited })
+    }
+}
+
+/// n of the steps that the model was distilled at, from the noisiest down.
+fn visited(train: usize, original: usize, n: usize) -> Vec<usize> {
+    let stride = train / original;
+    let nth = |i: usize| (i as f64 * (original as f64 / n as f64)).floor() as usize;
+    (0..n).map(|i| (original - nth(i)) * stride - 1).collect()
+}
+
+/// The sampler of a consistency model: denoise, and add noise again up to the next level.
+///
+/// ```text
+/// f(x, t) = c_skip x + c_out x₀        τ = 10 t
+/// c_skip = ¼/(τ² + ¼)        c_out = τ/√(τ² + ¼)
+/// ```
+///
+/// # References
+///
+/// Luo et al. (2023), "Latent Consistency Models", algorithm 3 and appendix C.
+#[derive(Debug)]
+pub(super) struct Lcm {
+    config: LcmConfig,
+    timesteps: Vec<f64>,
+    visited: Vec<usize>,
+}
+
+impl Scheduler for Lcm {
+    fn timesteps(&self) -> &[f64] {
+        &self.timesteps
+    }
+
+    fn noise_level(&self, index: usize) -> NoiseLevel {
+        self.config.schedule.noise_level(self.visited[index])
+    }
+
+    fn needs_noise(&self, index: usize) -> bool {
+        index + 1 < self.visited.len()
+    }
+
+    fn step(&mut self, input: StepInput) -> StepOutput {
+        let StepInput { index, prediction, sample, noise } = input;
+        // 1. The clean image that the prediction stands for, limited.
+        let level = self.noise_level(index);
+        let clean = self.config.prediction.denoised(level, sample.clone(), prediction);
+        let clean = self.config.clipping.apply(clean);
+        // 2. The boundary condition: at t = 0 the sample itself.
+        let tau = self.timesteps[index] * self.config.timestep_scaling;
+        let skip = SIGMA_DATA * SIGMA_DATA / (tau * tau + SIGMA_DATA * SIGMA_DATA);
+        let denoised = clean * (tau / tau.hypot(SIGMA_DATA)) + sample * skip;
+        // 3. Up to the next level, except on arrival.
+        let sample = if self.needs_noise(index) {
+            self.noise_level(index + 1).mix(denoised.clone(), required(noise))
+        } else {
+            denoised.clone()
+        };
+        StepOutput { sample, denoised }
+    }
+}

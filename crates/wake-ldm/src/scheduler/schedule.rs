@@ -1,0 +1,377 @@
+//! How much noise each training step adds, and how much has gathered up to it.
+
+use serde_json::Value;
+
+use super::NoiseLevel;
+use crate::error::{Error, Result, check_range};
+use crate::options::Options;
+
+/// The shape of the noise added per training step, βₜ.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BetaCurve {
+    /// Evenly spaced from the first number to the second.
+    Linear(f64, f64),
+    /// Squares of evenly spaced square roots: Stable Diffusion's.
+    ScaledLinear(f64, f64),
+    /// From a signal that falls as the square of a cosine, at most 0.999.
+    SquaredCosine,
+    /// From a signal that falls as exp(−12 t), at most 0.999.
+    Exponential,
+    /// A logistic curve from the first number to the second.
+    Sigmoid(f64, f64),
+    /// Numbers given one by one.
+    Trained(Vec<f64>),
+}
+
+/// What becomes of the little signal that usually survives the last training step.
+///
+/// # References
+///
+/// Lin et al. (2024), "Common Diffusion Noise Schedules and Sample Steps are Flawed", algorithm 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TerminalSnr {
+    /// It stays.
+    Kept,
+    /// The schedule is stretched until none is left.
+    Zero,
+    /// As `Zero`, with 2⁻²⁴ kept in the last step, so that σ stays finite.
+    AlmostZero,
+}
+
+/// The signal that is left after each training step.
+///
+/// ```text
+/// ᾱₜ = ∏ₛ₌₀ᵗ (1 − βₛ)        xₜ = √ᾱₜ x₀ + √(1 − ᾱₜ) n
+/// ```
+///
+/// Numbers are rounded to f32 where PyTorch rounds them, because the models were trained with
+/// those: the last steps of a cosine schedule differ in the fifth digit.
+///
+/// # References
+///
+/// Ho et al. (2020), "Denoising Diffusion Probabilistic Models", Eq. 4. Nichol & Dhariwal (2021),
+/// "Improved Denoising Diffusion Probabilistic Models", Eq. 17 (cosine).
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseSchedule {
+    curve: BetaCurve,
+    betas: Vec<f32>,
+    alphas_cumprod: Vec<f32>,
+}
+
+impl NoiseSchedule {
+    /// The schedule of a number of training steps.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] for fewer than 2 or more than 100,000 steps, for a first or last β
+    /// outside [1e-8, 0.9999], or for a β given one by one outside [0, 1] (excluding 0 first).
+    pub fn new(curve: &BetaCurve, steps: usize, terminal: TerminalSnr) -> Result<Self> {
+        check_range("num_train_timesteps", steps as f64, 2.0, 1e5)?;
+        let mut betas = curve.betas(steps)?;
+        if terminal != TerminalSnr::Kept {
+            betas = without_terminal_signal(&betas);
+        }
+        let mut alphas_cumprod = cumulative_product(betas.iter().map(|beta| 1.0 - beta));
+        if terminal == TerminalSnr::AlmostZero
+            && let Some(last) = alphas_cumprod.last_mut()
+        {
+            *last = f32::EPSILON / 2.0;
+        }
+        Ok(Self { curve: curve.clone(), betas, alphas_cumprod })
+    }
+
+    /// Number of training steps T.
+    pub fn steps(&self) -> usize {
+        self.betas.len()
+    }
+
+    /// The shape of the noise added per step, before any stretching.
+    pub fn curve(&self) -> &BetaCurve {
+        &self.curve
+    }
+
+    /// The noise βₜ that each step adds.
+    pub fn betas(&self) -> &[f32] {
+        &self.betas
+    }
+
+    /// The signal ᾱₜ left after each step (a variance).
+    pub fn alphas_cumprod(&self) -> &[f32] {
+        &self.alphas_cumprod
+    }
+
+    /// The signal ᾱₜ left after step `t`.
+    ///
+    /// # Panics
+    ///
+    /// When there are not that many steps.
+    pub fn alpha_cumprod(&self, t: usize) -> f64 {
+        f64::from(self.alphas_cumprod[t])
+    }
+
+    /// The noise level after step `t`: √ᾱₜ and √(1 − ᾱₜ).
+    ///
+    /// # Panics
+    ///
+    /// When there are not that many steps.
+    pub fn noise_level(&self, t: usize) -> NoiseLevel {
+        NoiseLevel::from_alpha_cumprod(self.alpha_cumprod(t))
+    }
+
+    /// Noise relative to the signal, σₜ = √((1 − ᾱₜ)/ᾱₜ), rising with t; infinite where no signal
+    /// is left.
+    pub fn sigmas(&self) -> Vec<f32> {
+        self.alphas_cumprod.iter().map(|alpha| ((1.0 - alpha) / alpha).sqrt()).collect()
+    }
+}
+
+impl NoiseLevel {
+    /// √ᾱ and √(1 − ᾱ).
+    pub(super) fn from_alpha_cumprod(alpha_cumprod: f64) -> Self {
+        Self { signal: alpha_cumprod.sqrt(), noise: (1.0 - alpha_cumprod).sqrt() }
+    }
+}
+
+impl BetaCurve {
+    fn betas(&self, steps: usize) -> Result<Vec<f32>> {
+        if let Self::Linear(first, last) | Self::ScaledLinear(first, last) | Self::Sigmoid(first, last) =
+            *self
+        {
+            check_range("beta_start", first, 1e-8, 0.9999)?;
+            check_range("beta_end", last, 1e-8, 0.9999)?;
+        }
+        Ok(match self {
+            Self::Linear(first, last) => linspace(*first, *last, steps),
+            Self::ScaledLinear(first, last) => {
+                linspace(first.sqrt(), last.sqrt(), steps).iter().map(|root| root * root).collect()
+            }
+            Self::SquaredCosine => betas_of(squared_cosine, steps),
+            Self::Exponential => betas_of(|t| (-12.0 * t).exp(), steps),
+            Self::Sigmoid(first, last) => sigmoid_betas(*first, *last, steps),
+            Self::Trained(betas) => trained(betas, steps)?,
+        })
+    }
+
+    /// Reads `beta_schedule`, `beta_start`, `beta_end` and `trained_betas`.
+    pub(super) fn take(options: &mut Options, defaults: &ScheduleDefaults) -> Result<Self> {
+        let (first, last) = defaults.ends;
+        let ends = (options.f64("beta_start", first)?, options.f64("beta_end", last)?);
+        let name = options.string("beta_schedule", defaults.curve)?;
+        if let Some(list) = options.take("trained_betas") {
+            return trained_list(options, &list);
+        }
+        match name.as_str() {
+            "linear" => Ok(Self::Linear(ends.0, ends.1)),
+            "scaled_linear" => Ok(Self::ScaledLinear(ends.0, ends.1)),
+            "squaredcos_cap_v2" => Ok(Self::SquaredCosine),
+            other if defaults.further == Some(other) && other == "exp" => Ok(Self::Exponential),
+            other if defaults.further == Some(other) => Ok(Self::Sigmoid(ends.0, ends.1)),
+            other => {
+                let supported = "linear, scaled_linear, squaredcos_cap_v2";
+                Err(options.unsupported("beta_schedule", &other.into(), supported))
+            }
+        }
+    }
+}
+
+/// What a scheduler assumes about the schedule where its configuration is silent.
+#[derive(Debug)]
+pub(super) struct ScheduleDefaults {
+    /// Name of the curve.
+    pub(super) curve: &'static str,
+    /// First and last β.
+    pub(super) ends: (f64, f64),
+    /// The curve that only this scheduler knows.
+    pub(super) further: Option<&'static str>,
+    /// What rescaling to zero terminal signal means to it; `None`: it does not know it.
+    pub(super) rescaled: Option<TerminalSnr>,
+}
+
+/// The defaults that most schedulers share.
+pub(super) const DEFAULTS: ScheduleDefaults = ScheduleDefaults {
+    curve: "linear",
+    ends: (1e-4, 0.02),
+    further: None,
+    rescaled: Some(TerminalSnr::AlmostZero),
+};
+
+impl NoiseSchedule {
+    /// Reads the options that shape the schedule.
+    pub(super) fn take(options: &mut Options, defaults: &ScheduleDefaults) -> Result<Self> {
+        let steps = options.usize("num_train_timesteps", 1000)?;
+        let curve = BetaCurve::take(options, defaults)?;
+        let terminal = match defaults.rescaled {
+            Some(terminal) if options.bool("rescale_betas_zero_snr", false)? => terminal,
+            _ => TerminalSnr::Kept,
+        };
+        Self::new(&curve, steps, terminal)
+    }
+}
+
+/// Evenly spaced f32 numbers, counted from both ends as PyTorch does.
+fn linspace(first: f64, last: f64, steps: usize) -> Vec<f32> {
+    let (first, last) = (first as f32, last as f32);
+    let step = (last - first) / (steps - 1) as f32;
+    let value = |i: usize| {
+        if i < steps / 2 { first + step * i as f32 } else { last - step * (steps - 1 - i) as f32 }
+    };
+    (0..steps).map(value).collect()
+}
+
+/// The β that make the signal fall as a function of t in [0, 1], at most 0.999.
+fn betas_of(signal: impl Fn(f64) -> f64, steps: usize) -> Vec<f32> {
+    let at = |i: usize| signal(i as f64 / steps as f64);
+    (0..steps).map(|i| (1.0 - at(i + 1) / at(i)).min(0.999) as f32).collect()
+}
+
+fn squared_cosine(t: f64) -> f64 {
+    ((t + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2).cos().powi(2)
+}
+
+fn sigmoid_betas(first: f64, last: f64, steps: usize) -> Vec<f32> {
+    let rise = (last - first) as f32;
+    let logistic = |x: f32| 1.0 / (1.0 + (-x).exp());
+    linspace(-6.0, 6.0, steps).into_iter().map(|x| logistic(x) * rise + first as f32).collect()
+}
+
+fn trained(betas: &[f64], steps: usize) -> Result<Vec<f32>> {
+    check_range("length of trained_betas", betas.len() as f64, steps as f64, steps as f64)?;
+    for (i, &beta) in betas.iter().enumerate() {
+        let (min, max) = if i == 0 { (1e-8, 0.9999) } else { (0.0, 1.0) };
+        check_range("trained_betas", beta, min, max)?;
+    }
+    Ok(betas.iter().map(|&beta| beta as f32).collect())
+}
+
+fn trained_list(options: &Options, list: &Value) -> Result<BetaCurve> {
+    let numbers: Option<Vec<f64>> =
+        list.as_array().and_then(|list| list.iter().map(Value::as_f64).collect());
+    match numbers {
+        Some(betas) => Ok(BetaCurve::Trained(betas)),
+        None => Err(options.unsupported("trained_betas", list, "a list of numbers")),
+    }
+}
+
+/// Products of the first factors, kept in f64 and rounded one by one.
+fn cumulative_product(factors: impl Iterator<Item = f32>) -> Vec<f32> {
+    let running = |product: &mut f64, factor: f32| {
+        *product *= f64::from(factor);
+        Some(*product as f32)
+    };
+    factors.scan(1.0, running).collect()
+}
+
+/// Stretches √ᾱ linearly so that the last one is 0 and the first stays.
+///
+/// # References
+///
+/// Lin et al. (2024), algorithm 1.
+fn without_terminal_signal(betas: &[f32]) -> Vec<f32> {
+    let alphas_cumprod = cumulative_product(betas.iter().map(|beta| 1.0 - beta));
+    let roots: Vec<f32> = alphas_cumprod.into_iter().map(f32::sqrt).collect();
+    let (first, last) = (roots[0], roots[roots.len() - 1]);
+    let stretch = first / (first - last);
+    let squares: Vec<f32> = roots.iter().map(|root| ((root - last) * stretch).powi(2)).collect();
+    let ratios = squares.windows(2).map(|pair| pair[1] / pair[0]);
+    std::iter::once(squares[0]).chain(ratios).map(|alpha| 1.0 - alpha).collect()
+}
+
+/// The error for a training step that the schedule does not have.
+pub(super) fn check_timestep(t: i64, steps: usize) -> Result<usize> {
+    match usize::try_from(t) {
+        Ok(index) if index < steps => Ok(index),
+        _ => Err(Error::OutOfRange {
+            name: "timestep (from steps, steps_offset and timestep_spacing)".to_owned(),
+            value: t as f64,
+            min: 0.0,
+            max: (steps - 1) as f64,
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CURVES: [BetaCurve; 5] = [
+        BetaCurve::Linear(1e-4, 0.02),
+        BetaCurve::ScaledLinear(0.00085, 0.012),
+        BetaCurve::SquaredCosine,
+        BetaCurve::Exponential,
+        BetaCurve::Sigmoid(1e-4, 0.02),
+    ];
+
+    fn stable_diffusion(terminal: TerminalSnr) -> NoiseSchedule {
+        NoiseSchedule::new(&BetaCurve::ScaledLinear(0.00085, 0.012), 1000, terminal).unwrap()
+    }
+
+    /// Published values of Stable Diffusion's schedule, to f32.
+    #[test]
+    fn stable_diffusion_schedule_has_its_known_values() {
+        let schedule = stable_diffusion(TerminalSnr::Kept);
+        let close = |t: usize, value: f64| {
+            let relative = schedule.alpha_cumprod(t) / value - 1.0;
+            // f32 rounding of 1000 betas and their complements: 1000 · 6e-8 / sqrt(1000), twice.
+            assert!(relative.abs() < 4e-6, "{t}: {relative:e}");
+        };
+        close(0, 0.99915);
+        close(500, 0.27633268);
+        close(999, 0.00466010);
+        assert!((f64::from(schedule.sigmas()[999]) / 14.6146412 - 1.0).abs() < 2e-6);
+        assert!((f64::from(schedule.betas()[0]) - 0.00085).abs() < 1e-10);
+        assert!((f64::from(schedule.betas()[999]) - 0.012).abs() < 1e-9);
+    }
+
+    /// The closed form of the cosine curve at both ends and in the middle: the famous integer
+    /// division makes all but the last of these zero.
+    #[test]
+    fn cosine_betas_match_their_closed_form() {
+        let schedule =
+            NoiseSchedule::new(&BetaCurve::SquaredCosine, 1000, TerminalSnr::Kept).unwrap();
+        let ratio = squared_cosine(0.5) / squared_cosine(0.0);
+        assert!((schedule.alpha_cumprod(499) / ratio - 1.0).abs() < 1e-5);
+        assert!((f64::from(schedule.betas()[0]) - 4.1284e-5).abs() < 1e-8);
+        assert!((schedule.betas()[999] - 0.999).abs() < 1e-7);
+    }
+
+    #[test]
+    fn signal_falls_and_noise_rises_for_every_curve_and_length() {
+        for curve in &CURVES {
+            for steps in [2, 3, 10, 999, 1000, 4000] {
+                for terminal in [TerminalSnr::Kept, TerminalSnr::Zero, TerminalSnr::AlmostZero] {
+                    let schedule = NoiseSchedule::new(curve, steps, terminal).unwrap();
+                    let alphas = schedule.alphas_cumprod();
+                    // The 2⁻²⁴ at the end may lie above what stretching leaves just before it.
+                    let compared = steps - usize::from(terminal == TerminalSnr::AlmostZero);
+                    let falls = alphas[..compared].windows(2).all(|pair| pair[1] < pair[0]);
+                    assert!(falls, "{curve:?} {steps} {terminal:?}");
+                    assert!(alphas.iter().all(|alpha| (0.0..1.0).contains(alpha)));
+                    let finite = schedule.sigmas().iter().all(|sigma| sigma.is_finite());
+                    assert_eq!(finite, terminal != TerminalSnr::Zero);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn zero_terminal_snr_ends_at_zero_and_keeps_the_start() {
+        let kept = stable_diffusion(TerminalSnr::Kept);
+        let zero = stable_diffusion(TerminalSnr::Zero);
+        assert!(zero.alpha_cumprod(999).abs() < f64::MIN_POSITIVE);
+        assert!((zero.alpha_cumprod(0) - kept.alpha_cumprod(0)).abs() < 1e-6);
+        let almost = stable_diffusion(TerminalSnr::AlmostZero);
+        assert!((almost.alpha_cumprod(999) - 2f64.powi(-24)).abs() < 1e-20);
+    }
+
+    #[test]
+    fn bad_numbers_are_refused_by_name() {
+        let new = |curve, steps| NoiseSchedule::new(&curve, steps, TerminalSnr::Kept);
+        assert!(new(BetaCurve::Linear(0.0, 0.02), 1000).is_err());
+        assert!(new(BetaCurve::Linear(1e-4, 1.5), 1000).is_err());
+        assert!(new(BetaCurve::Linear(f64::NAN, 0.02), 1000).is_err());
+        assert!(new(BetaCurve::SquaredCosine, 1).is_err());
+        assert!(new(BetaCurve::SquaredCosine, usize::MAX).is_err());
+        let error = new(BetaCurve::Trained(vec![0.1]), 3).unwrap_err().to_string();
+        assert_eq!(error, "length of trained_betas is 1, outside [3, 3]");
+    }
+}

@@ -1,0 +1,214 @@
+//! A sentence (or a scene) becomes a radar image with the diffusion model.
+//!
+//! ```text
+//! cargo run --release --example generate -- --weights stable-diffusion-v1-4 --steps 20
+//! cargo run --release --example generate -- --weights DIR --scene scene.toml --count 4 --seed 7
+//! ```
+//!
+//! Writes `image.png` (`image-0.png`, `image-1.png`, … with `--count`) and `report.json`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use burn::tensor::{Device, Tensor};
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use wake_ldm::pipeline::{Pipeline, Request, to_bytes};
+use wake_ldm::scheduler::SchedulerConfig;
+use wake_physics::Scene;
+
+/// Generate an image from a prompt with a latent diffusion model.
+#[derive(Parser)]
+struct Arguments {
+    /// What the image shows; without it and without --scene, the default scene in words.
+    #[arg(long, value_name = "TEXT", conflicts_with = "scene")]
+    prompt: Option<String>,
+    /// Scene file (TOML) to put into words.
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Folder of the model, in diffusers layout.
+    #[arg(long, value_name = "DIR")]
+    weights: Option<PathBuf>,
+    /// Steps of the scheduler.
+    #[arg(long, default_value_t = 50)]
+    steps: usize,
+    /// ddpm, ddim, pndm, euler, euler-ancestral, dpm++, heun, lms, unipc, lcm or flow-match-euler;
+    /// without it, the model's own.
+    #[arg(long, value_name = "NAME")]
+    scheduler: Option<String>,
+    /// How strongly to follow the prompt; up to 1: as the model does by itself.
+    #[arg(long, default_value_t = 7.5, allow_negative_numbers = true)]
+    guidance: f64,
+    /// What the image should not show.
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    negative: String,
+    /// Image k has this seed plus k.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Number of images.
+    #[arg(long, default_value_t = 1)]
+    count: usize,
+    /// flex, ndarray, wgpu or cuda, where compiled in; a GPU's number may follow, as in cuda:1.
+    #[arg(long, default_value = "flex")]
+    device: String,
+    /// Folder of the results, made if absent.
+    #[arg(long, value_name = "DIR", default_value = "out/generate")]
+    out: PathBuf,
+    /// Print the report as JSON on standard output, and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let weights = arguments.weights.as_ref().ok_or(
+        "--weights is missing: give the folder of a model in diffusers layout, such as Stable \
+         Diffusion v1.4 (this build has no model of its own yet)",
+    )?;
+    let prompt = prompt(arguments)?;
+    let device = device(&arguments.device)?;
+    let begin = Instant::now();
+    let pipeline = Pipeline::load(weights, &device)?;
+    let load = begin.elapsed().as_secs_f64();
+    let request = request(arguments, &prompt, &pipeline)?;
+    let (images, mut seconds) = generate(&pipeline, &request, arguments, &prompt)?;
+    seconds["load"] = json!(load);
+    seconds["total"] = json!(begin.elapsed().as_secs_f64());
+    std::fs::create_dir_all(&arguments.out)?;
+    let files = write_images(images, &arguments.out)?;
+    let report = json!({
+        "prompt": prompt, "negative": arguments.negative, "seed": arguments.seed,
+        "steps": arguments.steps, "guidance": arguments.guidance, "count": arguments.count,
+        "scheduler": request_scheduler(arguments, &pipeline)?.to_json(),
+        "device": arguments.device, "weights": weights, "files": files, "seconds": seconds,
+    });
+    std::fs::write(arguments.out.join("report.json"), format!("{report:#}\n"))?;
+    if arguments.json {
+        println!("{report:#}");
+    } else {
+        println!("{} in {}", files.join(", "), arguments.out.display());
+    }
+    Ok(())
+}
+
+/// The prompt as given, or a scene in words.
+fn prompt(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+    if let Some(prompt) = &arguments.prompt {
+        return Ok(prompt.clone());
+    }
+    let scene = match &arguments.scene {
+        Some(path) => Scene::read(path)?,
+        None => Scene::default(),
+    };
+    Ok(wake_text::prompt(&scene)?)
+}
+
+fn request_scheduler(
+    arguments: &Arguments,
+    pipeline: &Pipeline,
+) -> wake_ldm::Result<SchedulerConfig> {
+    let own = pipeline.scheduler().clone();
+    match &arguments.scheduler {
+        None => Ok(own),
+        // A model's file may leave clipping to the default, which latents must not have.
+        Some(name) => own.with("clip_sample", false)?.with_class(name),
+    }
+}
+
+fn request(
+    arguments: &Arguments,
+    prompt: &str,
+    pipeline: &Pipeline,
+) -> wake_ldm::Result<Request> {
+    Ok(Request::new(prompt)
+        .with_negative(arguments.negative.as_str())
+        .with_guidance(arguments.guidance)
+        .with_steps(arguments.steps)
+        .with_scheduler(request_scheduler(arguments, pipeline)?)
+        .with_count(arguments.count)
+        .with_seed(arguments.seed))
+}
+
+/// Runs the stages, each with its seconds.
+fn generate(
+    pipeline: &Pipeline,
+    request: &Request,
+    arguments: &Arguments,
+    prompt: &str,
+) -> Result<(Tensor<4>, Value), Box<dyn Error>> {
+    let begin = Instant::now();
+    // Embeddings are remembered, so the run finds them ready.
+    pipeline.embed(&[prompt, &arguments.negative]);
+    let text = begin.elapsed().as_secs_f64();
+
+    let begin = Instant::now();
+    let mut sampling = pipeline.sample(request)?;
+    let bar = progress_bar(sampling.len() as u64);
+    for progress in sampling.by_ref() {
+        bar.set_position(progress.done as u64);
+    }
+    bar.finish_and_clear();
+    // Reading a number waits for the device.
+    let latents = sampling.latents();
+    latents.to_data();
+    let denoise = begin.elapsed().as_secs_f64();
+
+    let begin = Instant::now();
+    let images = pipeline.decode(latents);
+    images.to_data();
+    let decode = begin.elapsed().as_secs_f64();
+    Ok((images, json!({"text": text, "denoise": denoise, "decode": decode})))
+}
+
+fn progress_bar(steps: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} step {pos} of {len}, {eta} left");
+    ProgressBar::new(steps).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// Writes one PNG per image and returns their names.
+fn write_images(images: Tensor<4>, out: &Path) -> Result<Vec<String>, Box<dyn Error>> {
+    let [count, channels, rows, columns] = images.dims();
+    let color = if channels == 1 { image::ColorType::L8 } else { image::ColorType::Rgb8 };
+    let mut names = Vec::new();
+    for (k, bytes) in to_bytes(images).into_iter().enumerate() {
+        let name = if count == 1 { "image.png".to_owned() } else { format!("image-{k}.png") };
+        image::save_buffer(out.join(&name), &bytes, columns as u32, rows as u32, color)?;
+        names.push(name);
+    }
+    Ok(names)
+}
+
+/// The device of a name, where its backend is compiled in.
+fn device(name: &str) -> Result<Device, String> {
+    let (kind, index) = name.split_once(':').unwrap_or((name, "0"));
+    let index: usize = index.parse().map_err(|_| format!("--device {name}: no number after ':'"))?;
+    match kind {
+        #[cfg(feature = "flex")]
+        "flex" if index == 0 => Ok(Device::flex()),
+        #[cfg(feature = "ndarray")]
+        #[allow(deprecated, reason = "kept until burn drops it")]
+        "ndarray" if index == 0 => Ok(Device::ndarray()),
+        #[cfg(feature = "wgpu")]
+        "wgpu" if name == "wgpu" => Ok(Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)),
+        #[cfg(feature = "wgpu")]
+        "wgpu" => Ok(Device::wgpu(burn::tensor::DeviceKind::DiscreteGpu(index))),
+        #[cfg(feature = "cuda")]
+        "cuda" => Ok(Device::cuda(index)),
+        _ => Err(format!(
+            "--device {name} is none of this build's: use flex, or build with \
+             --features ndarray, wgpu or cuda"
+        )),
+    }
+}
