@@ -57,8 +57,14 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     output::make_folder(&arguments.out)?;
     let mut cases: Vec<(usize, f64)> = TOLERANCES.map(|t| (FRONTIER_SIZE, t)).to_vec();
-    let sizes = SIZES.into_iter().filter(|&n| n <= arguments.largest as usize);
-    cases.extend(sizes.filter(|&n| n != FRONTIER_SIZE).map(|n| (n, DEFAULT_TOLERANCE)));
+    let sizes = SIZES
+        .into_iter()
+        .filter(|&n| n <= arguments.largest as usize);
+    cases.extend(
+        sizes
+            .filter(|&n| n != FRONTIER_SIZE)
+            .map(|n| (n, DEFAULT_TOLERANCE)),
+    );
     let bar = ProgressBar::new((cases.len() * STAGES.len()) as u64);
     let mut rows = Vec::new();
     for stage in STAGES {
@@ -68,7 +74,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     bar.finish_and_clear();
-    rows.sort_by(|a, b| (a.stage, a.size).cmp(&(b.stage, b.size)).then(b.tolerance.total_cmp(&a.tolerance)));
+    rows.sort_by(|a, b| {
+        (a.stage, a.size)
+            .cmp(&(b.stage, b.size))
+            .then(b.tolerance.total_cmp(&a.tolerance))
+    });
     write(&arguments.out, &rows)?;
     if arguments.json {
         println!("{}", json!({ "rows": rows }));
@@ -90,7 +100,9 @@ fn table(rows: &[Row]) -> String {
                     | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
     for r in rows {
-        let product = r.matrix_product_seconds.map_or(String::new(), |s| format!("{:.0}", 1e3 * s));
+        let product = r
+            .matrix_product_seconds
+            .map_or(String::new(), |s| format!("{:.0}", 1e3 * s));
         text += &format!(
             "| {} | {} | {:.0e} | {:.2} | {:.3}{} | {product} | {:.0} | {:.1e} | {:.1e} |\n",
             r.stage,

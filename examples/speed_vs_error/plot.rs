@@ -18,7 +18,10 @@ pub fn draw(path: &Path, rows: &[Row], size: usize) -> Result<(), Box<dyn std::e
     let area = SVGBackend::new(path, (900, 620)).into_drawing_area();
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&area)
-        .caption(format!("Speed against error, {size} x {size} pixels"), ("sans-serif", 22))
+        .caption(
+            format!("Speed against error, {size} x {size} pixels"),
+            ("sans-serif", 22),
+        )
         .margin(16)
         .x_label_area_size(44)
         .y_label_area_size(64)
@@ -40,12 +43,19 @@ pub fn draw(path: &Path, rows: &[Row], size: usize) -> Result<(), Box<dyn std::e
         };
         let fast = points(|r| r.fast_seconds);
         chart
-            .draw_series(LineSeries::new(fast.iter().copied(), colour.stroke_width(2)))?
+            .draw_series(LineSeries::new(
+                fast.iter().copied(),
+                colour.stroke_width(2),
+            ))?
             .label(format!("{stage}: fast, oracle (x)"))
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
         chart.draw_series(fast.iter().map(|&p| Circle::new(p, 4, colour.filled())))?;
         let oracle = points(|r| r.oracle_seconds);
-        chart.draw_series(oracle.iter().map(|&p| Cross::new(p, 5, colour.stroke_width(2))))?;
+        chart.draw_series(
+            oracle
+                .iter()
+                .map(|&p| Cross::new(p, 5, colour.stroke_width(2))),
+        )?;
     }
     chart
         .configure_series_labels()

@@ -8,12 +8,16 @@ use wake_physics::hull::Hull;
 use wake_physics::kelvin::KelvinWake;
 use wake_physics::sar::direct::DirectImage;
 use wake_physics::sar::{AzimuthResolution, Imaging, Sources};
-use wake_physics::scattering::{Backscatter, BackscatterTable, FacetFields, SlopeCovariance, Specular, TwoScale};
+use wake_physics::scattering::{
+    Backscatter, BackscatterTable, FacetFields, SlopeCovariance, Specular, TwoScale,
+};
 use wake_physics::spectrum::elfouhaily::Elfouhaily;
 use wake_physics::surface::Surface;
 use wake_physics::waves::{PlaneWaves, Quantity, Transfer, harmonic_sum, matrix_product};
 use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
-use wake_physics::{Field, Method, Raster, Scene, Track, nufft, permittivity, simulate, simulate_with};
+use wake_physics::{
+    Field, Method, Raster, Scene, Track, nufft, permittivity, simulate, simulate_with,
+};
 
 /// Stages in the order of the data flow.
 pub const STAGES: [&str; 5] = ["sea", "kelvin", "backscatter", "bunching", "scene"];
@@ -110,14 +114,24 @@ fn sum(
     let (fast_seconds, fields) = median_seconds(RUNS, fast);
     let (pixels, scale) = pixels(raster);
     let (oracle, exact) = seconds(|| harmonic_sum(waves, &TRANSFER, &QUANTITIES, raster, &pixels));
-    let errors = fields.iter().zip(&exact).fold(Errors::default(), |worst, (field, exact)| {
-        let values = pixels.iter().map(|&[i, j]| f64::from(field.at(i, j)));
-        worst.worst(Errors::of(values, exact, field.rms()))
-    });
+    let errors = fields
+        .iter()
+        .zip(&exact)
+        .fold(Errors::default(), |worst, (field, exact)| {
+            let values = pixels.iter().map(|&[i, j]| f64::from(field.at(i, j)));
+            worst.worst(Errors::of(values, exact, field.rms()))
+        });
     let (matrix_product_seconds, _) = product(raster, waves);
     Row {
         matrix_product_seconds: Some(matrix_product_seconds),
-        ..row(stage, raster, tolerance, fast_seconds, (oracle * scale, scale > 1.0), errors)
+        ..row(
+            stage,
+            raster,
+            tolerance,
+            fast_seconds,
+            (oracle * scale, scale > 1.0),
+            errors,
+        )
     }
 }
 
@@ -126,7 +140,8 @@ fn product(raster: &Raster, waves: &PlaneWaves) -> (f64, Vec<Field>) {
     let whole = raster.rows <= WHOLE;
     let rows = if whole { raster.rows } else { PRODUCT_ROWS };
     let part = Raster { rows, ..*raster };
-    let (seconds, fields) = median_seconds(1, || matrix_product(waves, &TRANSFER, &QUANTITIES, &part));
+    let (seconds, fields) =
+        median_seconds(1, || matrix_product(waves, &TRANSFER, &QUANTITIES, &part));
     (seconds * raster.rows as f64 / rows as f64, fields)
 }
 
@@ -137,8 +152,16 @@ fn pixels(raster: &Raster) -> (Vec<[usize; 2]>, f64) {
         return (all.collect(), 1.0);
     }
     let mut random = StdRng::seed_from_u64(1);
-    let one = |_| [random.random_range(0..raster.rows), random.random_range(0..raster.columns)];
-    ((0..SAMPLE).map(one).collect(), raster.len() as f64 / SAMPLE as f64)
+    let one = |_| {
+        [
+            random.random_range(0..raster.rows),
+            random.random_range(0..raster.columns),
+        ]
+    };
+    (
+        (0..SAMPLE).map(one).collect(),
+        raster.len() as f64 / SAMPLE as f64,
+    )
 }
 
 /// Surface and wake together: slopes, and what the imaging needs.
@@ -161,8 +184,14 @@ fn backscatter_model(spacing: f64) -> Backscatter {
     let wavenumber = std::f64::consts::TAU * scene.radar.frequency / 299_792_458.0;
     let epsilon = permittivity::sea_water(scene.radar.frequency, 20.0, 35.0);
     let short = Elfouhaily::new(scene.sea.wind_speed, scene.sea.fetch);
-    let two_scale =
-        TwoScale::new(INCIDENCE, wavenumber, scene.radar.polarization, epsilon, short, [1.0, 0.0]);
+    let two_scale = TwoScale::new(
+        INCIDENCE,
+        wavenumber,
+        scene.radar.polarization,
+        epsilon,
+        short,
+        [1.0, 0.0],
+    );
     let tilt: SlopeCovariance = two_scale.slopes_from(std::f64::consts::PI / spacing);
     let lobe = Specular::mirror_lobe(wavenumber, spacing);
     Backscatter {
@@ -184,7 +213,8 @@ fn backscatter(raster: &Raster, tolerance: f64) -> Row {
     let model = backscatter_model(raster.spacing);
     let mean: f64 = model.parts([0.0, 0.0]).iter().sum();
     let (fast_seconds, sigma0) = median_seconds(RUNS, || {
-        let table = BackscatterTable::covering(model.clone(), &slopes[0], &slopes[1], tolerance * mean);
+        let table =
+            BackscatterTable::covering(model.clone(), &slopes[0], &slopes[1], tolerance * mean);
         table.sigma0_field(&facets)
     });
     // Quadrature is slow: a sample above 128 pixels a side.
@@ -197,7 +227,14 @@ fn backscatter(raster: &Raster, tolerance: f64) -> Row {
     let exact: Vec<f64> = exact.into_iter().map(f64::from).collect();
     let values = pixels.iter().map(|&[i, j]| f64::from(sigma0.at(i, j)));
     let errors = Errors::of(values, &exact, sigma0.mean());
-    row("backscatter", raster, tolerance, fast_seconds, (oracle * scale, scale > 1.0), errors)
+    row(
+        "backscatter",
+        raster,
+        tolerance,
+        fast_seconds,
+        (oracle * scale, scale > 1.0),
+        errors,
+    )
 }
 
 /// Scattered kernels against the dense bunching integral.
@@ -235,10 +272,22 @@ fn bunching(raster: &Raster, tolerance: f64) -> Row {
     let (fast_seconds, image) = median_seconds(RUNS, || imaging.image(&sources, raster, tolerance));
     let (pixels, scale) = pixels(raster);
     let direct = DirectImage::new(&imaging, &sources, raster);
-    let (oracle, exact) = seconds(|| pixels.par_iter().map(|&[i, j]| direct.at(i, j)).collect::<Vec<f64>>());
+    let (oracle, exact) = seconds(|| {
+        pixels
+            .par_iter()
+            .map(|&[i, j]| direct.at(i, j))
+            .collect::<Vec<f64>>()
+    });
     let values = pixels.iter().map(|&[i, j]| f64::from(image.at(i, j)));
     let errors = Errors::of(values, &exact, image.mean());
-    row("bunching", raster, tolerance, fast_seconds, (oracle * scale, scale > 1.0), errors)
+    row(
+        "bunching",
+        raster,
+        tolerance,
+        fast_seconds,
+        (oracle * scale, scale > 1.0),
+        errors,
+    )
 }
 
 /// The whole simulation: fast at the size; the oracles of all stages on a small grid, scaled by modes and pixels.
@@ -269,7 +318,14 @@ fn scene(size: usize, tolerance: f64) -> wake_physics::Result<Row> {
         max: max / mean,
         rms: rms / mean,
     };
-    Ok(row("scene", &raster, tolerance, fast_seconds, (oracle, true), errors))
+    Ok(row(
+        "scene",
+        &raster,
+        tolerance,
+        fast_seconds,
+        (oracle, true),
+        errors,
+    ))
 }
 
 /// Pixels along a side of the scene that is also simulated directly.

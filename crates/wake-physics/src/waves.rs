@@ -8,8 +8,6 @@ use crate::raster::{Field, Raster};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-
-
 /// Plane waves of the sea surface at one instant:
 ///
 /// ```text

@@ -108,10 +108,7 @@ fn ahead_of_the_ship_there_is_no_wake() {
         let assignments = [
             "sea.wind_speed=0".to_owned(),
             format!("ship.position={position}"),
-            format!(
-                "ship.heading={}",
-                90
-            ),
+            format!("ship.heading={}", 90),
         ];
         let refs: Vec<&str> = assignments.iter().map(String::as_str).collect();
         let simulation = run(&small(48, 48, &refs));
