@@ -38,18 +38,23 @@ fn main() {
     drop(text);
 
     let small = AutoencoderKlConfig::small(16, 3).init(&device);
-    let latents: Tensor<4> = Tensor::random([1, 16, 32, 32], Distribution::Normal(0.0, 1.0), &device);
+    let latents: Tensor<4> =
+        Tensor::random([1, 16, 32, 32], Distribution::Normal(0.0, 1.0), &device);
     let seconds = measure(|| {
         black_box(small.decode(latents.clone()).into_data());
     });
     println!("small decoder, 32x32 latents: {seconds:.4?} s");
 
     let autoencoder = AutoencoderKlConfig::new().init(&device);
-    let latents: Tensor<4> = Tensor::random([1, 4, 64, 64], Distribution::Normal(0.0, 1.0), &device);
+    let latents: Tensor<4> =
+        Tensor::random([1, 4, 64, 64], Distribution::Normal(0.0, 1.0), &device);
     let seconds = measure(|| {
         black_box(autoencoder.decode(latents.clone()).into_data());
     });
-    println!("decoder to 512x512: {seconds:.2?} s, peak memory {}", peak_memory());
+    println!(
+        "decoder to 512x512: {seconds:.2?} s, peak memory {}",
+        peak_memory()
+    );
 }
 
 /// The most memory that this process has held, where the system tells.

@@ -8,7 +8,10 @@
 //!
 //! Stable Diffusion's U-Net takes many seconds and 4 GB: it runs three times, and only where no filter
 //! is given or the filter names it (`stable-diffusion`).
-#![allow(missing_docs, reason = "criterion's macros make undocumented functions")]
+#![allow(
+    missing_docs,
+    reason = "criterion's macros make undocumented functions"
+)]
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -103,7 +106,10 @@ fn stable_diffusion_unet() {
         })
         .collect();
     seconds.sort_by(f64::total_cmp);
-    println!("stable-diffusion U-Net, batch 2, 64x64: {seconds:.2?} s, peak memory {}", peak_memory());
+    println!(
+        "stable-diffusion U-Net, batch 2, 64x64: {seconds:.2?} s, peak memory {}",
+        peak_memory()
+    );
 }
 
 /// The most memory that this process has held, where the system tells.
@@ -117,7 +123,10 @@ criterion_group!(benches, residual_blocks, attentions, small_unet);
 
 fn main() {
     benches();
-    let filters: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
+    let filters: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|arg| !arg.starts_with('-'))
+        .collect();
     let named = |filter: &String| "stable-diffusion".contains(filter.as_str());
     if filters.is_empty() || filters.iter().any(named) {
         stable_diffusion_unet();

@@ -127,11 +127,7 @@ fn request_scheduler(
     }
 }
 
-fn request(
-    arguments: &Arguments,
-    prompt: &str,
-    pipeline: &Pipeline,
-) -> wake_ldm::Result<Request> {
+fn request(arguments: &Arguments, prompt: &str, pipeline: &Pipeline) -> wake_ldm::Result<Request> {
     Ok(Request::new(prompt)
         .with_negative(arguments.negative.as_str())
         .with_guidance(arguments.guidance)
@@ -169,7 +165,10 @@ fn generate(
     let images = pipeline.decode(latents);
     images.to_data();
     let decode = begin.elapsed().as_secs_f64();
-    Ok((images, json!({"text": text, "denoise": denoise, "decode": decode})))
+    Ok((
+        images,
+        json!({"text": text, "denoise": denoise, "decode": decode}),
+    ))
 }
 
 fn progress_bar(steps: u64) -> ProgressBar {
@@ -180,10 +179,18 @@ fn progress_bar(steps: u64) -> ProgressBar {
 /// Writes one PNG per image and returns their names.
 fn write_images(images: Tensor<4>, out: &Path) -> Result<Vec<String>, Box<dyn Error>> {
     let [count, channels, rows, columns] = images.dims();
-    let color = if channels == 1 { image::ColorType::L8 } else { image::ColorType::Rgb8 };
+    let color = if channels == 1 {
+        image::ColorType::L8
+    } else {
+        image::ColorType::Rgb8
+    };
     let mut names = Vec::new();
     for (k, bytes) in to_bytes(images).into_iter().enumerate() {
-        let name = if count == 1 { "image.png".to_owned() } else { format!("image-{k}.png") };
+        let name = if count == 1 {
+            "image.png".to_owned()
+        } else {
+            format!("image-{k}.png")
+        };
         image::save_buffer(out.join(&name), &bytes, columns as u32, rows as u32, color)?;
         names.push(name);
     }
@@ -193,7 +200,9 @@ fn write_images(images: Tensor<4>, out: &Path) -> Result<Vec<String>, Box<dyn Er
 /// The device of a name, where its backend is compiled in.
 fn device(name: &str) -> Result<Device, String> {
     let (kind, index) = name.split_once(':').unwrap_or((name, "0"));
-    let index: usize = index.parse().map_err(|_| format!("--device {name}: no number after ':'"))?;
+    let index: usize = index
+        .parse()
+        .map_err(|_| format!("--device {name}: no number after ':'"))?;
     match kind {
         #[cfg(feature = "flex")]
         "flex" if index == 0 => Ok(Device::flex()),
