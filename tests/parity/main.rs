@@ -3,6 +3,7 @@
 //! The reference files are those of the folder named by `WAKE_FIXTURES`, by default the copy in
 //! `tests/fixtures`; every case that their manifests list is run, on every CPU backend compiled in.
 #![cfg(feature = "ldm")]
+#![allow(clippy::unwrap_used, reason = "in tests, a panic is the report")]
 
 mod golden;
 mod models;

@@ -49,7 +49,7 @@ mod tests {
     }
 
     fn numbers(x: Tensor<4>) -> Vec<f32> {
-        x.into_data().try_to_vec().unwrap()
+        x.into_data().try_to_vec().expect("f32 numbers")
     }
 
     #[test]

@@ -94,7 +94,7 @@ impl Scheduler for EulerAncestral {
     }
 }
 
-/// The levels σ_up and σ_down of a step from σ to σ'.
+/// The levels `σ_up` and `σ_down` of a step from σ to σ'.
 fn ancestral_step(sigma: f64, next: f64) -> (f64, f64) {
     let up = (next * next * (sigma * sigma - next * next) / (sigma * sigma))
         .max(0.0)

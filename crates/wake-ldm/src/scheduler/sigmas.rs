@@ -90,7 +90,7 @@ impl SigmaOptions {
     }
 }
 
-/// σᵢ = (σ_max^{1/ρ} + i/(n−1) (σ_min^{1/ρ} − σ_max^{1/ρ}))^ρ with ρ = 7.
+/// `σᵢ = (σ_max^{1/ρ} + i/(n−1) (σ_min^{1/ρ} − σ_max^{1/ρ}))^ρ` with ρ = 7.
 fn karras(first: f64, last: f64, n: usize) -> Vec<f64> {
     const RHO: f64 = 7.0;
     let (first, last) = (first.powf(1.0 / RHO), last.powf(1.0 / RHO));
