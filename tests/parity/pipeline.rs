@@ -22,7 +22,9 @@ fn all_runs() -> Vec<Runs> {
     let entries = std::fs::read_dir(folder()).expect("the folder of fixtures");
     let mut found: Vec<Runs> = entries
         .map(|entry| entry.unwrap().path())
-        .filter(|models| models.join("runs/manifest.json").is_file())
+        .filter(|models| {
+            models.join("model_index.json").is_file() && models.join("runs/manifest.json").is_file()
+        })
         .map(|models| Runs {
             runs: models.join("runs"),
             models,
@@ -34,14 +36,10 @@ fn all_runs() -> Vec<Runs> {
         folder().display()
     );
     let runs = own_folder().join("runs");
-    let models = folder().join(
-        json(&runs.join("manifest.json"))["pipeline"]
-            .as_str()
-            .unwrap(),
-    );
-    if models.is_dir() {
-        found.push(Runs { models, runs });
-    }
+    let manifest = json(&runs.join("manifest.json"));
+    let models = manifest["pipeline"].as_str().expect("the pipeline's folder");
+    let models = own_folder().with_file_name(models);
+    found.push(Runs { models, runs });
     found
 }
 
