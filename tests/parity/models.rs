@@ -12,7 +12,7 @@ use wake_ldm::unet::{UNetConfig, UNetInput};
 use wake_ldm::weights::{self, Layout};
 use wake_ldm::{Error, Mismatch};
 
-use crate::golden::{Golden, devices, difference, folder, json, numbers};
+use crate::golden::{Golden, devices, difference, folder, json, numbers, own_folder};
 
 /// Ten times the noise floor of a model.
 fn allowed(model: &Value, floor: &str) -> f64 {
@@ -401,4 +401,45 @@ fn shards_are_read_through_their_index() {
     assert!(numbers(&sharded.forward(input(0.3))) == numbers(&whole.forward(input(0.3))));
     write(serde_json::json!({"a": "../../etc/passwd"})).unwrap();
     assert!(matches!(load(), Err(Error::InvalidSafetensors { .. })));
+}
+
+/// A low-rank adaptation at full and at half strength, against diffusers with peft.
+#[test]
+fn low_rank_adaptations_are_merged() {
+    let folder = own_folder().join("lora");
+    let file = folder.join("pytorch_lora_weights.safetensors");
+    let golden = Golden::read(&folder.join("case.safetensors"));
+    let models = own_folder().with_file_name("pipeline_a");
+    for (backend, device) in devices() {
+        for (scale, name) in [(1.0, "out"), (0.5, "out_half"), (0.0, "out_plain")] {
+            let (unet, _) = weights::load_unet(&models.join("unet"), &device).unwrap();
+            let unet = weights::merge_lora(unet, Layout::Diffusers, "unet", &file, scale).unwrap();
+            let out = unet.forward(UNetInput {
+                sample: golden.tensor("sample", &device),
+                timesteps: Tensor::full([1], golden.i64s("timestep")[0] as f64, &device),
+                context: golden.tensor("encoder_hidden_states", &device),
+                condition: None,
+            });
+            // Ten times the noise floor of the fixtures' U-Nets; merging rounds once more.
+            expect(
+                &format!("{backend} {name}"),
+                &numbers(&out),
+                &golden.f32s(name),
+                2e-5,
+            );
+        }
+        let (unet, config) = weights::load_unet(&models.join("unet"), &device).unwrap();
+        let absent = weights::merge_lora(unet, Layout::Diffusers, "text_encoder", &file, 1.0);
+        assert!(matches!(absent, Err(Error::WeightsMismatch { .. })));
+        let other = UNetConfig {
+            cross_attention_dim: 5,
+            ..config
+        }
+        .init(&device);
+        let misfit = weights::merge_lora(other, Layout::Diffusers, "unet", &file, 1.0);
+        let Err(Error::WeightsMismatch { mismatch, .. }) = misfit else {
+            panic!("it fitted")
+        };
+        assert!(!mismatch.misshapen.is_empty());
+    }
 }

@@ -37,7 +37,9 @@ fn all_runs() -> Vec<Runs> {
     );
     let runs = own_folder().join("runs");
     let manifest = json(&runs.join("manifest.json"));
-    let models = manifest["pipeline"].as_str().expect("the pipeline's folder");
+    let models = manifest["pipeline"]
+        .as_str()
+        .expect("the pipeline's folder");
     let models = own_folder().with_file_name(models);
     found.push(Runs { models, runs });
     found

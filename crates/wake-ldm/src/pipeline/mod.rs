@@ -11,6 +11,7 @@ mod request;
 mod sampling;
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
@@ -21,6 +22,7 @@ use crate::error::{Result, check_range};
 use crate::scheduler::SchedulerConfig;
 use crate::text::ClipText;
 use crate::unet::UNet;
+use crate::weights::{self, Layout, merge_lora};
 
 use request::invalid;
 pub use request::{Prompts, Request, StartImage};
@@ -100,6 +102,22 @@ impl Pipeline {
             embeddings: Mutex::default(),
             device: device.clone(),
         }
+    }
+
+    /// Merges a low-rank adaptation in diffusers' format into the U-Net, and into the text encoder where
+    /// the file has layers of it; `scale` is how much of it.
+    ///
+    /// # Errors
+    ///
+    /// As [`merge_lora`](crate::weights::merge_lora).
+    pub fn with_lora(mut self, path: &Path, scale: f64) -> Result<Self> {
+        self.unet = merge_lora(self.unet, Layout::Diffusers, "unet", path, scale)?;
+        if weights::has_prefix(path, "text_encoder")? {
+            let text = self.text_encoder;
+            self.text_encoder = merge_lora(text, Layout::ClipText, "text_encoder", path, scale)?;
+            self.embeddings = Mutex::default();
+        }
+        Ok(self)
     }
 
     /// The scheduler of requests that name none.

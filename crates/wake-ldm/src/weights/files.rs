@@ -49,6 +49,30 @@ impl MappedFiles {
         })
     }
 
+    /// Refuses files whose header has an entry that would change the numbers.
+    pub(super) fn refuse_metadata(&self, key: &str) -> Result<()> {
+        for (path, bytes) in &self.files {
+            let header =
+                SafeTensors::read_metadata(bytes).map_err(|error| Error::InvalidSafetensors {
+                    path: path.clone(),
+                    reason: error.to_string(),
+                })?;
+            let entry = header
+                .1
+                .metadata()
+                .as_ref()
+                .and_then(|entries| entries.get(key));
+            if let Some(value) = entry {
+                return Err(Error::Unsupported {
+                    option: key.to_owned(),
+                    value: value.chars().take(80).collect(),
+                    supported: "absent".to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// All tensors under their present names.
     pub(super) fn tensors(&self) -> Result<BTreeMap<String, Stored<'_>>> {
         let mut tensors = BTreeMap::new();

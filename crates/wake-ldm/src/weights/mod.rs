@@ -1,6 +1,7 @@
 //! Weights in the files of diffusers and transformers: reading, checking by name, writing.
 
 mod files;
+mod lora;
 mod names;
 
 use std::collections::BTreeMap;
@@ -19,6 +20,7 @@ use crate::unet::{UNet, UNetConfig};
 use files::{MappedFiles, Stored};
 use names::Path as ModulePath;
 
+pub use lora::merge_lora;
 pub use names::Layout;
 
 /// No configuration file is longer than this.
@@ -105,6 +107,15 @@ pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
         layout,
         stored: &stored,
     }))
+}
+
+/// Whether a file has tensors below a prefix.
+pub(crate) fn has_prefix(path: &Path, prefix: &str) -> Result<bool> {
+    let files = MappedFiles::open(path)?;
+    Ok(files
+        .tensors()?
+        .keys()
+        .any(|name| name.split('.').next() == Some(prefix)))
 }
 
 /// Writes a model's weights as f32 into one safetensors file that diffusers or transformers read.
