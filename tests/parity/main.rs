@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, reason = "in tests, a panic is the report")]
 
 mod golden;
+mod hard_cases;
 mod models;
 mod pipeline;
 mod published;
