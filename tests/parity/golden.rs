@@ -22,8 +22,8 @@ pub(crate) fn own_folder() -> PathBuf {
 
 /// Reads a JSON file.
 pub(crate) fn json(path: &std::path::Path) -> Value {
-    let text = std::fs::read_to_string(path)
-        .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let text =
+        std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
@@ -49,11 +49,19 @@ impl Golden {
             shape: view.shape().to_vec(),
             bytes: view.data().to_vec(),
         };
-        Self { tensors: file.iter().map(|(name, view)| (name.to_owned(), entry(view))).collect() }
+        Self {
+            tensors: file
+                .iter()
+                .map(|(name, view)| (name.to_owned(), entry(view)))
+                .collect(),
+        }
     }
 
     fn get(&self, name: &str, dtype: safetensors::Dtype) -> &Entry {
-        let entry = self.tensors.get(name).unwrap_or_else(|| panic!("no tensor {name}"));
+        let entry = self
+            .tensors
+            .get(name)
+            .unwrap_or_else(|| panic!("no tensor {name}"));
         assert_eq!(entry.dtype, dtype, "{name}");
         entry
     }
@@ -67,7 +75,11 @@ impl Golden {
     }
 
     pub(crate) fn shape(&self, name: &str) -> Vec<usize> {
-        self.tensors.get(name).unwrap_or_else(|| panic!("no tensor {name}")).shape.clone()
+        self.tensors
+            .get(name)
+            .unwrap_or_else(|| panic!("no tensor {name}"))
+            .shape
+            .clone()
     }
 
     /// Numbers of an f32 tensor.
@@ -78,7 +90,10 @@ impl Golden {
     /// Numbers of an i64 tensor.
     pub(crate) fn i64s(&self, name: &str) -> Vec<i64> {
         let bytes = &self.get(name, safetensors::Dtype::I64).bytes;
-        bytes.chunks_exact(8).map(|b| i64::from_le_bytes(b.try_into().unwrap())).collect()
+        bytes
+            .chunks_exact(8)
+            .map(|b| i64::from_le_bytes(b.try_into().unwrap()))
+            .collect()
     }
 
     /// Bytes of a u8 tensor.
@@ -101,7 +116,10 @@ impl Golden {
 }
 
 fn f32s(bytes: &[u8]) -> Vec<f32> {
-    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+    bytes
+        .chunks_exact(4)
+        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect()
 }
 
 /// A tensor of numbers.
@@ -115,7 +133,11 @@ pub(crate) fn tensor<const D: usize>(
 
 /// The numbers of a tensor.
 pub(crate) fn numbers<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {
-    tensor.to_data().convert_dtype(DType::F32).try_to_vec().unwrap()
+    tensor
+        .to_data()
+        .convert_dtype(DType::F32)
+        .try_to_vec()
+        .unwrap()
 }
 
 /// The largest absolute difference, infinite where anything is not a number.
@@ -123,14 +145,19 @@ pub(crate) fn difference(a: &[f32], b: &[f32]) -> f64 {
     assert_eq!(a.len(), b.len());
     let worst = |worst: f64, (a, b): (&f32, &f32)| {
         let difference = f64::from((a - b).abs());
-        if difference.is_nan() { f64::INFINITY } else { worst.max(difference) }
+        if difference.is_nan() {
+            f64::INFINITY
+        } else {
+            worst.max(difference)
+        }
     };
     a.iter().zip(b).fold(0.0, worst)
 }
 
 /// The largest absolute value.
 pub(crate) fn largest(a: &[f32]) -> f64 {
-    a.iter().fold(0.0, |largest, x| f64::from(x.abs()).max(largest))
+    a.iter()
+        .fold(0.0, |largest, x| f64::from(x.abs()).max(largest))
 }
 
 /// Every CPU backend that was compiled.

@@ -22,20 +22,36 @@ fn all_runs() -> Vec<Runs> {
     let entries = std::fs::read_dir(folder()).expect("the folder of fixtures");
     let mut found: Vec<Runs> = entries
         .map(|entry| entry.unwrap().path())
-        .filter(|models| models.join("runs/manifest.json").is_file())
-        .map(|models| Runs { runs: models.join("runs"), models })
+        .filter(|models| {
+            models.join("model_index.json").is_file() && models.join("runs/manifest.json").is_file()
+        })
+        .map(|models| Runs {
+            runs: models.join("runs"),
+            models,
+        })
         .collect();
-    assert!(!found.is_empty(), "no folder with runs/manifest.json in {}", folder().display());
+    assert!(
+        !found.is_empty(),
+        "no folder with runs/manifest.json in {}",
+        folder().display()
+    );
     let runs = own_folder().join("runs");
-    let models = folder().join(json(&runs.join("manifest.json"))["pipeline"].as_str().unwrap());
-    if models.is_dir() {
-        found.push(Runs { models, runs });
-    }
+    let manifest = json(&runs.join("manifest.json"));
+    let models = manifest["pipeline"]
+        .as_str()
+        .expect("the pipeline's folder");
+    let models = own_folder().with_file_name(models);
+    found.push(Runs { models, runs });
     found
 }
 
 fn texts(value: &Value) -> Vec<String> {
-    value.as_array().unwrap().iter().map(|text| text.as_str().unwrap().to_owned()).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|text| text.as_str().unwrap().to_owned())
+        .collect()
 }
 
 /// The scheduler of a run, or the option that is refused.
@@ -61,7 +77,12 @@ fn start(pipeline: &Pipeline, golden: &Golden) -> Tensor<4> {
     let [pixels, noise] = ["pixels", "posterior_noise"].map(|name| golden.tensor(name, device));
     let encoded = pipeline.encode(pixels, noise);
     // Ten times the noise floor of the models' encoders.
-    expect_within("encoded start", &numbers(&encoded), &golden.f32s("start"), 3e-5);
+    expect_within(
+        "encoded start",
+        &numbers(&encoded),
+        &golden.f32s("start"),
+        3e-5,
+    );
     encoded
 }
 
@@ -85,28 +106,50 @@ fn request(run: &Value, config: SchedulerConfig, golden: &Golden, pipeline: &Pip
             other => panic!("the pipeline test does not know the argument {other}"),
         };
     }
-    if golden.has("noise") { request.with_step_noise(golden.tensor("noise", device)) } else { request }
+    if golden.has("noise") {
+        request.with_step_noise(golden.tensor("noise", device))
+    } else {
+        request
+    }
 }
 
 /// |d| ≤ 2e-5 max|latents|, at least 2e-4.
 fn expect_latents(what: &str, ours: &Tensor<4>, expected: &[f32]) {
     let allowed = (2e-5 * largest(expected)).max(2e-4);
     let difference = difference(&numbers(ours), expected);
-    assert!(difference <= allowed, "{what}: differs by {difference:e}, allowed {allowed:e}");
+    assert!(
+        difference <= allowed,
+        "{what}: differs by {difference:e}, allowed {allowed:e}"
+    );
 }
 
 fn expect_within(what: &str, ours: &[f32], expected: &[f32], allowed: f64) {
     let difference = difference(ours, expected);
-    assert!(difference <= allowed, "{what}: differs by {difference:e}, allowed {allowed:e}");
+    assert!(
+        difference <= allowed,
+        "{what}: differs by {difference:e}, allowed {allowed:e}"
+    );
 }
 
 /// Token ids and embeddings of the prompts, where the run has them.
-fn check_text(name: &str, run: &Value, pipeline: &Pipeline, tokenizer: &Tokenizer, golden: &Golden) {
+fn check_text(
+    name: &str,
+    run: &Value,
+    pipeline: &Pipeline,
+    tokenizer: &Tokenizer,
+    golden: &Golden,
+) {
     for (key, ids, embeddings) in [
         ("prompt", "input_ids", "prompt_embeds"),
-        ("negative_prompt", "negative_input_ids", "negative_prompt_embeds"),
+        (
+            "negative_prompt",
+            "negative_input_ids",
+            "negative_prompt_embeds",
+        ),
     ] {
-        let Some(prompts) = run["args"].get(key).map(texts) else { continue };
+        let Some(prompts) = run["args"].get(key).map(texts) else {
+            continue;
+        };
         if golden.has(ids) {
             let ours: Vec<i64> = prompts
                 .iter()
@@ -117,7 +160,12 @@ fn check_text(name: &str, run: &Value, pipeline: &Pipeline, tokenizer: &Tokenize
         if golden.has(embeddings) {
             // Ten times the noise floor of the models' text encoders.
             let ours = numbers(&pipeline.embed(&prompts));
-            expect_within(&format!("{name}, {embeddings}"), &ours, &golden.f32s(embeddings), 2e-5);
+            expect_within(
+                &format!("{name}, {embeddings}"),
+                &ours,
+                &golden.f32s(embeddings),
+                2e-5,
+            );
         }
     }
 }
@@ -127,26 +175,48 @@ fn check_images(name: &str, pipeline: &Pipeline, latents: Tensor<4>, golden: &Go
     let raw = autoencoder.decode(autoencoder.from_latents(latents.clone()));
     let image = pipeline.decode(latents);
     for (what, ours) in [("decoded_raw", &raw), ("image", &image)] {
-        expect_within(&format!("{name}, {what}"), &numbers(ours), &golden.f32s(what), 2e-5);
+        expect_within(
+            &format!("{name}, {what}"),
+            &numbers(ours),
+            &golden.f32s(what),
+            2e-5,
+        );
     }
     let (ours, expected) = (to_bytes(image).concat(), golden.u8s("image_u8_nhwc"));
     assert_eq!(ours.len(), expected.len());
-    let levels = ours.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
+    let levels = ours
+        .iter()
+        .zip(&expected)
+        .map(|(a, b)| a.abs_diff(*b))
+        .max();
     assert!(levels <= Some(1), "{name}: bytes differ by {levels:?}");
 }
 
 fn check_run(name: &str, run: &Value, request: &Request, pipeline: &Pipeline, golden: &Golden) {
-    let mut sampling = pipeline.sample(request).unwrap_or_else(|error| panic!("{name}: {error}"));
-    let timesteps: Vec<f64> =
-        run["timesteps"].as_array().unwrap().iter().map(|t| t.as_f64().unwrap()).collect();
+    let mut sampling = pipeline
+        .sample(request)
+        .unwrap_or_else(|error| panic!("{name}: {error}"));
+    let timesteps: Vec<f64> = run["timesteps"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|t| t.as_f64().unwrap())
+        .collect();
     assert_eq!(sampling.len(), timesteps.len(), "{name}");
     for (i, progress) in sampling.by_ref().enumerate() {
-        assert!((progress.timestep - timesteps[i]).abs() < 1e-4, "{name}, call {i}");
+        assert!(
+            (progress.timestep - timesteps[i]).abs() < 1e-4,
+            "{name}, call {i}"
+        );
         let expected = numbers(&golden.entry::<4>("steps", i, pipeline.device()));
         expect_latents(&format!("{name}, step {i}"), &progress.latents, &expected);
     }
     let latents = sampling.latents();
-    expect_latents(&format!("{name}, at the end"), &latents, &golden.f32s("final_latents"));
+    expect_latents(
+        &format!("{name}, at the end"),
+        &latents,
+        &golden.f32s("final_latents"),
+    );
     check_images(name, pipeline, latents, golden);
 }
 
@@ -171,7 +241,10 @@ fn whole_runs_follow_diffusers_step_by_step() {
                 }
             }
         }
-        println!("{backend}: {ran} runs, {} refused {refused:?}", refused.len());
+        println!(
+            "{backend}: {ran} runs, {} refused {refused:?}",
+            refused.len()
+        );
         assert!(ran > 0, "no run ran");
     }
 }

@@ -13,19 +13,30 @@ use crate::golden::{devices, difference, folder, numbers};
 fn models() -> PathBuf {
     let entries = std::fs::read_dir(folder()).expect("the folder of fixtures");
     let mut folders = entries.map(|entry| entry.unwrap().path());
-    folders.find(|path| path.join("model_index.json").is_file()).expect("a pipeline")
+    folders
+        .find(|path| path.join("model_index.json").is_file())
+        .expect("a pipeline")
 }
 
 fn pipelines() -> Vec<(&'static str, Pipeline)> {
     let models = models();
     let load = |device| Pipeline::load(&models, &device).unwrap();
-    devices().into_iter().map(|(name, device)| (name, load(device))).collect()
+    devices()
+        .into_iter()
+        .map(|(name, device)| (name, load(device)))
+        .collect()
 }
 
 /// A small run that draws noise at every step.
 fn noisy(prompts: impl Into<Prompts>) -> Request {
-    let scheduler = SchedulerConfig::stable_diffusion("ddim").unwrap().with("eta", 1.0).unwrap();
-    Request::new(prompts).with_scheduler(scheduler).with_steps(3).with_size(16, 24)
+    let scheduler = SchedulerConfig::stable_diffusion("ddim")
+        .unwrap()
+        .with("eta", 1.0)
+        .unwrap();
+    Request::new(prompts)
+        .with_scheduler(scheduler)
+        .with_steps(3)
+        .with_size(16, 24)
 }
 
 fn image(x: &Tensor<4>, k: usize) -> Vec<f32> {
@@ -66,7 +77,10 @@ fn prompts_of_a_batch_do_not_mix() {
         let both = noisy(texts.to_vec()).with_seeds(vec![5, 5]);
         let both = pipeline.sample(&both).unwrap().finish();
         for (k, text) in texts.iter().enumerate() {
-            let alone = pipeline.sample(&noisy(text.as_str()).with_seed(5)).unwrap().finish();
+            let alone = pipeline
+                .sample(&noisy(text.as_str()).with_seed(5))
+                .unwrap()
+                .finish();
             assert_eq!(image(&both, k), image(&alone, 0), "{text}");
         }
         let embedded = noisy(pipeline.embed(&texts)).with_seeds(vec![5, 5]);
@@ -81,7 +95,10 @@ fn images_at_once_agree_with_images_one_by_one() {
     for (backend, pipeline) in pipelines() {
         let request = noisy("a ship").with_count(5);
         let one = pipeline.sample(&request).unwrap().finish();
-        let all = pipeline.sample(&request.with_images_at_once(4)).unwrap().finish();
+        let all = pipeline
+            .sample(&request.with_images_at_once(4))
+            .unwrap()
+            .finish();
         let difference = difference(&numbers(&one), &numbers(&all));
         println!("{backend}: four images at once differ by {difference:e}");
         assert!(difference < 2e-4, "{difference}");
@@ -94,7 +111,9 @@ fn images_at_once_agree_with_images_one_by_one() {
 fn without_guidance_the_negative_prompt_has_no_effect() {
     for (_, pipeline) in pipelines() {
         let of = |guidance: f64, negative: &str| {
-            let request = noisy("a ship").with_guidance(guidance).with_negative(negative);
+            let request = noisy("a ship")
+                .with_guidance(guidance)
+                .with_negative(negative);
             numbers(&pipeline.sample(&request).unwrap().finish())
         };
         let plain = of(1.0, "");
@@ -114,8 +133,15 @@ fn a_run_can_be_stopped_and_tells_how_far_it_is() {
         let request = noisy("a ship");
         let mut sampling = pipeline.sample(&request).unwrap();
         assert_eq!(sampling.len(), 3);
-        let done: Vec<_> = sampling.by_ref().take(2).map(|p| (p.done, p.of, p.latents)).collect();
-        assert_eq!(done.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>(), [(1, 3), (2, 3)]);
+        let done: Vec<_> = sampling
+            .by_ref()
+            .take(2)
+            .map(|p| (p.done, p.of, p.latents))
+            .collect();
+        assert_eq!(
+            done.iter().map(|p| (p.0, p.1)).collect::<Vec<_>>(),
+            [(1, 3), (2, 3)]
+        );
         assert_eq!(sampling.len(), 1);
         assert_eq!(numbers(&sampling.latents()), numbers(&done[1].2));
         let whole = numbers(&pipeline.sample(&request).unwrap().finish());
@@ -126,7 +152,12 @@ fn a_run_can_be_stopped_and_tells_how_far_it_is() {
 #[test]
 fn hard_prompts_give_finite_images() {
     let long = "a ship in the sea ".repeat(10_000 / 18 + 1);
-    let prompts = ["", &long[..10_000], "Ein Schiff · 船と航跡 · кильватер 🚢", "\0\u{202e}<|endoftext|>"];
+    let prompts = [
+        "",
+        &long[..10_000],
+        "Ein Schiff · 船と航跡 · кильватер 🚢",
+        "\0\u{202e}<|endoftext|>",
+    ];
     for (_, pipeline) in pipelines() {
         for prompt in prompts {
             let request = noisy(prompt).with_steps(1).with_negative(prompt);
@@ -148,7 +179,10 @@ fn a_start_image_steers_the_result() {
             let sampling = pipeline.sample(&request).unwrap();
             (sampling.len(), numbers(&sampling.latents()))
         };
-        let zero = pipeline.sample(&noisy("a ship").with_size(16, 24)).unwrap().latents();
+        let zero = pipeline
+            .sample(&noisy("a ship").with_size(16, 24))
+            .unwrap()
+            .latents();
         let ((few, near), (many, far)) = (at(0.1), at(1.0));
         assert!(few < many);
         let noise = numbers(&zero);
@@ -159,7 +193,12 @@ fn a_start_image_steers_the_result() {
             let dot: f64 = x.iter().zip(&noise).map(|(a, b)| f64::from(a * b)).sum();
             dot / (energy(x) * energy(&noise)).sqrt()
         };
-        assert!(share(&near) < share(&far), "{} {}", share(&near), share(&far));
+        assert!(
+            share(&near) < share(&far),
+            "{} {}",
+            share(&near),
+            share(&far)
+        );
     }
 }
 
@@ -181,17 +220,41 @@ fn requests_that_make_no_sense_are_refused_by_name() {
         ("count", noisy("a").with_count(0)),
         ("images_at_once", noisy("a").with_images_at_once(0)),
         ("number of seeds", noisy("a").with_seeds(vec![1, 2])),
-        ("number of negative prompts", noisy("a").with_negative(three)),
+        (
+            "number of negative prompts",
+            noisy("a").with_negative(three),
+        ),
         ("rows", noisy("a").with_size(0, 16)),
         ("columns", noisy("a").with_size(16, 17)),
         ("rows", noisy("a").with_size(usize::MAX, 16)),
-        ("shape of latents", noisy("a").with_latents(zeros([1, 3, 8, 12]))),
-        ("strength", noisy("a").with_start(start([1, 3, 16, 24]), 0.0)),
-        ("shape of the start image", noisy("a").with_start(start([1, 1, 16, 24]), 1.0)),
-        ("shape of the start image", noisy("a").with_start(start([1, 3, 16, 16]), 1.0)),
-        ("number of start images", noisy("a").with_start(start([3, 3, 16, 24]), 1.0)),
-        ("width of embeddings", noisy(Tensor::<3>::zeros([1, 77, 5], &device))),
-        ("shape of condition", noisy("a").with_condition(Tensor::zeros([1, 6], &device))),
+        (
+            "shape of latents",
+            noisy("a").with_latents(zeros([1, 3, 8, 12])),
+        ),
+        (
+            "strength",
+            noisy("a").with_start(start([1, 3, 16, 24]), 0.0),
+        ),
+        (
+            "shape of the start image",
+            noisy("a").with_start(start([1, 1, 16, 24]), 1.0),
+        ),
+        (
+            "shape of the start image",
+            noisy("a").with_start(start([1, 3, 16, 16]), 1.0),
+        ),
+        (
+            "number of start images",
+            noisy("a").with_start(start([3, 3, 16, 24]), 1.0),
+        ),
+        (
+            "width of embeddings",
+            noisy(Tensor::<3>::zeros([1, 77, 5], &device)),
+        ),
+        (
+            "shape of condition",
+            noisy("a").with_condition(Tensor::zeros([1, 6], &device)),
+        ),
     ] {
         let error = pipeline.sample(&request).expect_err(name);
         let named = match &error {
@@ -200,5 +263,13 @@ fn requests_that_make_no_sense_are_refused_by_name() {
             other => panic!("{name}: {other}"),
         };
         assert_eq!(named, name, "{error}");
+    }
+}
+
+#[test]
+#[cfg(feature = "flex")]
+fn every_compiled_device_passes_the_self_check() {
+    for (backend, device) in devices() {
+        wake_ldm::self_check(&device).unwrap_or_else(|error| panic!("{backend}: {error}"));
     }
 }

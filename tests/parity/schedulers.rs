@@ -57,7 +57,12 @@ impl Case<'_> {
     fn config(&self, key: &str) -> Result<SchedulerConfig, String> {
         let mut options = self.case[key].as_object().unwrap().clone();
         options.insert("_class_name".to_owned(), self.case["class"].clone());
-        options.extend(self.case["step_kwargs"].as_object().cloned().unwrap_or_default());
+        options.extend(
+            self.case["step_kwargs"]
+                .as_object()
+                .cloned()
+                .unwrap_or_default(),
+        );
         let text = Value::Object(options).to_string();
         match SchedulerConfig::from_json(&text, self.name.as_ref()) {
             Ok(config) => Ok(config),
@@ -67,8 +72,10 @@ impl Case<'_> {
     }
 
     fn expect_close(&self, what: &str, run: &Value, ours: &Tensor<4>, expected: &[f32]) {
-        let (difference, allowed) =
-            (difference(&numbers(ours), expected), tolerance(run, expected));
+        let (difference, allowed) = (
+            difference(&numbers(ours), expected),
+            tolerance(run, expected),
+        );
         assert!(
             difference <= allowed,
             "{}, {what}: differs by {difference:e}, allowed {allowed:e}",
@@ -77,21 +84,37 @@ impl Case<'_> {
     }
 
     fn check_schedule(&self, scheduler: &dyn Scheduler, run: &Value, path: &str) {
-        let expected: Vec<f64> =
-            run["timesteps"].as_array().unwrap().iter().map(|t| t.as_f64().unwrap()).collect();
+        let expected: Vec<f64> = run["timesteps"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|t| t.as_f64().unwrap())
+            .collect();
         assert_eq!(scheduler.timesteps().len(), expected.len(), "{path}");
         for (ours, expected) in scheduler.timesteps().iter().zip(&expected) {
             // Whole steps agree exactly; fractions come from f32 logarithms.
-            assert!((ours - expected).abs() <= 1e-6 * expected.abs().max(1.0), "{path}: {ours} {expected}");
+            assert!(
+                (ours - expected).abs() <= 1e-6 * expected.abs().max(1.0),
+                "{path}: {ours} {expected}"
+            );
         }
         let sigma = run["init_noise_sigma"].as_f64().unwrap();
-        assert!((scheduler.init_noise_sigma() / sigma - 1.0).abs() < 1e-6, "{path}");
-        let draws: Vec<usize> =
-            (0..expected.len()).filter(|&i| scheduler.needs_noise(i)).collect();
+        assert!(
+            (scheduler.init_noise_sigma() / sigma - 1.0).abs() < 1e-6,
+            "{path}"
+        );
+        let draws: Vec<usize> = (0..expected.len())
+            .filter(|&i| scheduler.needs_noise(i))
+            .collect();
         let used: Vec<usize> = match &run["noise_used_at_steps"] {
             Value::String(word) if word == "all" => (0..expected.len()).collect(),
             Value::String(_) => vec![],
-            list => list.as_array().unwrap().iter().map(|i| i.as_u64().unwrap() as usize).collect(),
+            list => list
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|i| i.as_u64().unwrap() as usize)
+                .collect(),
         };
         assert_eq!(draws, used, "{path}");
     }
@@ -101,11 +124,17 @@ impl Case<'_> {
         if !self.golden.has(&name) {
             return;
         }
-        for (i, &sigma) in self.golden.f32s(&name)[..scheduler.timesteps().len()].iter().enumerate() {
+        for (i, &sigma) in self.golden.f32s(&name)[..scheduler.timesteps().len()]
+            .iter()
+            .enumerate()
+        {
             let NoiseLevel { signal, noise } = scheduler.noise_level(i);
             let straight = (signal + noise - 1.0).abs() < 1e-9;
             let ours = if straight { noise } else { noise / signal };
-            assert!((ours / f64::from(sigma) - 1.0).abs() < 2e-6, "{path}: {ours} {sigma}");
+            assert!(
+                (ours / f64::from(sigma) - 1.0).abs() < 2e-6,
+                "{path}: {ours} {sigma}"
+            );
         }
     }
 
@@ -128,12 +157,23 @@ impl Case<'_> {
         for (index, &timestep) in timesteps.iter().enumerate() {
             let input = scheduler.scale_model_input(sample.clone(), index);
             let prediction = model(self.meta, &input, timestep);
-            let noise =
-                scheduler.needs_noise(index).then(|| self.golden.entry("noise", index, self.device));
-            let output = scheduler.step(StepInput { index, prediction, sample, noise });
+            let noise = scheduler
+                .needs_noise(index)
+                .then(|| self.golden.entry("noise", index, self.device));
+            let output = scheduler.step(StepInput {
+                index,
+                prediction,
+                sample,
+                noise,
+            });
             sample = output.sample;
             let state = numbers(&self.golden.entry::<4>(&trajectory, index + 1, self.device));
-            self.expect_close(&format!("{steps} steps, state {}", index + 1), run, &sample, &state);
+            self.expect_close(
+                &format!("{steps} steps, state {}", index + 1),
+                run,
+                &sample,
+                &state,
+            );
             if self.golden.has(&denoised) {
                 let clean = numbers(&self.golden.entry::<4>(&denoised, index, self.device));
                 let what = format!("{steps} steps, clean image {index}");
@@ -145,11 +185,17 @@ impl Case<'_> {
     /// Noise added to clean images, and velocities, at the listed steps.
     fn check_noising(&self, config: &SchedulerConfig) {
         let listed = self.case["add_noise_timesteps"].as_array().unwrap();
-        let after = self.case.get("add_noise_after_set_timesteps").and_then(Value::as_u64);
+        let after = self
+            .case
+            .get("add_noise_after_set_timesteps")
+            .and_then(Value::as_u64);
         let scheduler = after.map(|steps| config.scheduler(steps as usize).unwrap());
         let level = |t: f64| match &scheduler {
             Some(scheduler) => {
-                let index = scheduler.timesteps().iter().position(|&s| (s - t).abs() < 1e-3);
+                let index = scheduler
+                    .timesteps()
+                    .iter()
+                    .position(|&s| (s - t).abs() < 1e-3);
                 scheduler.noise_level(index.unwrap())
             }
             None => config.noise_schedule().unwrap().noise_level(t as usize),
@@ -172,10 +218,15 @@ impl Case<'_> {
 
     /// The schedule itself is one of the stored ones, to the last bits of f32.
     fn check_schedule_table(&self, config: &SchedulerConfig, tables: &[(Vec<f32>, Vec<f32>)]) {
-        let Some(schedule) = config.noise_schedule() else { return };
+        let Some(schedule) = config.noise_schedule() else {
+            return;
+        };
         let same = |ours: &[f32], stored: &[f32], ulps: f32| {
             ours.len() == stored.len()
-                && ours.iter().zip(stored).all(|(a, b)| (a - b).abs() <= ulps * f32::EPSILON * b.abs())
+                && ours
+                    .iter()
+                    .zip(stored)
+                    .all(|(a, b)| (a - b).abs() <= ulps * f32::EPSILON * b.abs())
         };
         let found = tables.iter().any(|(betas, alphas)| {
             let stretched = alphas[alphas.len() - 1] < 1e-7;
@@ -188,14 +239,21 @@ impl Case<'_> {
             close && (stretched || same(schedule.betas(), betas, 4.0))
         });
         let ends = [0, schedule.steps() - 1].map(|t| schedule.alphas_cumprod()[t]);
-        assert!(found || tables.is_empty(), "{}: no stored schedule has the ends {ends:?}", self.name);
+        assert!(
+            found || tables.is_empty(),
+            "{}: no stored schedule has the ends {ends:?}",
+            self.name
+        );
     }
 }
 
 /// The stored schedules: β and ᾱ, and ᾱ once more without terminal signal.
 fn stored_schedules(golden: &Golden) -> Vec<(Vec<f32>, Vec<f32>)> {
     let mut tables = Vec::new();
-    for name in golden.names().filter_map(|name| name.strip_prefix("betas/")) {
+    for name in golden
+        .names()
+        .filter_map(|name| name.strip_prefix("betas/"))
+    {
         let betas = golden.f32s(&format!("betas/{name}"));
         for kind in ["alphas_cumprod", "alphas_cumprod_zsnr"] {
             let alphas = format!("{kind}/{name}");
@@ -219,11 +277,20 @@ fn schedulers_follow_diffusers_state_by_state() {
         let (mut ran, mut refused) = (0, Vec::new());
         for (name, case) in cases {
             let meta = &manifest["meta"];
-            let case = Case { name, case, meta, golden: &golden, device: &device };
+            let case = Case {
+                name,
+                case,
+                meta,
+                golden: &golden,
+                device: &device,
+            };
             match case.config("config") {
                 Ok(config) => {
                     let full = case.config("full_config");
-                    assert!(full.is_ok(), "{name}: spelling out defaults is refused: {full:?}");
+                    assert!(
+                        full.is_ok(),
+                        "{name}: spelling out defaults is refused: {full:?}"
+                    );
                     case.check_schedule_table(&config, &tables);
                     for (steps, run) in case.case["runs"].as_object().unwrap() {
                         case.check_run(&config, steps, run);
@@ -233,12 +300,19 @@ fn schedulers_follow_diffusers_state_by_state() {
                 }
                 Err(option) => {
                     let name = option.rsplit(' ').next().unwrap_or_default().to_owned();
-                    assert!(REFUSABLE.contains(&name.as_str()), "{}: {option} refused", case.name);
+                    assert!(
+                        REFUSABLE.contains(&name.as_str()),
+                        "{}: {option} refused",
+                        case.name
+                    );
                     refused.push(format!("{} ({name})", case.name));
                 }
             }
         }
-        println!("{backend}: {ran} scheduler cases ran, {} refused {refused:?}", refused.len());
+        println!(
+            "{backend}: {ran} scheduler cases ran, {} refused {refused:?}",
+            refused.len()
+        );
         assert!(ran > 0, "no scheduler case ran");
     }
 }

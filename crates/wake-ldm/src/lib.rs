@@ -1,1 +1,23 @@
-//! wake-ldm
+#![doc = include_str!("../README.md")]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod error;
+mod options;
+
+pub mod nn;
+pub mod noise;
+
+pub mod autoencoder;
+pub mod text;
+pub mod unet;
+
+pub mod scheduler;
+pub mod weights;
+
+pub mod pipeline;
+#[cfg(feature = "flex")]
+mod self_check;
+
+pub use error::{Error, Mismatch, Misshapen, Result};
+#[cfg(feature = "flex")]
+pub use self_check::self_check;

@@ -61,7 +61,10 @@ pub fn normal_batch(
     device: &Device,
 ) -> Tensor<4> {
     let length = channels * rows * columns;
-    let numbers: Vec<f32> = sources.iter().flat_map(|source| source.normal(stream, length)).collect();
+    let numbers: Vec<f32> = sources
+        .iter()
+        .flat_map(|source| source.normal(stream, length))
+        .collect();
     let data = TensorData::new(numbers, [sources.len(), channels, rows, columns]);
     Tensor::from_data(data, device)
 }
@@ -83,8 +86,16 @@ fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for _ in 0..10 {
         let [high0, low0] = product(0xD2511F53, counter[0]);
         let [high1, low1] = product(0xCD9E8D57, counter[2]);
-        counter = [high1 ^ counter[1] ^ key[0], low1, high0 ^ counter[3] ^ key[1], low0];
-        key = [key[0].wrapping_add(0x9E3779B9), key[1].wrapping_add(0xBB67AE85)];
+        counter = [
+            high1 ^ counter[1] ^ key[0],
+            low1,
+            high0 ^ counter[3] ^ key[1],
+            low0,
+        ];
+        key = [
+            key[0].wrapping_add(0x9E3779B9),
+            key[1].wrapping_add(0xBB67AE85),
+        ];
     }
     counter
 }
@@ -104,8 +115,16 @@ mod tests {
     fn philox_gives_the_known_answers() {
         let all = u32::MAX;
         for (counter, key, answer) in [
-            ([0; 4], [0; 2], [0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8]),
-            ([all; 4], [all; 2], [0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd]),
+            (
+                [0; 4],
+                [0; 2],
+                [0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8],
+            ),
+            (
+                [all; 4],
+                [all; 2],
+                [0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd],
+            ),
             (
                 [0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344],
                 [0xa4093822, 0x299f31d0],
@@ -121,7 +140,11 @@ mod tests {
         let n = 400_000;
         let numbers = NoiseSource::new(7).normal(INITIAL_STREAM, n);
         let moment = |power: i32| {
-            numbers.iter().map(|&x| f64::from(x).powi(power)).sum::<f64>() / n as f64
+            numbers
+                .iter()
+                .map(|&x| f64::from(x).powi(power))
+                .sum::<f64>()
+                / n as f64
         };
         // Five standard errors of each moment: √(E x^2p − (E x^p)²)/√n.
         let allowed = |deviation: f64| 5.0 * deviation / (n as f64).sqrt();
@@ -129,17 +152,27 @@ mod tests {
         assert!((moment(2) - 1.0).abs() < allowed(2.0_f64.sqrt()));
         assert!(moment(3).abs() < allowed(15.0_f64.sqrt()));
         assert!((moment(4) - 3.0).abs() < allowed(96.0_f64.sqrt()));
-        let neighbours =
-            numbers.windows(2).map(|pair| f64::from(pair[0] * pair[1])).sum::<f64>() / n as f64;
+        let neighbours = numbers
+            .windows(2)
+            .map(|pair| f64::from(pair[0] * pair[1]))
+            .sum::<f64>()
+            / n as f64;
         assert!(neighbours.abs() < allowed(1.0));
         assert!(numbers.iter().all(|x| x.is_finite()));
     }
 
     #[test]
+    #[allow(
+        clippy::float_cmp,
+        reason = "the same or other bits are what is tested"
+    )]
     fn seeds_and_streams_differ_and_lengths_do_not_matter() {
         let long = NoiseSource::new(3).normal(5, 1003);
         assert_eq!(NoiseSource::new(3).normal(5, 10), long[..10]);
-        for other in [NoiseSource::new(3).normal(6, 10), NoiseSource::new(4).normal(5, 10)] {
+        for other in [
+            NoiseSource::new(3).normal(6, 10),
+            NoiseSource::new(4).normal(5, 10),
+        ] {
             assert!(other.iter().zip(&long).all(|(a, b)| a != b));
         }
         let high_bits = NoiseSource::new(3 + (1 << 32)).normal(5, 10);

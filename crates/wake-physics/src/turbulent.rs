@@ -14,8 +14,8 @@ use crate::kelvin::fade;
 use crate::raster::{Field, Raster};
 use crate::track::Track;
 
-/// Damping on the centreline at the stern, D(0) = 0.8, that is −7 dB: chosen.
-pub const STERN_DAMPING: f64 = 0.8;
+/// Damping on the centreline at the stern, D(0) = 0.6, that is −4 dB: chosen.
+pub const STERN_DAMPING: f64 = 0.6;
 
 /// Time in which the damping falls to 1/e, 1000 s: chosen, so that 5 % is left 28 km behind a ship of 10 m/s.
 /// Dark centrelines have been seen up to 41 km (Shemdin 1990, J. Geophys. Res. 95).
@@ -43,7 +43,7 @@ pub fn width(beam: f64, distance: f64) -> f64 {
 /// Damping D of the Bragg spectrum on the centreline [1].
 ///
 /// ```text
-/// D(d) = 0.8 exp(−d/(U · 1000 s))
+/// D(d) = 0.6 exp(−d/(U · 1000 s))
 /// ```
 ///
 /// - `speed` U [m/s]; 0 behind a ship at rest

@@ -16,7 +16,11 @@ impl Guidance {
         let negative = both.clone().narrow(0, 0, images);
         let prompt = both.narrow(0, images, images);
         let guided = negative.clone() + (prompt.clone() - negative) * self.scale;
-        if self.rescale > 0.0 { self.rescaled(guided, prompt) } else { guided }
+        if self.rescale > 0.0 {
+            self.rescaled(guided, prompt)
+        } else {
+            guided
+        }
     }
 
     /// Mixes in the same with the standard deviation that it has without guidance.
@@ -45,13 +49,21 @@ mod tests {
     }
 
     fn numbers(x: Tensor<4>) -> Vec<f32> {
-        x.into_data().try_to_vec().unwrap()
+        x.into_data().try_to_vec().expect("f32 numbers")
     }
 
     #[test]
     fn scale_one_is_the_prompt_alone_and_zero_the_negative() {
         let both = batch([1, 2]);
-        let of = |scale| numbers(Guidance { scale, rescale: 0.0 }.combine(both.clone()));
+        let of = |scale| {
+            numbers(
+                Guidance {
+                    scale,
+                    rescale: 0.0,
+                }
+                .combine(both.clone()),
+            )
+        };
         let halves = [1, 0].map(|i| numbers(both.clone().narrow(0, i, 1)));
         for (ours, expected) in [of(1.0), of(0.0)].iter().zip(&halves) {
             for (a, b) in ours.iter().zip(expected) {
@@ -65,7 +77,11 @@ mod tests {
     fn full_rescaling_restores_the_deviation() {
         let both = batch([3, 4]);
         let prompt = both.clone().narrow(0, 1, 1);
-        let guided = Guidance { scale: 9.0, rescale: 1.0 }.combine(both);
+        let guided = Guidance {
+            scale: 9.0,
+            rescale: 1.0,
+        }
+        .combine(both);
         let [a, b] = [guided, prompt].map(|x| numbers(deviation(x))[0]);
         assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
     }
@@ -73,7 +89,11 @@ mod tests {
     #[test]
     fn constant_predictions_stay_finite() {
         let both = Tensor::<4>::zeros([2, 1, 2, 2], &Device::flex());
-        let guided = Guidance { scale: 30.0, rescale: 0.7 }.combine(both);
+        let guided = Guidance {
+            scale: 30.0,
+            rescale: 0.7,
+        }
+        .combine(both);
         assert!(numbers(guided).iter().all(|x| x.is_finite()));
     }
 }

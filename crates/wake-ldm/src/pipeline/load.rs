@@ -6,11 +6,12 @@ use burn::tensor::Device;
 use wake_text::{TOKENS, Tokenizer};
 
 use super::{Pipeline, PipelineParts};
-use crate::autoencoder::AutoencoderKlConfig;
-use crate::error::{Result, check_range};
+use crate::error::{Error, Result, check_range};
 use crate::scheduler::SchedulerConfig;
-use crate::text::ClipTextConfig;
-use crate::unet::UNetConfig;
+use crate::weights::{load_autoencoder, load_text_encoder, load_unet};
+
+/// CLIP's vocabulary: the largest id that its tokenizer gives, and one.
+const CLIP_VOCABULARY: usize = 49408;
 
 impl Pipeline {
     /// Reads a folder with `text_encoder`, `unet`, `vae`, `scheduler` and (else CLIP's own)
@@ -18,27 +19,69 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// [`Error`](crate::Error) with the file, option or tensors that do not fit.
+    /// [`Error`] with the file, option or tensors that do not fit, or with two models that do not fit
+    /// each other.
     pub fn load(folder: &Path, device: &Device) -> Result<Self> {
-        let text = ClipTextConfig::read(&folder.join("text_encoder/config.json"))?;
-        let unet = UNetConfig::read(&folder.join("unet/config.json"))?;
-        let autoencoder = AutoencoderKlConfig::read(&folder.join("vae/config.json"))?;
-        check_range("max_position_embeddings", text.max_tokens as f64, TOKENS as f64, 1e6)?;
-        Ok(Self::new(
-            PipelineParts {
-                tokenizer: tokenizer(&folder.join("tokenizer"))?,
-                text_encoder: crate::weights::load(text.init(device), "text", &folder.join("text_encoder/model.safetensors"))?,
-                latent_size: unet.sample_size,
-                unet: crate::weights::load(unet.init(device), "", &folder.join("unet/diffusion_pytorch_model.safetensors"))?,
-                autoencoder: crate::weights::load(autoencoder.init(device), "", &folder.join("vae/diffusion_pytorch_model.safetensors"))?,
-                scheduler: SchedulerConfig::read(&folder.join("scheduler/scheduler_config.json"))?,
-            },
-            device,
-        ))
+        let tokenizer = tokenizer(&folder.join("tokenizer"))?;
+        let scheduler = SchedulerConfig::read(&folder.join("scheduler/scheduler_config.json"))?;
+        let (text_encoder, text) = load_text_encoder(&folder.join("text_encoder"), device)?;
+        check_range(
+            "max_position_embeddings",
+            text.max_tokens as f64,
+            TOKENS as f64,
+            1e6,
+        )?;
+        if tokenizer.is_none() {
+            check_range(
+                "vocab_size",
+                text.vocab_size as f64,
+                CLIP_VOCABULARY as f64,
+                1e9,
+            )?;
+        }
+        let (unet, config) = load_unet(&folder.join("unet"), device)?;
+        must_agree(
+            "cross_attention_dim",
+            config.cross_attention_dim,
+            text.hidden_size,
+        )?;
+        let (autoencoder, _) = load_autoencoder(&folder.join("vae"), device)?;
+        for (name, channels) in [
+            ("in_channels", config.in_channels),
+            ("out_channels", config.out_channels),
+        ] {
+            must_agree(name, channels, autoencoder.latent_channels())?;
+        }
+        let latent_size = config.sample_size;
+        let parts = PipelineParts {
+            tokenizer,
+            text_encoder,
+            unet,
+            autoencoder,
+            scheduler,
+            latent_size,
+        };
+        Ok(Self::new(parts, device))
     }
 }
 
 /// The folder's tokenizer, or CLIP's where there is none.
 fn tokenizer(folder: &Path) -> Result<Option<Tokenizer>> {
-    if folder.is_dir() { Ok(Some(Tokenizer::from_folder(folder)?)) } else { Ok(None) }
+    if folder.is_dir() {
+        Ok(Some(Tokenizer::from_folder(folder)?))
+    } else {
+        Ok(None)
+    }
+}
+
+/// The error for a U-Net that does not fit the other models.
+fn must_agree(option: &str, value: usize, expected: usize) -> Result<()> {
+    if value == expected {
+        return Ok(());
+    }
+    Err(Error::InvalidOption {
+        option: format!("{option} of the U-Net"),
+        value: value.to_string(),
+        expected: format!("{expected}, as the other models have it"),
+    })
 }

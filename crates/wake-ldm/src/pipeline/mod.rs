@@ -11,6 +11,7 @@ mod request;
 mod sampling;
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
@@ -21,10 +22,11 @@ use crate::error::{Result, check_range};
 use crate::scheduler::SchedulerConfig;
 use crate::text::ClipText;
 use crate::unet::UNet;
+use crate::weights::{self, Layout, merge_lora};
 
+use request::invalid;
 pub use request::{Prompts, Request, StartImage};
 pub use sampling::{Progress, Sampling};
-use request::invalid;
 
 /// How many prompts' embeddings are kept.
 const CACHED_PROMPTS: usize = 256;
@@ -82,8 +84,14 @@ pub struct Pipeline {
 impl Pipeline {
     /// A pipeline of models that lie on `device`.
     pub fn new(parts: PipelineParts, device: &Device) -> Self {
-        let PipelineParts { tokenizer, text_encoder, unet, autoencoder, scheduler, latent_size } =
-            parts;
+        let PipelineParts {
+            tokenizer,
+            text_encoder,
+            unet,
+            autoencoder,
+            scheduler,
+            latent_size,
+        } = parts;
         Self {
             tokenizer,
             text_encoder,
@@ -94,6 +102,22 @@ impl Pipeline {
             embeddings: Mutex::default(),
             device: device.clone(),
         }
+    }
+
+    /// Merges a low-rank adaptation in diffusers' format into the U-Net, and into the text encoder where
+    /// the file has layers of it; `scale` is how much of it.
+    ///
+    /// # Errors
+    ///
+    /// As [`merge_lora`](crate::weights::merge_lora).
+    pub fn with_lora(mut self, path: &Path, scale: f64) -> Result<Self> {
+        self.unet = merge_lora(self.unet, Layout::Diffusers, "unet", path, scale)?;
+        if weights::has_prefix(path, "text_encoder")? {
+            let text = self.text_encoder;
+            self.text_encoder = merge_lora(text, Layout::ClipText, "text_encoder", path, scale)?;
+            self.embeddings = Mutex::default();
+        }
+        Ok(self)
     }
 
     /// The scheduler of requests that name none.
@@ -121,18 +145,33 @@ impl Pipeline {
     ///
     /// When there is no prompt.
     pub fn embed<S: AsRef<str>>(&self, prompts: &[S]) -> Tensor<3> {
-        Tensor::cat(prompts.iter().map(|prompt| self.embed_one(prompt.as_ref())).collect(), 0)
+        Tensor::cat(
+            prompts
+                .iter()
+                .map(|prompt| self.embed_one(prompt.as_ref()))
+                .collect(),
+            0,
+        )
     }
 
     fn embed_one(&self, prompt: &str) -> Tensor<3> {
-        let mut cache = self.embeddings.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cache = self
+            .embeddings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = cache.get(prompt) {
             return known.clone();
         }
         let tokenizer = self.tokenizer.as_ref().unwrap_or_else(|| Tokenizer::clip());
-        let ids: Vec<i32> = tokenizer.encode(prompt).ids.iter().map(|&id| id as i32).collect();
+        let ids: Vec<i32> = tokenizer
+            .encode(prompt)
+            .ids
+            .iter()
+            .map(|&id| id as i32)
+            .collect();
         let length = ids.len();
-        let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(ids, [1, length]), &self.device);
+        let ids: Tensor<2, Int> =
+            Tensor::from_data(TensorData::new(ids, [1, length]), &self.device);
         let embedding = self.text_encoder.forward(ids).last_hidden_state;
         if cache.len() >= CACHED_PROMPTS {
             cache.clear();
@@ -181,10 +220,13 @@ impl Pipeline {
     pub fn encode(&self, pixels: Tensor<4>, noise: Tensor<4>) -> Tensor<4> {
         let images = pixels.dims()[0];
         let one = |k: usize| {
-            let posterior = self.autoencoder.encode(pixels.clone().narrow(0, k, 1) * 2.0 - 1.0);
+            let posterior = self
+                .autoencoder
+                .encode(pixels.clone().narrow(0, k, 1) * 2.0 - 1.0);
             posterior.sample(noise.clone().narrow(0, k, 1))
         };
-        self.autoencoder.to_latents(Tensor::cat((0..images).map(one).collect(), 0))
+        self.autoencoder
+            .to_latents(Tensor::cat((0..images).map(one).collect(), 0))
     }
 
     /// Channels, rows and columns of the latent images of a request.
@@ -204,7 +246,11 @@ impl Pipeline {
                 return Err(invalid(name, size, format!("a multiple of {down}")));
             }
         }
-        Ok([self.autoencoder.latent_channels(), rows / down, columns / down])
+        Ok([
+            self.autoencoder.latent_channels(),
+            rows / down,
+            columns / down,
+        ])
     }
 
     /// Embeddings of prompts, one per image.
@@ -240,7 +286,11 @@ impl Pipeline {
                     Some(channels) => format!("{:?}", [request.images(), channels]),
                     None => "none, because this U-Net has no condition vector".to_owned(),
                 };
-                Err(invalid("shape of condition", format!("{found:?}"), expected))
+                Err(invalid(
+                    "shape of condition",
+                    format!("{found:?}"),
+                    expected,
+                ))
             }
         }
     }
@@ -250,11 +300,19 @@ impl Pipeline {
         let [_, channels, pixel_rows, pixel_columns] = pixels.dims();
         let down = self.autoencoder.downsampling();
         let found = [channels, pixel_rows, pixel_columns];
-        let expected = [self.autoencoder.image_channels(), rows * down, columns * down];
+        let expected = [
+            self.autoencoder.image_channels(),
+            rows * down,
+            columns * down,
+        ];
         if found == expected {
             return Ok(());
         }
-        Err(invalid("shape of the start image", format!("{found:?}"), format!("{expected:?}")))
+        Err(invalid(
+            "shape of the start image",
+            format!("{found:?}"),
+            format!("{expected:?}"),
+        ))
     }
 }
 
@@ -270,11 +328,16 @@ fn last_two(x: &Tensor<4>) -> [usize; 2] {
 /// `[images, channels, rows, columns]` to `rows · columns · channels` bytes each.
 pub fn to_bytes(images: Tensor<4>) -> Vec<Vec<u8>> {
     let [count, channels, rows, columns] = images.dims();
-    let interleaved = images.permute([0, 2, 3, 1]).reshape([count * rows * columns * channels]);
+    let interleaved = images
+        .permute([0, 2, 3, 1])
+        .reshape([count * rows * columns * channels]);
     let bytes: Vec<u8> = interleaved
         .into_data()
         .iter::<f32>()
         .map(|x| (x * 255.0).round_ties_even().clamp(0.0, 255.0) as u8)
         .collect();
-    bytes.chunks(rows * columns * channels).map(<[u8]>::to_vec).collect()
+    bytes
+        .chunks(rows * columns * channels)
+        .map(<[u8]>::to_vec)
+        .collect()
 }

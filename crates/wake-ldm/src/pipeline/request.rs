@@ -8,6 +8,10 @@ use crate::scheduler::SchedulerConfig;
 
 /// Words, or what the text encoder made of them.
 #[derive(Debug, Clone)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "a request has two of these, not thousands"
+)]
 pub enum Prompts {
     /// One text per image (times [`Request::count`]).
     Texts(Vec<String>),

@@ -99,7 +99,9 @@ impl<'a> Sampling<'a> {
 
     /// One prediction per image; a few images at a time.
     fn predict(&self, index: usize) -> Tensor<4> {
-        let input = self.scheduler.scale_model_input(self.latents.clone(), index);
+        let input = self
+            .scheduler
+            .scale_model_input(self.latents.clone(), index);
         let images = input.dims()[0];
         let chunks = (0..images).step_by(self.images_at_once).map(|start| {
             let length = self.images_at_once.min(images - start);
@@ -112,7 +114,10 @@ impl<'a> Sampling<'a> {
     fn predict_some(&self, input: Tensor<4>, index: usize, start: usize) -> Tensor<4> {
         let images = input.dims()[0];
         let prompts = self.prompts.clone().narrow(0, start, images);
-        let condition = self.condition.clone().map(|rows| rows.narrow(0, start, images));
+        let condition = self
+            .condition
+            .clone()
+            .map(|rows| rows.narrow(0, start, images));
         let (Some(guidance), Some(negatives)) = (self.guidance, self.negatives.clone()) else {
             return self.call(input, prompts, condition, index);
         };
@@ -136,7 +141,12 @@ impl<'a> Sampling<'a> {
         let timestep = self.scheduler.timesteps()[index];
         let batch = sample.dims()[0];
         let timesteps = Tensor::full([batch], timestep, &self.pipeline.device);
-        self.pipeline.unet.forward(UNetInput { sample, timesteps, context, condition })
+        self.pipeline.unet.forward(UNetInput {
+            sample,
+            timesteps,
+            context,
+            condition,
+        })
     }
 
     /// The noise of a step, where it draws some.
@@ -151,7 +161,12 @@ impl<'a> Sampling<'a> {
         }
         let stream = STEP_STREAM + index as u32;
         let shape = [channels, rows, columns];
-        Some(normal_batch(&self.sources, stream, shape, &self.pipeline.device))
+        Some(normal_batch(
+            &self.sources,
+            stream,
+            shape,
+            &self.pipeline.device,
+        ))
     }
 }
 
@@ -163,7 +178,12 @@ impl Iterator for Sampling<'_> {
         let timestep = *self.scheduler.timesteps().get(index)?;
         let prediction = self.predict(index);
         let (sample, noise) = (self.latents.clone(), self.noise(index));
-        let output = self.scheduler.step(StepInput { index, prediction, sample, noise });
+        let output = self.scheduler.step(StepInput {
+            index,
+            prediction,
+            sample,
+            noise,
+        });
         self.latents = output.sample;
         self.next += 1;
         Some(Progress {
@@ -185,7 +205,9 @@ impl ExactSizeIterator for Sampling<'_> {}
 
 /// The call that a run starts with: past those that its strength leaves out.
 fn first_call(request: &Request, scheduler: &dyn Scheduler) -> usize {
-    let Some((_, strength)) = request.start else { return 0 };
+    let Some((_, strength)) = request.start else {
+        return 0;
+    };
     let taken = ((request.steps as f64 * strength) as usize).min(request.steps);
     (request.steps - taken) * scheduler.calls_per_step()
 }
@@ -197,13 +219,22 @@ fn initial_noise(
     shape: [usize; 3],
 ) -> Result<Tensor<4>> {
     let Some(given) = &request.latents else {
-        return Ok(normal_batch(sources, INITIAL_STREAM, shape, &pipeline.device));
+        return Ok(normal_batch(
+            sources,
+            INITIAL_STREAM,
+            shape,
+            &pipeline.device,
+        ));
     };
     let expected = [sources.len(), shape[0], shape[1], shape[2]];
     if given.dims() == expected {
         return Ok(given.clone());
     }
-    Err(invalid("shape of latents", format!("{:?}", given.dims()), format!("{expected:?}")))
+    Err(invalid(
+        "shape of latents",
+        format!("{:?}", given.dims()),
+        format!("{expected:?}"),
+    ))
 }
 
 /// The clean latent images of a start, one per image of the run.
@@ -229,7 +260,11 @@ fn start_latents(
         return Ok(latents);
     }
     let found = format!("{:?}", [channels, rows, columns]);
-    Err(invalid("shape of start latents", found, format!("{shape:?}")))
+    Err(invalid(
+        "shape of start latents",
+        found,
+        format!("{shape:?}"),
+    ))
 }
 
 /// Repeats a single entry for every image.
@@ -237,16 +272,26 @@ fn one_each(name: &str, x: Tensor<4>, images: usize) -> Result<Tensor<4>> {
     match x.dims()[0] {
         1 => Ok(x.repeat_dim(0, images)),
         found if found == images => Ok(x),
-        found => Err(invalid(name, found, format!("1 or {images}, one per image"))),
+        found => Err(invalid(
+            name,
+            found,
+            format!("1 or {images}, one per image"),
+        )),
     }
 }
 
 fn check_step_noise(request: &Request, calls: usize, [c, h, w]: [usize; 3]) -> Result<()> {
-    let Some(noise) = &request.step_noise else { return Ok(()) };
+    let Some(noise) = &request.step_noise else {
+        return Ok(());
+    };
     let [steps, images, channels, rows, columns] = noise.dims();
     if steps >= calls && [images, channels, rows, columns] == [request.images(), c, h, w] {
         return Ok(());
     }
     let expected = format!("{:?}", [calls, request.images(), c, h, w]);
-    Err(invalid("shape of step noise", format!("{:?}", noise.dims()), expected))
+    Err(invalid(
+        "shape of step noise",
+        format!("{:?}", noise.dims()),
+        expected,
+    ))
 }

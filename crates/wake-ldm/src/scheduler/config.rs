@@ -155,7 +155,12 @@ impl SchedulerConfig {
             ("skip_prk_steps", true.into()),
             ("steps_offset", 1.into()),
         ];
-        Self::from_options(options.map(|(key, value)| (key.to_owned(), value)).into_iter().collect())
+        Self::from_options(
+            options
+                .map(|(key, value)| (key.to_owned(), value))
+                .into_iter()
+                .collect(),
+        )
     }
 
     /// Reads a `scheduler_config.json`.
@@ -164,8 +169,11 @@ impl SchedulerConfig {
     ///
     /// [`Error::Io`] and [`Error::Json`] for a bad file, otherwise as [`with`](Self::with).
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
+            action: "read",
+            path: path.to_owned(),
+            source,
+        })?;
         Self::from_json(&text, path)
     }
 
@@ -175,8 +183,10 @@ impl SchedulerConfig {
     ///
     /// As [`read`](Self::read).
     pub fn from_json(text: &str, path: &Path) -> Result<Self> {
-        let options = serde_json::from_str(&finite(text))
-            .map_err(|source| Error::Json { path: path.to_owned(), source })?;
+        let options = serde_json::from_str(&finite(text)).map_err(|source| Error::Json {
+            path: path.to_owned(),
+            source,
+        })?;
         Self::from_options(options)
     }
 
@@ -264,7 +274,10 @@ impl SchedulerConfig {
     }
 
     fn from_options(options: Map<String, Value>) -> Result<Self> {
-        let name = options.get("_class_name").and_then(Value::as_str).unwrap_or("absent");
+        let name = options
+            .get("_class_name")
+            .and_then(Value::as_str)
+            .unwrap_or("absent");
         let class = class_of(name)?;
         let text = Value::Object(options.clone()).to_string();
         let mut left = Options::parse(class, &text, Path::new("scheduler_config.json"))?;
@@ -297,17 +310,24 @@ impl Kind {
 
 /// The class of a short name or of itself.
 fn class_of(name: &str) -> Result<&'static str> {
-    let found = CLASSES.iter().find(|(short, class)| *short == name || *class == name);
-    found.map(|(_, class)| *class).ok_or_else(|| Error::Unsupported {
-        option: "scheduler _class_name".to_owned(),
-        value: name.to_owned(),
-        supported: CLASSES.map(|(short, class)| format!("{short} ({class})")).join(", "),
-    })
+    let found = CLASSES
+        .iter()
+        .find(|(short, class)| *short == name || *class == name);
+    found
+        .map(|(_, class)| *class)
+        .ok_or_else(|| Error::Unsupported {
+            option: "scheduler _class_name".to_owned(),
+            value: name.to_owned(),
+            supported: CLASSES
+                .map(|(short, class)| format!("{short} ({class})"))
+                .join(", "),
+        })
 }
 
 /// Python writes infinities that JSON does not know: the largest numbers stand for them.
 fn finite(text: &str) -> String {
-    text.replace("-Infinity", "-1.7976931348623157e308").replace(": Infinity", ": 1.7976931348623157e308")
+    text.replace("-Infinity", "-1.7976931348623157e308")
+        .replace(": Infinity", ": 1.7976931348623157e308")
 }
 
 #[cfg(test)]
@@ -338,7 +358,8 @@ mod tests {
         assert!(read(r#"{"_class_name": "PNDMScheduler", "use_karras_sigmas": true}"#).is_ok());
         let error = read(r#"{"_class_name": "DDIMScheduler", "swirl": 2}"#).unwrap_err();
         assert!(matches!(&error, Error::Unsupported { option, .. } if option.ends_with("swirl")));
-        let error = read(r#"{"_class_name": "DDIMScheduler", "prediction_type": "x"}"#).unwrap_err();
+        let error =
+            read(r#"{"_class_name": "DDIMScheduler", "prediction_type": "x"}"#).unwrap_err();
         assert!(error.to_string().contains("prediction_type"));
         assert!(read(r#"{"_class_name": "ScoreSdeVeScheduler"}"#).is_err());
         assert!(read(r#"{}"#).is_err() && read("[]").is_err() && read("").is_err());
@@ -346,7 +367,8 @@ mod tests {
 
     #[test]
     fn python_infinities_are_read() {
-        let text = r#"{"_class_name": "DPMSolverMultistepScheduler", "lambda_min_clipped": -Infinity}"#;
+        let text =
+            r#"{"_class_name": "DPMSolverMultistepScheduler", "lambda_min_clipped": -Infinity}"#;
         let config = read(text).unwrap();
         assert_eq!(config.scheduler(10).unwrap().timesteps().len(), 10);
     }
@@ -356,7 +378,13 @@ mod tests {
         let config = SchedulerConfig::stable_diffusion("ddim").unwrap();
         let error = config.scheduler(1000).unwrap_err();
         assert!(matches!(&error, Error::OutOfRange { name, .. } if name.contains("steps_offset")));
-        assert!(config.with("steps_offset", 0).unwrap().scheduler(1000).is_ok());
+        assert!(
+            config
+                .with("steps_offset", 0)
+                .unwrap()
+                .scheduler(1000)
+                .is_ok()
+        );
     }
 
     #[test]
@@ -367,7 +395,15 @@ mod tests {
             .unwrap()
             .with("timestep_spacing", "trailing")
             .unwrap();
-        assert!(matches!(zero.scheduler(4), Err(Error::InvalidOption { .. })));
-        assert!(zero.with("prediction_type", "v_prediction").unwrap().scheduler(4).is_ok());
+        assert!(matches!(
+            zero.scheduler(4),
+            Err(Error::InvalidOption { .. })
+        ));
+        assert!(
+            zero.with("prediction_type", "v_prediction")
+                .unwrap()
+                .scheduler(4)
+                .is_ok()
+        );
     }
 }

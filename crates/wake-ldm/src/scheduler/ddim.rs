@@ -23,9 +23,16 @@ pub(super) struct DdimConfig {
 
 impl DdimConfig {
     pub(super) fn take(options: &mut Options) -> Result<Self> {
-        let defaults = ScheduleDefaults { rescaled: Some(TerminalSnr::Zero), ..DEFAULTS };
+        let defaults = ScheduleDefaults {
+            rescaled: Some(TerminalSnr::Zero),
+            ..DEFAULTS
+        };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         let eta = options.f64("eta", 0.0)?;
         check_range("eta", eta, 0.0, 1.0)?;
         Ok(Self {
@@ -42,9 +49,12 @@ impl DdimConfig {
     pub(super) fn init(&self, n: usize) -> Result<Ddim> {
         let steps = self.steps.whole(n)?;
         let train = self.schedule.steps();
-        let visited: Vec<usize> =
-            steps.iter().map(|&t| check_timestep(t, train)).collect::<Result<_>>()?;
-        self.prediction.check_signal(self.schedule.noise_level(visited[0]).signal)?;
+        let visited: Vec<usize> = steps
+            .iter()
+            .map(|&t| check_timestep(t, train))
+            .collect::<Result<_>>()?;
+        self.prediction
+            .check_signal(self.schedule.noise_level(visited[0]).signal)?;
         Ok(Ddim {
             config: self.clone(),
             timesteps: steps.iter().map(|&t| t as f64).collect(),
@@ -76,12 +86,18 @@ impl Ddim {
     /// ᾱ at a step and one stride further down.
     fn alphas(&self, index: usize) -> (f64, f64) {
         let t = self.visited[index];
-        (self.config.schedule.alpha_cumprod(t), self.config.alpha_after(t, self.stride))
+        (
+            self.config.schedule.alpha_cumprod(t),
+            self.config.alpha_after(t, self.stride),
+        )
     }
 
     /// The standard deviation of the noise that a step adds, Eq. 16.
     fn deviation(&self, now: f64, next: f64) -> f64 {
-        self.config.eta * ((1.0 - next) / (1.0 - now) * (1.0 - now / next)).max(0.0).sqrt()
+        self.config.eta
+            * ((1.0 - next) / (1.0 - now) * (1.0 - now / next))
+                .max(0.0)
+                .sqrt()
     }
 }
 
@@ -109,8 +125,17 @@ impl Scheduler for Ddim {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, noise } = input;
-        let DdimConfig { prediction: kind, clipping, .. } = self.config;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            noise,
+        } = input;
+        let DdimConfig {
+            prediction: kind,
+            clipping,
+            ..
+        } = self.config;
         let (now, next) = self.alphas(index);
         let level = self.noise_level(index);
         // 1. The clean image, Eq. 9, limited.
@@ -143,9 +168,12 @@ mod tests {
     fn variances_are_the_published_ones() {
         let curve = BetaCurve::Linear(1e-4, 0.02);
         let schedule = NoiseSchedule::new(&curve, 1000, TerminalSnr::Kept).unwrap();
-        for (t, next, expected) in
-            [(420, 400, 0.14771), (980, 960, 0.32460), (487, 486, 0.00979), (999, 998, 0.02)]
-        {
+        for (t, next, expected) in [
+            (420, 400, 0.14771),
+            (980, 960, 0.32460),
+            (487, 486, 0.00979),
+            (999, 998, 0.02),
+        ] {
             let (now, next) = (schedule.alpha_cumprod(t), schedule.alpha_cumprod(next));
             let variance = (1.0 - next) / (1.0 - now) * (1.0 - now / next);
             assert!((variance - expected).abs() < 1e-5, "{t}: {variance}");

@@ -36,7 +36,11 @@ impl DdpmConfig {
             ..DEFAULTS
         };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         let name = options.string("variance_type", "fixed_small")?;
         let variance = match name.as_str() {
             "fixed_small" | "fixed_small_log" => Variance::Small,
@@ -58,9 +62,12 @@ impl DdpmConfig {
     pub(super) fn init(&self, n: usize) -> Result<Ddpm> {
         let steps = self.steps.whole(n)?;
         let train = self.schedule.steps();
-        let visited: Vec<usize> =
-            steps.iter().map(|&t| check_timestep(t, train)).collect::<Result<_>>()?;
-        self.prediction.check_signal(self.schedule.noise_level(visited[0]).signal)?;
+        let visited: Vec<usize> = steps
+            .iter()
+            .map(|&t| check_timestep(t, train))
+            .collect::<Result<_>>()?;
+        self.prediction
+            .check_signal(self.schedule.noise_level(visited[0]).signal)?;
         Ok(Ddpm {
             config: self.clone(),
             timesteps: steps.iter().map(|&t| t as f64).collect(),
@@ -90,7 +97,10 @@ impl Ddpm {
     /// ᾱ at a step and at the one after it (1 after the last).
     fn alphas(&self, index: usize) -> (f64, f64) {
         let schedule = &self.config.schedule;
-        let next = self.visited.get(index + 1).map_or(1.0, |&t| schedule.alpha_cumprod(t));
+        let next = self
+            .visited
+            .get(index + 1)
+            .map_or(1.0, |&t| schedule.alpha_cumprod(t));
         (schedule.alpha_cumprod(self.visited[index]), next)
     }
 
@@ -119,12 +129,20 @@ impl Scheduler for Ddpm {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, noise } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            noise,
+        } = input;
         let (now, next) = self.alphas(index);
         let added = 1.0 - now / next;
         // 1. The clean image, Eq. 15, limited.
         let level = self.noise_level(index);
-        let denoised = self.config.prediction.denoised(level, sample.clone(), prediction);
+        let denoised = self
+            .config
+            .prediction
+            .denoised(level, sample.clone(), prediction);
         let denoised = self.config.clipping.apply(denoised);
         // 2. The mean of the step back, Eq. 7.
         let of_clean = next.sqrt() * added / (1.0 - now);

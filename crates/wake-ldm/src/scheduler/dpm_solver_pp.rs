@@ -41,7 +41,12 @@ pub(super) struct DpmSolverConfig {
 impl DpmSolverConfig {
     pub(super) fn take(options: &mut Options) -> Result<Self> {
         let schedule = NoiseSchedule::take(options, &DEFAULTS)?;
-        let known = [Spread::Karras, Spread::Exponential, Spread::Lu, Spread::Flow];
+        let known = [
+            Spread::Karras,
+            Spread::Exponential,
+            Spread::Lu,
+            Spread::Flow,
+        ];
         let sigmas = SigmaOptions::take(options, &known)?;
         let path = PathOptions {
             steps: take_steps(options, &schedule)?,
@@ -49,7 +54,10 @@ impl DpmSolverConfig {
             end_at_zero: take_final_zero(options)?,
             round_steps: *schedule.curve() != BetaCurve::SquaredCosine,
         };
-        options.only("variance_type", &["fixed_small", "fixed_small_log", "fixed_large"])?;
+        options.only(
+            "variance_type",
+            &["fixed_small", "fixed_small_log", "fixed_large"],
+        )?;
         options.only("use_dynamic_shifting", &[false])?;
         let algorithm = take_algorithm(options, path.end_at_zero)?;
         let order = take_order(options, algorithm)?;
@@ -68,14 +76,22 @@ impl DpmSolverConfig {
 
     pub(super) fn init(&self, n: usize) -> Result<DpmSolver> {
         let path = self.path.path(&self.schedule, n)?;
-        Ok(DpmSolver { config: self.clone(), path, history: Vec::new() })
+        Ok(DpmSolver {
+            config: self.clone(),
+            path,
+            history: Vec::new(),
+        })
     }
 }
 
 /// The visited steps, of which the noisiest may be cut off at a signal-to-noise ratio.
 fn take_steps(options: &mut Options, schedule: &NoiseSchedule) -> Result<Steps> {
     let clip = options.f64("lambda_min_clipped", f64::MIN)?;
-    let clipped = schedule.sigmas().iter().filter(|&&sigma| -f64::from(sigma.ln()) < clip).count();
+    let clipped = schedule
+        .sigmas()
+        .iter()
+        .filter(|&&sigma| -f64::from(sigma.ln()) < clip)
+        .count();
     let steps = Steps::take(options, schedule.steps() - clipped, "linspace")?;
     if clipped > 0 && steps.spacing == Spacing::Trailing {
         let supported = "linspace or leading spacing";
@@ -87,10 +103,22 @@ fn take_steps(options: &mut Options, schedule: &NoiseSchedule) -> Result<Steps> 
 fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<Algorithm> {
     let name = options.string("algorithm_type", "dpmsolver++")?;
     let algorithm = match name.as_str() {
-        "dpmsolver++" | "deis" => Algorithm { data: true, stochastic: false },
-        "sde-dpmsolver++" => Algorithm { data: true, stochastic: true },
-        "dpmsolver" => Algorithm { data: false, stochastic: false },
-        "sde-dpmsolver" => Algorithm { data: false, stochastic: true },
+        "dpmsolver++" | "deis" => Algorithm {
+            data: true,
+            stochastic: false,
+        },
+        "sde-dpmsolver++" => Algorithm {
+            data: true,
+            stochastic: true,
+        },
+        "dpmsolver" => Algorithm {
+            data: false,
+            stochastic: false,
+        },
+        "sde-dpmsolver" => Algorithm {
+            data: false,
+            stochastic: true,
+        },
         other => {
             let supported = "dpmsolver++, sde-dpmsolver++, dpmsolver, sde-dpmsolver";
             return Err(options.unsupported("algorithm_type", &other.into(), supported));
@@ -129,13 +157,21 @@ fn take_prediction(
     algorithm: Algorithm,
 ) -> Result<Prediction> {
     if spread != Spread::Flow {
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         return Prediction::take(options, &known);
     }
     if algorithm.data {
         return Prediction::take(options, &[Prediction::Flow]);
     }
-    Err(options.unsupported("use_flow_sigmas", &true.into(), "dpmsolver++ and sde-dpmsolver++"))
+    Err(options.unsupported(
+        "use_flow_sigmas",
+        &true.into(),
+        "dpmsolver++ and sde-dpmsolver++",
+    ))
 }
 
 /// An exponential integrator: the linear part of the equation is solved exactly in λ = ln(α/σ),
@@ -172,8 +208,18 @@ struct Factors {
 
 impl DpmSolver {
     /// The clean image and what the history holds of a prediction.
-    fn convert(&self, level: NoiseLevel, sample: &Tensor<4>, prediction: Tensor<4>) -> [Tensor<4>; 2] {
-        let DpmSolverConfig { prediction: kind, clipping, algorithm, .. } = self.config;
+    fn convert(
+        &self,
+        level: NoiseLevel,
+        sample: &Tensor<4>,
+        prediction: Tensor<4>,
+    ) -> [Tensor<4>; 2] {
+        let DpmSolverConfig {
+            prediction: kind,
+            clipping,
+            algorithm,
+            ..
+        } = self.config;
         let denoised = kind.denoised(level, sample.clone(), prediction.clone());
         let denoised = clipping.apply(denoised);
         let kept = if algorithm.data {
@@ -188,7 +234,12 @@ impl DpmSolver {
 
     /// The order of a step: as much as history, end of the run and repeated levels allow.
     fn order(&self, index: usize) -> usize {
-        let DpmSolverConfig { lower_order_final, euler_at_final, ref path, .. } = self.config;
+        let DpmSolverConfig {
+            lower_order_final,
+            euler_at_final,
+            ref path,
+            ..
+        } = self.config;
         let left = self.path.len() - index;
         let short = lower_order_final && self.path.len() < SHORT_RUN;
         let wanted = match left {
@@ -197,7 +248,11 @@ impl DpmSolver {
             _ => self.config.order,
         };
         let standing = self.path.log_snr(index + 1) <= self.path.log_snr(index);
-        let older = if standing { 0 } else { wanted.min(self.history.len()) - 1 };
+        let older = if standing {
+            0
+        } else {
+            wanted.min(self.history.len()) - 1
+        };
         1 + self.path.usable_before(index, older)
     }
 
@@ -221,7 +276,11 @@ impl DpmSolver {
         };
         let value = z.exp_m1();
         let midpoint = self.config.midpoint && order < 3;
-        let slope = if midpoint { 0.5 * value } else { over(value, z) - 1.0 };
+        let slope = if midpoint {
+            0.5 * value
+        } else {
+            over(value, z) - 1.0
+        };
         Factors {
             sample,
             value: -amplitude * value,
@@ -271,7 +330,12 @@ impl Scheduler for DpmSolver {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, noise } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            noise,
+        } = input;
         // 1. The clean image, or the noise.
         let [denoised, kept] = self.convert(self.path.level(index), &sample, prediction);
         self.history.insert(0, kept.clone());
@@ -288,6 +352,9 @@ impl Scheduler for DpmSolver {
         if self.config.algorithm.stochastic {
             next = next + required(noise) * factors.noise;
         }
-        StepOutput { sample: next, denoised }
+        StepOutput {
+            sample: next,
+            denoised,
+        }
     }
 }

@@ -26,7 +26,11 @@ pub(super) struct EulerConfig {
 impl EulerConfig {
     pub(super) fn take(options: &mut Options) -> Result<Self> {
         let schedule = NoiseSchedule::take(options, &DEFAULTS)?;
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         let prediction = Prediction::take(options, &known)?;
         let mut sigmas = SigmaOptions::take(options, &[Spread::Karras, Spread::Exponential])?;
         sigmas.log_linear = take_choice(options, "interpolation_type", ["linear", "log_linear"])?;
@@ -50,9 +54,15 @@ impl EulerConfig {
             n,
         )?;
         if self.continuous {
-            path.timesteps = path.sigmas[..n].iter().map(|sigma| round(0.25 * sigma.ln())).collect();
+            path.timesteps = path.sigmas[..n]
+                .iter()
+                .map(|sigma| round(0.25 * sigma.ln()))
+                .collect();
         }
-        Ok(Euler { path, prediction: self.prediction })
+        Ok(Euler {
+            path,
+            prediction: self.prediction,
+        })
     }
 }
 
@@ -95,7 +105,12 @@ impl Scheduler for Euler {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, .. } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            ..
+        } = input;
         let (sigma, next) = (self.path.sigmas[index], self.path.sigmas[index + 1]);
         let level = self.path.level(index);
         // 1. The clean image.
@@ -103,6 +118,9 @@ impl Scheduler for Euler {
         // 2. The slope of the path.
         let slope = (sample.clone() - denoised.clone()) / sigma;
         // 3. Along it to the next level.
-        StepOutput { sample: sample + slope * (next - sigma), denoised }
+        StepOutput {
+            sample: sample + slope * (next - sigma),
+            denoised,
+        }
     }
 }

@@ -32,7 +32,10 @@ impl EulerAncestralConfig {
 
     pub(super) fn init(&self, n: usize) -> Result<EulerAncestral> {
         let path = SigmaPath::fractional(&self.schedule, self.steps, &self.sigmas, true, n)?;
-        Ok(EulerAncestral { path, prediction: self.prediction })
+        Ok(EulerAncestral {
+            path,
+            prediction: self.prediction,
+        })
     }
 }
 
@@ -73,7 +76,12 @@ impl Scheduler for EulerAncestral {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, noise } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            noise,
+        } = input;
         let (sigma, next) = (self.path.sigmas[index], self.path.sigmas[index + 1]);
         let (up, down) = ancestral_step(sigma, next);
         // 1. The clean image and the slope towards it.
@@ -86,9 +94,11 @@ impl Scheduler for EulerAncestral {
     }
 }
 
-/// The levels σ_up and σ_down of a step from σ to σ'.
+/// The levels `σ_up` and `σ_down` of a step from σ to σ'.
 fn ancestral_step(sigma: f64, next: f64) -> (f64, f64) {
-    let up = (next * next * (sigma * sigma - next * next) / (sigma * sigma)).max(0.0).sqrt();
+    let up = (next * next * (sigma * sigma - next * next) / (sigma * sigma))
+        .max(0.0)
+        .sqrt();
     (up, (next * next - up * up).max(0.0).sqrt())
 }
 

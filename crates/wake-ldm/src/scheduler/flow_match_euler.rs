@@ -27,7 +27,9 @@ impl FlowMatchEulerConfig {
         check_range("num_train_timesteps", train as f64, 2.0, 1e5)?;
         let shift = options.f64("shift", 1.0)?;
         check_range("shift", shift, 1e-3, 1e3)?;
-        let terminal = options.optional_f64("shift_terminal")?.filter(|&sigma| sigma > 0.0);
+        let terminal = options
+            .optional_f64("shift_terminal")?
+            .filter(|&sigma| sigma > 0.0);
         check_range("shift_terminal", terminal.unwrap_or(0.0), 0.0, 0.999)?;
         options.only("use_dynamic_shifting", &[false])?;
         Ok(Self {
@@ -45,23 +47,39 @@ impl FlowMatchEulerConfig {
         let mut sigmas = self.levels(n);
         check_positive(&sigmas)?;
         if self.inverted {
-            sigmas.iter_mut().for_each(|sigma| *sigma = round(1.0 - *sigma));
+            sigmas
+                .iter_mut()
+                .for_each(|sigma| *sigma = round(1.0 - *sigma));
         }
-        let timesteps = sigmas.iter().map(|sigma| round(sigma * self.train as f64)).collect();
+        let timesteps = sigmas
+            .iter()
+            .map(|sigma| round(sigma * self.train as f64))
+            .collect();
         sigmas.push(if self.inverted { 1.0 } else { 0.0 });
-        Ok(FlowMatchEuler { timesteps, sigmas, stochastic: self.stochastic })
+        Ok(FlowMatchEuler {
+            timesteps,
+            sigmas,
+            stochastic: self.stochastic,
+        })
     }
 
     /// Noise levels from 1 down. diffusers shifts twice: the ends of its range, then every level.
     fn levels(&self, n: usize) -> Vec<f64> {
         let train = self.train as f64;
-        let (first, last) = (round(self.shifted(1.0)), round(self.shifted(round(1.0 / train))));
+        let (first, last) = (
+            round(self.shifted(1.0)),
+            round(self.shifted(round(1.0 / train))),
+        );
         let even = linspace(first * train, last * train, n);
         let mut sigmas: Vec<f64> = even.into_iter().map(|t| self.shifted(t / train)).collect();
         if let Some(terminal) = self.terminal {
             stretch(&mut sigmas, terminal);
         }
-        self.sigmas.respread(&sigmas, n).into_iter().map(round).collect()
+        self.sigmas
+            .respread(&sigmas, n)
+            .into_iter()
+            .map(round)
+            .collect()
     }
 
     /// σ' = k σ/(1 + (k − 1) σ).
@@ -74,7 +92,9 @@ impl FlowMatchEulerConfig {
 fn stretch(sigmas: &mut [f64], terminal: f64) {
     let scale = (1.0 - sigmas[sigmas.len() - 1]) / (1.0 - terminal);
     if scale > 0.0 {
-        sigmas.iter_mut().for_each(|sigma| *sigma = 1.0 - (1.0 - *sigma) / scale);
+        sigmas
+            .iter_mut()
+            .for_each(|sigma| *sigma = 1.0 - (1.0 - *sigma) / scale);
     }
 }
 
@@ -98,7 +118,10 @@ impl Scheduler for FlowMatchEuler {
 
     fn noise_level(&self, index: usize) -> NoiseLevel {
         let sigma = self.sigmas[index];
-        NoiseLevel { signal: 1.0 - sigma, noise: sigma }
+        NoiseLevel {
+            signal: 1.0 - sigma,
+            noise: sigma,
+        }
     }
 
     fn needs_noise(&self, _index: usize) -> bool {
@@ -106,12 +129,21 @@ impl Scheduler for FlowMatchEuler {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, noise } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            noise,
+        } = input;
         let (sigma, next) = (self.sigmas[index], self.sigmas[index + 1]);
         let level = self.noise_level(index);
         let denoised = Prediction::Flow.denoised(level, sample.clone(), prediction.clone());
         let sample = if self.stochastic {
-            NoiseLevel { signal: 1.0 - next, noise: next }.mix(denoised.clone(), required(noise))
+            NoiseLevel {
+                signal: 1.0 - next,
+                noise: next,
+            }
+            .mix(denoised.clone(), required(noise))
         } else {
             sample + prediction * (next - sigma)
         };

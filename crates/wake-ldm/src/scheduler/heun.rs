@@ -29,7 +29,11 @@ impl HeunConfig {
             ..DEFAULTS
         };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         Ok(Self {
             steps: Steps::take(options, schedule.steps(), "linspace")?,
             prediction: Prediction::take(options, &known)?,
@@ -43,8 +47,17 @@ impl HeunConfig {
         let mut path = SigmaPath::fractional(&self.schedule, self.steps, &self.sigmas, true, n)?;
         path.timesteps = doubled(&path.timesteps, 0);
         path.sigmas = doubled(&path.sigmas, 1);
-        let Self { prediction, clipping, .. } = *self;
-        Ok(Heun { path, prediction, clipping, first: None })
+        let Self {
+            prediction,
+            clipping,
+            ..
+        } = *self;
+        Ok(Heun {
+            path,
+            prediction,
+            clipping,
+            first: None,
+        })
     }
 }
 
@@ -97,7 +110,12 @@ impl Scheduler for Heun {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, .. } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            ..
+        } = input;
         let (sigma, next) = (self.path.sigmas[index], self.path.sigmas[index + 1]);
         // 1. The clean image and the slope, at the start or at the trial's end.
         let level = self.path.level(index);

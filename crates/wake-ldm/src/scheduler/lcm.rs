@@ -28,7 +28,11 @@ impl LcmConfig {
             ..DEFAULTS
         };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         let original_steps = options.usize("original_inference_steps", 50)?;
         check_range(
             "original_inference_steps",
@@ -48,9 +52,14 @@ impl LcmConfig {
     pub(super) fn init(&self, n: usize) -> Result<Lcm> {
         check_range("steps", n as f64, 1.0, self.original_steps as f64)?;
         let visited = visited(self.schedule.steps(), self.original_steps, n);
-        self.prediction.check_signal(self.schedule.noise_level(visited[0]).signal)?;
+        self.prediction
+            .check_signal(self.schedule.noise_level(visited[0]).signal)?;
         let timesteps = visited.iter().map(|&t| t as f64).collect();
-        Ok(Lcm { config: self.clone(), timesteps, visited })
+        Ok(Lcm {
+            config: self.clone(),
+            timesteps,
+            visited,
+        })
     }
 }
 
@@ -92,10 +101,18 @@ impl Scheduler for Lcm {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, noise } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            noise,
+        } = input;
         // 1. The clean image that the prediction stands for, limited.
         let level = self.noise_level(index);
-        let clean = self.config.prediction.denoised(level, sample.clone(), prediction);
+        let clean = self
+            .config
+            .prediction
+            .denoised(level, sample.clone(), prediction);
         let clean = self.config.clipping.apply(clean);
         // 2. The boundary condition: at t = 0 the sample itself.
         let tau = self.timesteps[index] * self.config.timestep_scaling;
@@ -103,7 +120,8 @@ impl Scheduler for Lcm {
         let denoised = clean * (tau / tau.hypot(SIGMA_DATA)) + sample * skip;
         // 3. Up to the next level, except on arrival.
         let sample = if self.needs_noise(index) {
-            self.noise_level(index + 1).mix(denoised.clone(), required(noise))
+            self.noise_level(index + 1)
+                .mix(denoised.clone(), required(noise))
         } else {
             denoised.clone()
         };

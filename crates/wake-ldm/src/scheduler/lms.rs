@@ -22,9 +22,16 @@ pub(super) struct LmsConfig {
 
 impl LmsConfig {
     pub(super) fn take(options: &mut Options) -> Result<Self> {
-        let defaults = ScheduleDefaults { rescaled: None, ..DEFAULTS };
+        let defaults = ScheduleDefaults {
+            rescaled: None,
+            ..DEFAULTS
+        };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         let order = options.usize("order", 4)?;
         check_range("order", order as f64, 1.0, 4.0)?;
         Ok(Self {
@@ -38,7 +45,12 @@ impl LmsConfig {
 
     pub(super) fn init(&self, n: usize) -> Result<Lms> {
         let path = SigmaPath::fractional(&self.schedule, self.steps, &self.sigmas, true, n)?;
-        Ok(Lms { path, prediction: self.prediction, order: self.order, slopes: Vec::new() })
+        Ok(Lms {
+            path,
+            prediction: self.prediction,
+            order: self.order,
+            slopes: Vec::new(),
+        })
     }
 }
 
@@ -82,7 +94,12 @@ impl Scheduler for Lms {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, .. } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            ..
+        } = input;
         let level = self.path.level(index);
         // 1. The slope here.
         let denoised = self.prediction.denoised(level, sample.clone(), prediction);
@@ -90,9 +107,13 @@ impl Scheduler for Lms {
         self.slopes.insert(0, slope);
         self.slopes.truncate(self.order);
         // 2. The weights of this and the older ones; a level visited twice tells nothing new.
-        let nodes: Vec<f64> =
-            (0..self.slopes.len()).map(|back| self.path.sigmas[index - back]).collect();
-        let usable = 1 + nodes.windows(2).take_while(|pair| pair[1] > pair[0]).count();
+        let nodes: Vec<f64> = (0..self.slopes.len())
+            .map(|back| self.path.sigmas[index - back])
+            .collect();
+        let usable = 1 + nodes
+            .windows(2)
+            .take_while(|pair| pair[1] > pair[0])
+            .count();
         let weights = interpolation_weights(&nodes[..usable], self.path.sigmas[index + 1]);
         // 3. The step.
         let sample = self
@@ -111,8 +132,13 @@ fn interpolation_weights(nodes: &[f64], end: f64) -> Vec<f64> {
     if length == 0.0 {
         return vec![0.0; nodes.len()];
     }
-    let shifted: Vec<f64> = nodes.iter().map(|node| (node - nodes[0]) / length).collect();
-    (0..nodes.len()).map(|j| length * unit_integral(&lagrange(&shifted, j))).collect()
+    let shifted: Vec<f64> = nodes
+        .iter()
+        .map(|node| (node - nodes[0]) / length)
+        .collect();
+    (0..nodes.len())
+        .map(|j| length * unit_integral(&lagrange(&shifted, j)))
+        .collect()
 }
 
 /// Coefficients, lowest first, of the polynomial that is 1 at node j and 0 at the others.
@@ -131,7 +157,11 @@ fn lagrange(nodes: &[f64], j: usize) -> Vec<f64> {
 
 /// ∫₀¹ of a polynomial.
 fn unit_integral(polynomial: &[f64]) -> f64 {
-    polynomial.iter().enumerate().map(|(power, c)| c / (power + 1) as f64).sum()
+    polynomial
+        .iter()
+        .enumerate()
+        .map(|(power, c)| c / (power + 1) as f64)
+        .sum()
 }
 
 #[cfg(test)]
@@ -155,9 +185,16 @@ mod tests {
         let end: f64 = 0.914;
         let weights = interpolation_weights(&nodes, end);
         for degree in 0..4 {
-            let sum: f64 = weights.iter().zip(nodes).map(|(w, x)| w * x.powi(degree)).sum();
+            let sum: f64 = weights
+                .iter()
+                .zip(nodes)
+                .map(|(w, x)| w * x.powi(degree))
+                .sum();
             let exact = (end.powi(degree + 1) - nodes[0].powi(degree + 1)) / f64::from(degree + 1);
-            assert!((sum - exact).abs() < 1e-12 * exact.abs(), "{degree}: {sum} {exact}");
+            assert!(
+                (sum - exact).abs() < 1e-12 * exact.abs(),
+                "{degree}: {sum} {exact}"
+            );
         }
     }
 }

@@ -31,15 +31,26 @@ impl PathOptions {
         let (mut sigmas, timesteps) = match self.sigmas.spread {
             Spread::Steps => {
                 let timesteps: Vec<f64> = whole.into_iter().map(|t| t as f64).collect();
-                (timesteps.iter().map(|&t| table.sigma(t)).collect(), timesteps)
+                (
+                    timesteps.iter().map(|&t| table.sigma(t)).collect(),
+                    timesteps,
+                )
             }
             Spread::Flow => self.flow(schedule.steps() as f64, n),
             _ => self.spread(&table, n),
         };
         check_positive(&sigmas)?;
-        sigmas.push(if self.end_at_zero { 0.0 } else { table.smallest() });
+        sigmas.push(if self.end_at_zero {
+            0.0
+        } else {
+            table.smallest()
+        });
         let sigmas = sigmas.into_iter().map(round).collect();
-        Ok(LogSnrPath { timesteps, sigmas, flow: self.sigmas.spread == Spread::Flow })
+        Ok(LogSnrPath {
+            timesteps,
+            sigmas,
+            flow: self.sigmas.spread == Spread::Flow,
+        })
     }
 
     /// Levels spread over all of training, and their training steps.
@@ -47,9 +58,16 @@ impl PathOptions {
         let sigmas = self.sigmas.respread(&table.falling(), n);
         let whole = |t: f64| {
             let rounds = self.round_steps && self.sigmas.spread != Spread::Exponential;
-            if rounds { t.round_ties_even() } else { t.trunc() }
+            if rounds {
+                t.round_ties_even()
+            } else {
+                t.trunc()
+            }
         };
-        let timesteps = sigmas.iter().map(|&sigma| whole(table.timestep(sigma))).collect();
+        let timesteps = sigmas
+            .iter()
+            .map(|&sigma| whole(table.timestep(sigma)))
+            .collect();
         (sigmas, timesteps)
     }
 
@@ -76,10 +94,16 @@ impl LogSnrPath {
     pub(super) fn level(&self, index: usize) -> NoiseLevel {
         let sigma = self.sigmas[index];
         if self.flow {
-            return NoiseLevel { signal: 1.0 - sigma, noise: sigma };
+            return NoiseLevel {
+                signal: 1.0 - sigma,
+                noise: sigma,
+            };
         }
         let signal = 1.0 / sigma.hypot(1.0);
-        NoiseLevel { signal, noise: sigma * signal }
+        NoiseLevel {
+            signal,
+            noise: sigma * signal,
+        }
     }
 
     /// λ = ln(α/σ) before a step, or after the last; infinite where there is no noise.
@@ -92,7 +116,9 @@ impl LogSnrPath {
     /// before a level that is visited twice.
     pub(super) fn usable_before(&self, index: usize, wanted: usize) -> usize {
         let distinct = |back: &usize| {
-            index.checked_sub(*back).is_some_and(|i| self.log_snr(i) < self.log_snr(i + 1))
+            index
+                .checked_sub(*back)
+                .is_some_and(|i| self.log_snr(i) < self.log_snr(i + 1))
         };
         (1..=wanted).take_while(distinct).count()
     }

@@ -24,7 +24,10 @@ pub(super) struct PndmConfig {
 
 impl PndmConfig {
     pub(super) fn take(options: &mut Options) -> Result<Self> {
-        let defaults = ScheduleDefaults { rescaled: None, ..DEFAULTS };
+        let defaults = ScheduleDefaults {
+            rescaled: None,
+            ..DEFAULTS
+        };
         let schedule = NoiseSchedule::take(options, &defaults)?;
         Ok(Self {
             steps: Steps::take(options, schedule.steps(), "leading")?,
@@ -46,8 +49,10 @@ impl PndmConfig {
         } else {
             with_runge_kutta(&steps, stride / 2)
         };
-        let visited: Vec<usize> =
-            calls.iter().map(|&t| check_timestep(t, train)).collect::<Result<_>>()?;
+        let visited: Vec<usize> = calls
+            .iter()
+            .map(|&t| check_timestep(t, train))
+            .collect::<Result<_>>()?;
         Ok(Pndm {
             config: self.clone(),
             timesteps: calls.iter().map(|&t| t as f64).collect(),
@@ -65,7 +70,13 @@ impl PndmConfig {
 /// All steps, the second twice.
 fn multistep_calls(steps: &[i64]) -> Vec<i64> {
     let second = steps.get(1).copied();
-    steps.iter().take(1).copied().chain(second).chain(steps.iter().skip(1).copied()).collect()
+    steps
+        .iter()
+        .take(1)
+        .copied()
+        .chain(second)
+        .chain(steps.iter().skip(1).copied())
+        .collect()
 }
 
 /// Four calls for each of the first three steps, one for each further; and how many come first.
@@ -134,7 +145,11 @@ impl Pndm {
     /// One of the four calls of a Runge-Kutta step, Eq. 13.
     fn runge_kutta(&mut self, t: i64, sample: Tensor<4>, prediction: Tensor<4>) -> StepOutput {
         let stage = self.calls % 4;
-        let half = if stage.is_multiple_of(2) { self.stride / 2 } else { 0 };
+        let half = if stage.is_multiple_of(2) {
+            self.stride / 2
+        } else {
+            0
+        };
         if stage == 0 {
             self.history.push(prediction.clone());
             self.saved = Some(sample.clone());
@@ -145,7 +160,11 @@ impl Pndm {
             Some(sum) => sum + weighted,
             None => weighted,
         };
-        let direction = if stage == 3 { sum } else { self.keep_sum(sum, prediction) };
+        let direction = if stage == 3 {
+            sum
+        } else {
+            self.keep_sum(sum, prediction)
+        };
         let start = self.saved.clone().unwrap_or(sample);
         let first = self.timesteps[self.calls / 4 * 4] as i64;
         self.transfer(start, first, t - half as i64, direction)
@@ -187,7 +206,9 @@ fn adams_bashforth(history: &[Tensor<4>]) -> Tensor<4> {
     };
     let newest = history[history.len() - 1].clone() * weights[0];
     let older = history.iter().rev().zip(weights).skip(1);
-    older.fold(newest, |sum, (prediction, &weight)| sum + prediction.clone() * weight)
+    older.fold(newest, |sum, (prediction, &weight)| {
+        sum + prediction.clone() * weight
+    })
 }
 
 impl Scheduler for Pndm {
@@ -200,7 +221,12 @@ impl Scheduler for Pndm {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, sample, .. } = input;
+        let StepInput {
+            index,
+            prediction,
+            sample,
+            ..
+        } = input;
         let t = self.timesteps[index] as i64;
         let output = if self.calls < self.runge_kutta_calls {
             self.runge_kutta(t, sample, prediction)

@@ -25,7 +25,12 @@ impl Prediction {
     /// ```text
     /// ε: (x − σ ε)/α     v: (α x/s − σ v)/s, s² = α² + σ²     flow: x − σ v
     /// ```
-    pub fn denoised(self, level: NoiseLevel, sample: Tensor<4>, prediction: Tensor<4>) -> Tensor<4> {
+    pub fn denoised(
+        self,
+        level: NoiseLevel,
+        sample: Tensor<4>,
+        prediction: Tensor<4>,
+    ) -> Tensor<4> {
         let NoiseLevel { signal, noise } = level;
         match self {
             Self::Epsilon => (sample - prediction * noise) / signal,
@@ -119,7 +124,10 @@ impl Clipping {
             Self::Range(range) => denoised.clamp(-range, range),
             Self::Dynamic { ratio, max } => {
                 let limit = quantile(denoised.clone().abs(), ratio).clamp(1.0, max);
-                denoised.max_pair(limit.clone().neg()).min_pair(limit.clone()) / limit
+                denoised
+                    .max_pair(limit.clone().neg())
+                    .min_pair(limit.clone())
+                    / limit
             }
         }
     }
@@ -148,7 +156,11 @@ impl Clipping {
         check_range("dynamic_thresholding_ratio", ratio, 0.0, 1.0)?;
         check_range("sample_max_value", max, 1.0, f64::MAX)?;
         let on = options.bool("thresholding", false)?;
-        Ok(if on { Self::Dynamic { ratio, max } } else { Self::Off })
+        Ok(if on {
+            Self::Dynamic { ratio, max }
+        } else {
+            Self::Off
+        })
     }
 }
 

@@ -77,7 +77,11 @@ impl NoiseSchedule {
         {
             *last = f32::EPSILON / 2.0;
         }
-        Ok(Self { curve: curve.clone(), betas, alphas_cumprod })
+        Ok(Self {
+            curve: curve.clone(),
+            betas,
+            alphas_cumprod,
+        })
     }
 
     /// Number of training steps T.
@@ -121,30 +125,38 @@ impl NoiseSchedule {
     /// Noise relative to the signal, σₜ = √((1 − ᾱₜ)/ᾱₜ), rising with t; infinite where no signal
     /// is left.
     pub fn sigmas(&self) -> Vec<f32> {
-        self.alphas_cumprod.iter().map(|alpha| ((1.0 - alpha) / alpha).sqrt()).collect()
+        self.alphas_cumprod
+            .iter()
+            .map(|alpha| ((1.0 - alpha) / alpha).sqrt())
+            .collect()
     }
 }
 
 impl NoiseLevel {
     /// √ᾱ and √(1 − ᾱ).
     pub(super) fn from_alpha_cumprod(alpha_cumprod: f64) -> Self {
-        Self { signal: alpha_cumprod.sqrt(), noise: (1.0 - alpha_cumprod).sqrt() }
+        Self {
+            signal: alpha_cumprod.sqrt(),
+            noise: (1.0 - alpha_cumprod).sqrt(),
+        }
     }
 }
 
 impl BetaCurve {
     fn betas(&self, steps: usize) -> Result<Vec<f32>> {
-        if let Self::Linear(first, last) | Self::ScaledLinear(first, last) | Self::Sigmoid(first, last) =
-            *self
+        if let Self::Linear(first, last)
+        | Self::ScaledLinear(first, last)
+        | Self::Sigmoid(first, last) = *self
         {
             check_range("beta_start", first, 1e-8, 0.9999)?;
             check_range("beta_end", last, 1e-8, 0.9999)?;
         }
         Ok(match self {
             Self::Linear(first, last) => linspace(*first, *last, steps),
-            Self::ScaledLinear(first, last) => {
-                linspace(first.sqrt(), last.sqrt(), steps).iter().map(|root| root * root).collect()
-            }
+            Self::ScaledLinear(first, last) => linspace(first.sqrt(), last.sqrt(), steps)
+                .iter()
+                .map(|root| root * root)
+                .collect(),
             Self::SquaredCosine => betas_of(squared_cosine, steps),
             Self::Exponential => betas_of(|t| (-12.0 * t).exp(), steps),
             Self::Sigmoid(first, last) => sigmoid_betas(*first, *last, steps),
@@ -155,7 +167,10 @@ impl BetaCurve {
     /// Reads `beta_schedule`, `beta_start`, `beta_end` and `trained_betas`.
     pub(super) fn take(options: &mut Options, defaults: &ScheduleDefaults) -> Result<Self> {
         let (first, last) = defaults.ends;
-        let ends = (options.f64("beta_start", first)?, options.f64("beta_end", last)?);
+        let ends = (
+            options.f64("beta_start", first)?,
+            options.f64("beta_end", last)?,
+        );
         let name = options.string("beta_schedule", defaults.curve)?;
         if let Some(list) = options.take("trained_betas") {
             return trained_list(options, &list);
@@ -213,7 +228,11 @@ fn linspace(first: f64, last: f64, steps: usize) -> Vec<f32> {
     let (first, last) = (first as f32, last as f32);
     let step = (last - first) / (steps - 1) as f32;
     let value = |i: usize| {
-        if i < steps / 2 { first + step * i as f32 } else { last - step * (steps - 1 - i) as f32 }
+        if i < steps / 2 {
+            first + step * i as f32
+        } else {
+            last - step * (steps - 1 - i) as f32
+        }
     };
     (0..steps).map(value).collect()
 }
@@ -221,21 +240,33 @@ fn linspace(first: f64, last: f64, steps: usize) -> Vec<f32> {
 /// The β that make the signal fall as a function of t in [0, 1], at most 0.999.
 fn betas_of(signal: impl Fn(f64) -> f64, steps: usize) -> Vec<f32> {
     let at = |i: usize| signal(i as f64 / steps as f64);
-    (0..steps).map(|i| (1.0 - at(i + 1) / at(i)).min(0.999) as f32).collect()
+    (0..steps)
+        .map(|i| (1.0 - at(i + 1) / at(i)).min(0.999) as f32)
+        .collect()
 }
 
 fn squared_cosine(t: f64) -> f64 {
-    ((t + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2).cos().powi(2)
+    ((t + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2)
+        .cos()
+        .powi(2)
 }
 
 fn sigmoid_betas(first: f64, last: f64, steps: usize) -> Vec<f32> {
     let rise = (last - first) as f32;
     let logistic = |x: f32| 1.0 / (1.0 + (-x).exp());
-    linspace(-6.0, 6.0, steps).into_iter().map(|x| logistic(x) * rise + first as f32).collect()
+    linspace(-6.0, 6.0, steps)
+        .into_iter()
+        .map(|x| logistic(x) * rise + first as f32)
+        .collect()
 }
 
 fn trained(betas: &[f64], steps: usize) -> Result<Vec<f32>> {
-    check_range("length of trained_betas", betas.len() as f64, steps as f64, steps as f64)?;
+    check_range(
+        "length of trained_betas",
+        betas.len() as f64,
+        steps as f64,
+        steps as f64,
+    )?;
     for (i, &beta) in betas.iter().enumerate() {
         let (min, max) = if i == 0 { (1e-8, 0.9999) } else { (0.0, 1.0) };
         check_range("trained_betas", beta, min, max)?;
@@ -244,8 +275,9 @@ fn trained(betas: &[f64], steps: usize) -> Result<Vec<f32>> {
 }
 
 fn trained_list(options: &Options, list: &Value) -> Result<BetaCurve> {
-    let numbers: Option<Vec<f64>> =
-        list.as_array().and_then(|list| list.iter().map(Value::as_f64).collect());
+    let numbers: Option<Vec<f64>> = list
+        .as_array()
+        .and_then(|list| list.iter().map(Value::as_f64).collect());
     match numbers {
         Some(betas) => Ok(BetaCurve::Trained(betas)),
         None => Err(options.unsupported("trained_betas", list, "a list of numbers")),
@@ -271,9 +303,15 @@ fn without_terminal_signal(betas: &[f32]) -> Vec<f32> {
     let roots: Vec<f32> = alphas_cumprod.into_iter().map(f32::sqrt).collect();
     let (first, last) = (roots[0], roots[roots.len() - 1]);
     let stretch = first / (first - last);
-    let squares: Vec<f32> = roots.iter().map(|root| ((root - last) * stretch).powi(2)).collect();
+    let squares: Vec<f32> = roots
+        .iter()
+        .map(|root| ((root - last) * stretch).powi(2))
+        .collect();
     let ratios = squares.windows(2).map(|pair| pair[1] / pair[0]);
-    std::iter::once(squares[0]).chain(ratios).map(|alpha| 1.0 - alpha).collect()
+    std::iter::once(squares[0])
+        .chain(ratios)
+        .map(|alpha| 1.0 - alpha)
+        .collect()
 }
 
 /// The error for a training step that the schedule does not have.
@@ -338,7 +376,11 @@ mod tests {
     fn signal_falls_and_noise_rises_for_every_curve_and_length() {
         for curve in &CURVES {
             for steps in [2, 3, 10, 999, 1000, 4000] {
-                for terminal in [TerminalSnr::Kept, TerminalSnr::Zero, TerminalSnr::AlmostZero] {
+                for terminal in [
+                    TerminalSnr::Kept,
+                    TerminalSnr::Zero,
+                    TerminalSnr::AlmostZero,
+                ] {
                     let schedule = NoiseSchedule::new(curve, steps, terminal).unwrap();
                     let alphas = schedule.alphas_cumprod();
                     // The 2⁻²⁴ at the end may lie above what stretching leaves just before it.
@@ -371,7 +413,9 @@ mod tests {
         assert!(new(BetaCurve::Linear(f64::NAN, 0.02), 1000).is_err());
         assert!(new(BetaCurve::SquaredCosine, 1).is_err());
         assert!(new(BetaCurve::SquaredCosine, usize::MAX).is_err());
-        let error = new(BetaCurve::Trained(vec![0.1]), 3).unwrap_err().to_string();
+        let error = new(BetaCurve::Trained(vec![0.1]), 3)
+            .unwrap_err()
+            .to_string();
         assert_eq!(error, "length of trained_betas is 1, outside [3, 3]");
     }
 }

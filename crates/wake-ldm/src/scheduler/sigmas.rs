@@ -40,8 +40,13 @@ pub(super) struct SigmaOptions {
 
 impl SigmaOptions {
     /// The levels of the visited steps.
-    pub(super) const STEPS: Self =
-        Self { spread: Spread::Steps, min: None, max: None, flow_shift: 1.0, log_linear: false };
+    pub(super) const STEPS: Self = Self {
+        spread: Spread::Steps,
+        min: None,
+        max: None,
+        flow_shift: 1.0,
+        log_linear: false,
+    };
 
     /// Reads which of `known` spreads is asked for.
     pub(super) fn take(options: &mut Options, known: &[Spread]) -> Result<Self> {
@@ -76,19 +81,23 @@ impl SigmaOptions {
         let last = self.min.unwrap_or(sigmas[sigmas.len() - 1]);
         match self.spread {
             Spread::Karras => karras(first, last, n),
-            Spread::Exponential | Spread::Lu => {
-                linspace(first.ln(), last.ln(), n).into_iter().map(f64::exp).collect()
-            }
+            Spread::Exponential | Spread::Lu => linspace(first.ln(), last.ln(), n)
+                .into_iter()
+                .map(f64::exp)
+                .collect(),
             Spread::Steps | Spread::Flow => sigmas.to_vec(),
         }
     }
 }
 
-/// σᵢ = (σ_max^{1/ρ} + i/(n−1) (σ_min^{1/ρ} − σ_max^{1/ρ}))^ρ with ρ = 7.
+/// `σᵢ = (σ_max^{1/ρ} + i/(n−1) (σ_min^{1/ρ} − σ_max^{1/ρ}))^ρ` with ρ = 7.
 fn karras(first: f64, last: f64, n: usize) -> Vec<f64> {
     const RHO: f64 = 7.0;
     let (first, last) = (first.powf(1.0 / RHO), last.powf(1.0 / RHO));
-    linspace(0.0, 1.0, n).into_iter().map(|ramp| (first + ramp * (last - first)).powf(RHO)).collect()
+    linspace(0.0, 1.0, n)
+        .into_iter()
+        .map(|ramp| (first + ramp * (last - first)).powf(RHO))
+        .collect()
 }
 
 /// The noise levels of all training steps, and what lies between them.
@@ -158,30 +167,47 @@ impl SigmaPath {
         let end = if end_at_zero { 0.0 } else { table.smallest() };
         let mut timesteps: Vec<f64> = steps.fractional(n)?.into_iter().map(round).collect();
         let mut sigmas: Vec<f64> = if options.log_linear {
-            let all = SigmaOptions { spread: Spread::Exponential, ..*options };
+            let all = SigmaOptions {
+                spread: Spread::Exponential,
+                ..*options
+            };
             all.respread(&table.falling(), n + 1)
         } else {
             timesteps.iter().map(|&t| table.sigma(t)).collect()
         };
         if options.spread != Spread::Steps {
             sigmas = options.respread(&sigmas, n);
-            timesteps = sigmas.iter().map(|&sigma| round(table.timestep(sigma))).collect();
+            timesteps = sigmas
+                .iter()
+                .map(|&sigma| round(table.timestep(sigma)))
+                .collect();
         }
         check_positive(&sigmas)?;
         sigmas.push(end);
         let sigmas = sigmas.into_iter().map(round).collect();
-        Ok(Self { timesteps, sigmas, leading: steps.spacing == Spacing::Leading })
+        Ok(Self {
+            timesteps,
+            sigmas,
+            leading: steps.spacing == Spacing::Leading,
+        })
     }
 
     /// What noise is multiplied with at the start: σ, or √(σ² + 1) with leading spacing.
     pub(super) fn init_noise_sigma(&self) -> f64 {
         let largest = self.sigmas.iter().copied().fold(0.0, f64::max);
-        if self.leading { largest.hypot(1.0) } else { largest }
+        if self.leading {
+            largest.hypot(1.0)
+        } else {
+            largest
+        }
     }
 
     /// The level x = x₀ + σ n before a step.
     pub(super) fn level(&self, index: usize) -> NoiseLevel {
-        NoiseLevel { signal: 1.0, noise: self.sigmas[index] }
+        NoiseLevel {
+            signal: 1.0,
+            noise: self.sigmas[index],
+        }
     }
 
     /// What the model's input is multiplied with: 1/√(σ² + 1).
@@ -207,7 +233,10 @@ pub(super) fn take_final_zero(options: &mut Options) -> Result<bool> {
 
 /// Refuses a path on which some noise level is not a positive number.
 pub(super) fn check_positive(sigmas: &[f64]) -> Result<()> {
-    match sigmas.iter().find(|sigma| !sigma.is_finite() || **sigma <= 0.0) {
+    match sigmas
+        .iter()
+        .find(|sigma| !sigma.is_finite() || **sigma <= 0.0)
+    {
         None => Ok(()),
         Some(&sigma) => Err(Error::OutOfRange {
             name: "sigma (from sigma_min, sigma_max and the schedule)".to_owned(),
@@ -231,8 +260,9 @@ mod tests {
     /// The published Karras levels of Stable Diffusion's range, in ten steps.
     #[test]
     fn karras_levels_are_the_published_ones() {
-        let expected =
-            [14.6146, 9.1029, 5.4784, 3.1686, 1.7494, 0.9141, 0.4469, 0.2014, 0.0819, 0.0292];
+        let expected = [
+            14.6146, 9.1029, 5.4784, 3.1686, 1.7494, 0.9141, 0.4469, 0.2014, 0.0819, 0.0292,
+        ];
         for (sigma, expected) in karras(14.6146, 0.0291672, 10).into_iter().zip(expected) {
             assert!((sigma - expected).abs() < 6e-5, "{sigma} {expected}");
         }

@@ -44,7 +44,11 @@ impl Steps {
         };
         let offset = options.usize("steps_offset", 0)?;
         check_range("steps_offset", offset as f64, 0.0, train as f64)?;
-        Ok(Self { spacing, offset, train })
+        Ok(Self {
+            spacing,
+            offset,
+            train,
+        })
     }
 
     /// Whole training steps, from noisy to clean.
@@ -53,7 +57,11 @@ impl Steps {
     ///
     /// [`Error::OutOfRange`] when `n` is not in 1…T.
     pub(super) fn whole(self, n: usize) -> Result<Vec<i64>> {
-        Ok(self.fractional(n)?.into_iter().map(|t| t.round_ties_even() as i64).collect())
+        Ok(self
+            .fractional(n)?
+            .into_iter()
+            .map(|t| t.round_ties_even() as i64)
+            .collect())
     }
 
     /// Training steps from noisy to clean; fractions with linspace spacing.
@@ -96,18 +104,26 @@ impl Steps {
                 steps
             }
         };
-        Ok(steps.into_iter().map(|t| t.round_ties_even() as i64).collect())
+        Ok(steps
+            .into_iter()
+            .map(|t| t.round_ties_even() as i64)
+            .collect())
     }
 
     fn leading(self, n: usize, ratio: usize) -> Vec<f64> {
-        (0..n).rev().map(|i| (i * ratio + self.offset) as f64).collect()
+        (0..n)
+            .rev()
+            .map(|i| (i * ratio + self.offset) as f64)
+            .collect()
     }
 
     /// Rounded T − i·T/n, less 1.
     fn trailing(self, n: usize) -> Vec<f64> {
         let train = self.train as f64;
         let ratio = train / n as f64;
-        (0..n).map(|i| (train - i as f64 * ratio).round_ties_even() - 1.0).collect()
+        (0..n)
+            .map(|i| (train - i as f64 * ratio).round_ties_even() - 1.0)
+            .collect()
     }
 }
 
@@ -117,7 +133,15 @@ pub(super) fn linspace(first: f64, last: f64, n: usize) -> Vec<f64> {
         return vec![first];
     }
     let step = (last - first) / (n - 1) as f64;
-    (0..n).map(|i| if i + 1 == n { last } else { first + i as f64 * step }).collect()
+    (0..n)
+        .map(|i| {
+            if i + 1 == n {
+                last
+            } else {
+                first + i as f64 * step
+            }
+        })
+        .collect()
 }
 
 /// The error for a number of steps that a method cannot take.
@@ -135,7 +159,11 @@ mod tests {
     use super::*;
 
     fn steps(spacing: Spacing, offset: usize) -> Steps {
-        Steps { spacing, offset, train: 1000 }
+        Steps {
+            spacing,
+            offset,
+            train: 1000,
+        }
     }
 
     #[test]
@@ -154,7 +182,10 @@ mod tests {
             for spacing in [Spacing::Leading, Spacing::Trailing, Spacing::Linspace] {
                 let whole = steps(spacing, 0).whole(n).unwrap();
                 assert_eq!(whole.len(), n);
-                assert!(whole.windows(2).all(|pair| pair[1] < pair[0]), "{spacing:?} {n}");
+                assert!(
+                    whole.windows(2).all(|pair| pair[1] < pair[0]),
+                    "{spacing:?} {n}"
+                );
                 assert!(whole[0] <= 999 && whole[n - 1] >= 0);
                 match spacing {
                     Spacing::Leading => assert_eq!(whole[n - 1], 0),

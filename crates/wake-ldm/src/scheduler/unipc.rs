@@ -63,29 +63,54 @@ impl UniPcConfig {
             Err(options.unsupported(option, &value, supported))
         };
         if zero && self.plain {
-            return refuse("solver_type", "bh1".into(), "bh2 with final_sigmas_type zero");
+            return refuse(
+                "solver_type",
+                "bh1".into(),
+                "bh2 with final_sigmas_type zero",
+            );
         }
         if zero && !self.data {
-            return refuse("predict_x0", false.into(), "true with final_sigmas_type zero");
+            return refuse(
+                "predict_x0",
+                false.into(),
+                "true with final_sigmas_type zero",
+            );
         }
         if zero && !self.lower_order_final && self.order > 1 {
-            return refuse("lower_order_final", false.into(), "true with final_sigmas_type zero");
+            return refuse(
+                "lower_order_final",
+                false.into(),
+                "true with final_sigmas_type zero",
+            );
         }
         if !zero && self.path.sigmas.spread != Spread::Steps {
-            return refuse("final_sigmas_type", "sigma_min".into(), "zero with spread sigmas");
+            return refuse(
+                "final_sigmas_type",
+                "sigma_min".into(),
+                "zero with spread sigmas",
+            );
         }
         Ok(())
     }
 
     pub(super) fn init(&self, n: usize) -> Result<UniPc> {
         let path = self.path.path(&self.schedule, n)?;
-        Ok(UniPc { config: self.clone(), path, history: Vec::new(), last: None })
+        Ok(UniPc {
+            config: self.clone(),
+            path,
+            history: Vec::new(),
+            last: None,
+        })
     }
 }
 
 fn take_prediction(options: &mut Options, spread: Spread, data: bool) -> Result<Prediction> {
     if spread != Spread::Flow {
-        let known = [Prediction::Epsilon, Prediction::Sample, Prediction::Velocity];
+        let known = [
+            Prediction::Epsilon,
+            Prediction::Sample,
+            Prediction::Velocity,
+        ];
         return Prediction::take(options, &known);
     }
     if data {
@@ -119,9 +144,13 @@ fn take_plain(options: &mut Options) -> Result<bool> {
 }
 
 fn take_uncorrected(options: &mut Options) -> Result<Vec<usize>> {
-    let Some(value) = options.take("disable_corrector") else { return Ok(vec![]) };
+    let Some(value) = options.take("disable_corrector") else {
+        return Ok(vec![]);
+    };
     let count = |entry: &Value| entry.as_u64().and_then(|count| usize::try_from(count).ok());
-    let list = value.as_array().and_then(|list| list.iter().map(count).collect());
+    let list = value
+        .as_array()
+        .and_then(|list| list.iter().map(count).collect());
     list.ok_or_else(|| options.unsupported("disable_corrector", &value, "a list of steps"))
 }
 
@@ -161,11 +190,24 @@ struct Update {
 }
 
 impl UniPc {
-    fn convert(&self, level: NoiseLevel, sample: &Tensor<4>, prediction: Tensor<4>) -> [Tensor<4>; 2] {
-        let UniPcConfig { prediction: kind, clipping, data, .. } = self.config;
+    fn convert(
+        &self,
+        level: NoiseLevel,
+        sample: &Tensor<4>,
+        prediction: Tensor<4>,
+    ) -> [Tensor<4>; 2] {
+        let UniPcConfig {
+            prediction: kind,
+            clipping,
+            data,
+            ..
+        } = self.config;
         let denoised = clipping.apply(kind.denoised(level, sample.clone(), prediction.clone()));
-        let kept =
-            if data { denoised.clone() } else { kind.noise(level, sample.clone(), prediction) };
+        let kept = if data {
+            denoised.clone()
+        } else {
+            kind.noise(level, sample.clone(), prediction)
+        };
         [denoised, kept]
     }
 
@@ -204,7 +246,9 @@ impl UniPc {
 
     /// The step to the next level from what is known at this one, Eq. 3.
     fn predict(&self, index: usize, order: usize, sample: Tensor<4>) -> Tensor<4> {
-        let Some(update) = self.update(index, order) else { return sample };
+        let Some(update) = self.update(index, order) else {
+            return sample;
+        };
         let newest = self.history[0].clone();
         let next = sample * update.sample + newest * update.value;
         let weights = match order {
@@ -219,12 +263,19 @@ impl UniPc {
 
     /// The last step again, now that its end is known, Eq. 9.
     fn correct(&self, index: usize, sample: Tensor<4>, here: &Tensor<4>) -> Tensor<4> {
-        let Some((start, order)) = self.last.clone() else { return sample };
-        let Some(update) = self.update(index - 1, order) else { return sample };
+        let Some((start, order)) = self.last.clone() else {
+            return sample;
+        };
+        let Some(update) = self.update(index - 1, order) else {
+            return sample;
+        };
         let newest = self.history[0].clone();
         let again = start * update.sample + newest.clone() * update.value;
-        let weights =
-            if order == 1 { vec![0.5] } else { solve(&update.ratios, &update.moments) };
+        let weights = if order == 1 {
+            vec![0.5]
+        } else {
+            solve(&update.ratios, &update.moments)
+        };
         let change = (here.clone() - newest) * weights[order - 1];
         let change = match self.differences(&update, &weights[..order - 1]) {
             Some(sum) if order > 1 => change + sum,
@@ -237,8 +288,14 @@ impl UniPc {
     fn order(&self, index: usize) -> usize {
         let left = self.path.len() - index;
         let most = self.config.order;
-        let wanted = if self.config.lower_order_final { most.min(left) } else { most };
-        1 + self.path.usable_before(index, wanted.min(self.history.len()) - 1)
+        let wanted = if self.config.lower_order_final {
+            most.min(left)
+        } else {
+            most
+        };
+        1 + self
+            .path
+            .usable_before(index, wanted.min(self.history.len()) - 1)
     }
 }
 
@@ -264,14 +321,19 @@ fn solve(ratios: &[f64], moments: &[f64]) -> Vec<f64> {
     };
     let mut rows: Vec<Vec<f64>> = (0..n).map(row).collect();
     for column in 0..n {
-        let largest = |&a: &usize, &b: &usize| rows[a][column].abs().total_cmp(&rows[b][column].abs());
+        let largest =
+            |&a: &usize, &b: &usize| rows[a][column].abs().total_cmp(&rows[b][column].abs());
         let pivot = (column..n).max_by(largest).unwrap_or(column);
         rows.swap(column, pivot);
         let pivot_row = rows[column].clone();
         for (i, row) in rows.iter_mut().enumerate() {
             let factor = row[column] / pivot_row[column];
             for (entry, pivot) in row.iter_mut().zip(&pivot_row) {
-                *entry = if i == column { *pivot / pivot_row[column] } else { *entry - factor * pivot };
+                *entry = if i == column {
+                    *pivot / pivot_row[column]
+                } else {
+                    *entry - factor * pivot
+                };
             }
         }
     }
@@ -288,11 +350,18 @@ impl Scheduler for UniPc {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput { index, prediction, mut sample, .. } = input;
+        let StepInput {
+            index,
+            prediction,
+            mut sample,
+            ..
+        } = input;
         // 1. What the prediction says at the predicted sample.
         let [denoised, kept] = self.convert(self.path.level(index), &sample, prediction);
         // 2. With it, the last step is corrected.
-        let corrects = index.checked_sub(1).is_some_and(|last| !self.config.uncorrected.contains(&last));
+        let corrects = index
+            .checked_sub(1)
+            .is_some_and(|last| !self.config.uncorrected.contains(&last));
         if corrects {
             sample = self.correct(index, sample, &kept);
         }
@@ -301,7 +370,10 @@ impl Scheduler for UniPc {
         // 3. The next step is predicted.
         let order = self.order(index);
         self.last = Some((sample.clone(), order));
-        StepOutput { sample: self.predict(index, order, sample), denoised }
+        StepOutput {
+            sample: self.predict(index, order, sample),
+            denoised,
+        }
     }
 }
 
@@ -314,8 +386,11 @@ mod tests {
         let (ratios, moments) = ([-1.3, -0.6, 1.0], [0.4, -0.7, 0.25]);
         let weights = solve(&ratios, &moments);
         for (i, moment) in moments.iter().enumerate() {
-            let sum: f64 =
-                weights.iter().zip(ratios).map(|(w, r)| w * r.powi(i as i32)).sum();
+            let sum: f64 = weights
+                .iter()
+                .zip(ratios)
+                .map(|(w, r)| w * r.powi(i as i32))
+                .sum();
             assert!((sum - moment).abs() < 1e-13, "{i}: {sum} {moment}");
         }
     }

@@ -1,0 +1,114 @@
+//! Multi-head attention over token sequences.
+
+use burn::module::Module;
+use burn::nn::{Linear, LinearConfig};
+use burn::tensor::module::attention as scaled_dot_product;
+use burn::tensor::ops::AttentionModuleOptions;
+use burn::tensor::{DType, Device, Tensor};
+
+use super::{cast_to, is_half};
+
+/// Attention of several heads, each seeing an equal share of the channels.
+///
+/// ```text
+/// head_h = softmax(Q_h K_hᵀ / √d) V_h
+/// ```
+///
+/// - `d`: channels per head
+/// - `causal`: position i sees only positions 0…i
+///
+/// Half-precision inputs are widened to f32 for the products and the softmax, so that logits
+/// beyond 65,504 stay finite, and narrowed again.
+///
+/// # Shapes
+///
+/// - `query`: `[batch, tokens, channels]`
+/// - `key`, `value`: `[batch, tokens of the context, channels]`
+/// - result: `[batch, tokens, channels]`
+///
+/// # References
+///
+/// Vaswani et al. (2017), "Attention Is All You Need", Eq. 1.
+pub fn attention(
+    query: Tensor<3>,
+    key: Tensor<3>,
+    value: Tensor<3>,
+    heads: usize,
+    causal: bool,
+) -> Tensor<3> {
+    let dtype = query.dtype();
+    if is_half(dtype) {
+        let wide = |x| cast_to(x, DType::F32);
+        let out = attention(wide(query), wide(key), wide(value), heads, causal);
+        return cast_to(out, dtype);
+    }
+    let [batch, tokens, channels] = query.dims();
+    let options = AttentionModuleOptions {
+        is_causal: causal,
+        ..Default::default()
+    };
+    let (query, key, value) = (
+        split_heads(query, heads),
+        split_heads(key, heads),
+        split_heads(value, heads),
+    );
+    scaled_dot_product(query, key, value, None, None, options)
+        .swap_dims(1, 2)
+        .reshape([batch, tokens, channels])
+}
+
+fn split_heads(x: Tensor<3>, heads: usize) -> Tensor<4> {
+    let [batch, tokens, channels] = x.dims();
+    x.reshape([batch, tokens, heads, channels / heads])
+        .swap_dims(1, 2)
+}
+
+/// Attention of the U-Net and the autoencoder: to itself, or to a context such as a prompt.
+#[derive(Module, Debug)]
+pub struct CrossAttention {
+    to_q: Linear,
+    to_k: Linear,
+    to_v: Linear,
+    to_out: Linear,
+    heads: usize,
+}
+
+impl CrossAttention {
+    /// A layer with random weights; `bias` says whether query, key and value have one.
+    pub fn new(
+        channels: usize,
+        context_channels: usize,
+        heads: usize,
+        bias: bool,
+        device: &Device,
+    ) -> Self {
+        let linear = |from, bias| {
+            LinearConfig::new(from, channels)
+                .with_bias(bias)
+                .init(device)
+        };
+        Self {
+            to_q: linear(channels, bias),
+            to_k: linear(context_channels, bias),
+            to_v: linear(context_channels, bias),
+            to_out: linear(channels, true),
+            heads,
+        }
+    }
+
+    /// Attends from `x` to `context`, or to `x` itself where there is none.
+    ///
+    /// # Shapes
+    ///
+    /// - `x`: `[batch, tokens, channels]`
+    /// - `context`: `[batch, tokens of the context, context_channels]`
+    /// - result: as `x`
+    pub fn forward(&self, x: Tensor<3>, context: Option<Tensor<3>>) -> Tensor<3> {
+        let context = context.unwrap_or_else(|| x.clone());
+        let key = self.to_k.forward(context.clone());
+        let value = self.to_v.forward(context);
+        let query = self.to_q.forward(x);
+        self.to_out
+            .forward(attention(query, key, value, self.heads, false))
+    }
+}

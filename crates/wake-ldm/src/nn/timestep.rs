@@ -1,0 +1,87 @@
+//! How a diffusion step, or any vector of numbers, enters the U-Net.
+
+use burn::module::Module;
+use burn::nn::{Linear, LinearConfig};
+use burn::tensor::activation::silu;
+use burn::tensor::{Device, Tensor};
+
+/// Waves of the step number, from period 2π down to 2π · 10⁴.
+///
+/// ```text
+/// ω_i = 10000^(−i / (n/2 − s)),   e(t) = [cos(t ω_0…), sin(t ω_0…)]
+/// ```
+///
+/// - `channels` n, even
+/// - `frequency_shift` s: 0 in Stable Diffusion
+/// - `cos_first`: else the sines come first
+///
+/// The frequencies are rounded as torch rounds them, since t ω reaches 999.
+///
+/// # Shapes
+///
+/// `timesteps`: `[batch]`; result: `[batch, channels]`.
+///
+/// # References
+///
+/// Vaswani et al. (2017), "Attention Is All You Need", section 3.5.
+pub fn sinusoidal_embedding(
+    timesteps: Tensor<1>,
+    channels: usize,
+    cos_first: bool,
+    frequency_shift: f64,
+) -> Tensor<2> {
+    let half = channels / 2;
+    let frequencies = Tensor::<1>::from_floats(
+        frequencies(half, frequency_shift).as_slice(),
+        &timesteps.device(),
+    );
+    let angles = timesteps.unsqueeze_dim::<2>(1) * frequencies.unsqueeze::<2>();
+    let (cos, sin) = (angles.clone().cos(), angles.sin());
+    if cos_first {
+        Tensor::cat(vec![cos, sin], 1)
+    } else {
+        Tensor::cat(vec![sin, cos], 1)
+    }
+}
+
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "channel counts are far below 2²⁴"
+)]
+fn frequencies(half: usize, shift: f64) -> Vec<f32> {
+    let rate = -(10_000.0_f64.ln()) as f32;
+    let range = (half as f64 - shift) as f32;
+    (0..half).map(|i| (rate * i as f32 / range).exp()).collect()
+}
+
+/// Two linear layers around a SiLU.
+#[derive(Module, Debug)]
+pub struct TimestepEmbedding {
+    linear_1: Linear,
+    linear_2: Linear,
+}
+
+impl TimestepEmbedding {
+    /// Length of what is embedded.
+    pub fn input_channels(&self) -> usize {
+        let [channels, _] = self.linear_1.weight.dims();
+        channels
+    }
+
+    /// Layers with random weights.
+    pub fn new(channels_in: usize, channels_out: usize, device: &Device) -> Self {
+        Self {
+            linear_1: LinearConfig::new(channels_in, channels_out).init(device),
+            linear_2: LinearConfig::new(channels_out, channels_out).init(device),
+        }
+    }
+
+    /// Embeds a batch of vectors.
+    ///
+    /// # Shapes
+    ///
+    /// `[batch, channels_in]` to `[batch, channels_out]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        self.linear_2.forward(silu(self.linear_1.forward(x)))
+    }
+}

@@ -1,0 +1,243 @@
+//! Reading the options of a `config.json` one by one, so that none is overlooked.
+//!
+//! Every option is either taken (it shapes the model), required to have the one value that we
+//! implement, or known to change no number. Whatever is left over at the end and is neither `null`
+//! nor `false` might change the numbers, and is refused by name.
+
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use crate::error::{Error, Result};
+
+/// The options of one component that nobody has looked at yet.
+#[derive(Debug)]
+pub(crate) struct Options {
+    component: &'static str,
+    left: Map<String, Value>,
+}
+
+impl Options {
+    /// Parses the text of a configuration file; `path` only serves messages.
+    pub(crate) fn parse(component: &'static str, text: &str, path: &Path) -> Result<Self> {
+        let left = serde_json::from_str(text).map_err(|source| Error::Json {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self { component, left })
+    }
+
+    /// Takes a value; `null` counts as absent.
+    pub(crate) fn take(&mut self, key: &str) -> Option<Value> {
+        self.left.remove(key).filter(|value| !value.is_null())
+    }
+
+    /// Takes a whole number, or the default where it is absent.
+    pub(crate) fn usize(&mut self, key: &str, default: usize) -> Result<usize> {
+        match self.take(key) {
+            None => Ok(default),
+            Some(value) => as_usize(&value).ok_or_else(|| self.invalid(key, &value, "a count")),
+        }
+    }
+
+    /// Takes a number, or the default where it is absent.
+    pub(crate) fn f64(&mut self, key: &str, default: f64) -> Result<f64> {
+        Ok(self.optional_f64(key)?.unwrap_or(default))
+    }
+
+    /// Takes a number that may be absent.
+    pub(crate) fn optional_f64(&mut self, key: &str) -> Result<Option<f64>> {
+        match self.take(key) {
+            None => Ok(None),
+            Some(value) => match value.as_f64() {
+                Some(number) => Ok(Some(number)),
+                None => Err(self.invalid(key, &value, "a number")),
+            },
+        }
+    }
+
+    /// Takes a truth value, or the default where it is absent.
+    pub(crate) fn bool(&mut self, key: &str, default: bool) -> Result<bool> {
+        match self.take(key) {
+            None => Ok(default),
+            Some(value) => value
+                .as_bool()
+                .ok_or_else(|| self.invalid(key, &value, "true or false")),
+        }
+    }
+
+    /// Takes a text, or the default where it is absent.
+    pub(crate) fn string(&mut self, key: &str, default: &str) -> Result<String> {
+        match self.take(key) {
+            None => Ok(default.to_owned()),
+            Some(Value::String(text)) => Ok(text),
+            Some(value) => Err(self.invalid(key, &value, "a text")),
+        }
+    }
+
+    /// Takes a list of counts; a single count stands for `length` equal ones.
+    pub(crate) fn usizes(
+        &mut self,
+        key: &str,
+        length: usize,
+        default: usize,
+    ) -> Result<Vec<usize>> {
+        let Some(value) = self.take(key) else {
+            return Ok(vec![default; length]);
+        };
+        if let Some(count) = as_usize(&value) {
+            return Ok(vec![count; length]);
+        }
+        let counts = value
+            .as_array()
+            .and_then(|list| list.iter().map(as_usize).collect());
+        counts.ok_or_else(|| self.invalid(key, &value, "a count or a list of counts"))
+    }
+
+    /// Takes a list of counts that must be there.
+    pub(crate) fn required_usizes(&mut self, key: &str) -> Result<Vec<usize>> {
+        let value = self.take(key).unwrap_or(Value::Null);
+        let counts = value
+            .as_array()
+            .and_then(|list| list.iter().map(as_usize).collect());
+        counts.ok_or_else(|| self.invalid(key, &value, "a list of counts"))
+    }
+
+    /// Takes a list of texts that must be there.
+    pub(crate) fn required_strings(&mut self, key: &str) -> Result<Vec<String>> {
+        let value = self.take(key).unwrap_or(Value::Null);
+        let texts = value.as_array().and_then(|list| {
+            list.iter()
+                .map(|text| text.as_str().map(str::to_owned))
+                .collect::<Option<Vec<_>>>()
+        });
+        texts.ok_or_else(|| self.invalid(key, &value, "a list of texts"))
+    }
+
+    /// Takes an option that must be absent or have one of the values that we implement.
+    pub(crate) fn only<V: Into<Value> + Clone>(
+        &mut self,
+        key: &str,
+        supported: &[V],
+    ) -> Result<()> {
+        let Some(value) = self.take(key) else {
+            return Ok(());
+        };
+        let supported: Vec<Value> = supported.iter().cloned().map(Into::into).collect();
+        if supported.iter().any(|good| same(good, &value)) {
+            return Ok(());
+        }
+        let names: Vec<String> = supported.iter().map(ToString::to_string).collect();
+        Err(self.unsupported(key, &value, &names.join(", ")))
+    }
+
+    /// Takes options that change no number.
+    pub(crate) fn ignore(&mut self, keys: &[&str]) {
+        for key in keys {
+            self.left.remove(*key);
+        }
+    }
+
+    /// Refuses what is left over, except private notes (a leading underscore), `null` and `false`.
+    pub(crate) fn finish(self) -> Result<()> {
+        let harmless = |key: &str, value: &Value| {
+            key.starts_with('_') || value.is_null() || value == &Value::Bool(false)
+        };
+        match self.left.iter().find(|(key, value)| !harmless(key, value)) {
+            None => Ok(()),
+            Some((key, value)) => Err(self.unsupported(key, value, "absent or null")),
+        }
+    }
+
+    /// The error for a value that we do not implement.
+    pub(crate) fn unsupported(&self, key: &str, value: &Value, supported: &str) -> Error {
+        Error::Unsupported {
+            option: self.named(key),
+            value: value.to_string(),
+            supported: supported.to_owned(),
+        }
+    }
+
+    fn invalid(&self, key: &str, value: &Value, expected: &str) -> Error {
+        Error::InvalidOption {
+            option: self.named(key),
+            value: value.to_string(),
+            expected: expected.to_owned(),
+        }
+    }
+
+    fn named(&self, key: &str) -> String {
+        format!("{} {key}", self.component)
+    }
+}
+
+fn as_usize(value: &Value) -> Option<usize> {
+    value.as_u64().and_then(|count| usize::try_from(count).ok())
+}
+
+/// Equality that takes 0 and 0.0 for the same number.
+fn same(a: &Value, b: &Value) -> bool {
+    match (a.as_f64(), b.as_f64()) {
+        (Some(a), Some(b)) => a.total_cmp(&b).is_eq(),
+        _ => a == b,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(text: &str) -> Options {
+        Options::parse("test", text, Path::new("config.json")).unwrap()
+    }
+
+    #[test]
+    fn a_left_over_option_is_refused_by_name() {
+        let mut taken = options(r#"{"a": 1, "b": "x", "_note": 3, "c": null, "d": false}"#);
+        assert_eq!(taken.usize("a", 7).unwrap(), 1);
+        let error = taken.finish().unwrap_err();
+        assert!(matches!(&error, Error::Unsupported { option, .. } if option == "test b"));
+        assert_eq!(
+            error.to_string(),
+            "test b = \"x\" is not supported; supported: absent or null"
+        );
+    }
+
+    #[test]
+    fn an_option_with_one_value_accepts_it_in_either_spelling() {
+        assert!(options(r#"{"dropout": 0}"#).only("dropout", &[0.0]).is_ok());
+        assert!(options("{}").only("dropout", &[0.0]).is_ok());
+        assert!(
+            options(r#"{"dropout": 0.1}"#)
+                .only("dropout", &[0.0])
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn wrong_kinds_are_errors_not_panics() {
+        let text = r#"{"a": -1, "b": 1.5, "c": "x", "d": [1, "x"], "e": {}}"#;
+        assert!(options(text).usize("a", 0).is_err());
+        assert!(options(text).usize("b", 0).is_err());
+        assert!(options(text).f64("c", 0.0).is_err());
+        assert!(options(text).usizes("d", 2, 0).is_err());
+        assert!(options(text).bool("e", true).is_err());
+        assert!(options(text).string("e", "").is_err());
+        assert!(options(text).required_strings("d").is_err());
+        assert!(options(text).required_usizes("absent").is_err());
+        let deep = "[".repeat(100_000);
+        assert!(matches!(
+            Options::parse("t", &deep, Path::new("x")),
+            Err(Error::Json { .. })
+        ));
+    }
+
+    #[test]
+    fn a_single_count_stands_for_all_levels() {
+        assert_eq!(options(r#"{"h": 8}"#).usizes("h", 3, 1).unwrap(), [8, 8, 8]);
+        assert_eq!(
+            options(r#"{"h": [5, 10]}"#).usizes("h", 2, 1).unwrap(),
+            [5, 10]
+        );
+    }
+}

@@ -1,0 +1,151 @@
+//! The conditional U-Net: from a noisy image, a step and a prompt to what the noise was.
+
+mod blocks;
+mod config;
+
+use burn::module::Module;
+use burn::nn::conv::Conv2d;
+use burn::tensor::activation::silu;
+use burn::tensor::{Device, Tensor};
+
+use crate::nn::norm::GroupNorm;
+use crate::nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
+use crate::nn::{cast_to, conv3x3};
+use blocks::{DownBlock, Levels, MidBlock, UpBlock};
+
+pub use config::UNetConfig;
+
+/// What a U-Net looks at.
+#[derive(Debug, Clone)]
+pub struct UNetInput {
+    /// The noisy latent image, `[batch, in_channels, rows, columns]`.
+    pub sample: Tensor<4>,
+    /// The step of each image, `[batch]`; fractions are allowed.
+    pub timesteps: Tensor<1>,
+    /// The prompt's tokens, `[batch, tokens, cross_attention_dim]`.
+    pub context: Tensor<3>,
+    /// Numbers that condition the image beside the prompt, `[batch, condition_channels]`; `None`
+    /// leaves the model unconditioned by them.
+    pub condition: Option<Tensor<2>>,
+}
+
+/// A U-shaped stack of residual blocks and transformers.
+///
+/// ```text
+/// image ─► conv ─► down ─► down ─► … ─► middle ─► … ─► up ─► up ─► norm, conv ─► prediction
+///                    └────────┴───────── skip ──────────┘─────┘
+/// ```
+///
+/// The step (and the condition vector) enters every residual block, the prompt every transformer.
+///
+/// # References
+///
+/// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models", section
+/// 3.2 and appendix E.2.
+#[derive(Module, Debug)]
+pub struct UNet {
+    conv_in: Conv2d,
+    time_embedding: TimestepEmbedding,
+    class_embedding: Option<TimestepEmbedding>,
+    down_blocks: Vec<DownBlock>,
+    mid_block: MidBlock,
+    up_blocks: Vec<UpBlock>,
+    conv_norm_out: GroupNorm,
+    conv_out: Conv2d,
+    time_channels: usize,
+    cos_first: bool,
+    frequency_shift: f64,
+}
+
+impl UNetConfig {
+    /// A U-Net with random weights; they are drawn when they are first used.
+    ///
+    /// # Panics
+    ///
+    /// When [`validate`](Self::validate) fails.
+    pub fn init(&self, device: &Device) -> UNet {
+        if let Err(error) = self.validate() {
+            panic!("{error}");
+        }
+        let levels = Levels::new(self);
+        let width = self.block_out_channels[0];
+        let time = levels.time_channels;
+        UNet {
+            conv_in: conv3x3(self.in_channels, width, device),
+            time_embedding: TimestepEmbedding::new(width, time, device),
+            class_embedding: self
+                .condition_channels
+                .map(|channels| TimestepEmbedding::new(channels, time, device)),
+            down_blocks: levels.down(device),
+            mid_block: levels.mid(device),
+            up_blocks: levels.up(device),
+            conv_norm_out: GroupNorm::new(self.norm_groups, width, self.norm_epsilon, device),
+            conv_out: conv3x3(width, self.out_channels, device),
+            time_channels: width,
+            cos_first: self.cos_first,
+            frequency_shift: self.frequency_shift,
+        }
+    }
+}
+
+impl UNet {
+    /// Length of the condition vector, if the model has one.
+    pub fn condition_channels(&self) -> Option<usize> {
+        self.class_embedding
+            .as_ref()
+            .map(TimestepEmbedding::input_channels)
+    }
+
+    /// Predicts the noise (or velocity, or clean image, as the model was trained to).
+    ///
+    /// Inputs are cast to the precision of the weights, the result to that of the sample.
+    ///
+    /// # Shapes
+    ///
+    /// See [`UNetInput`]; result `[batch, out_channels, rows, columns]`. Rows and columns are free;
+    /// powers of two times 2^(levels − 1) avoid resizing on the way up.
+    ///
+    /// # Panics
+    ///
+    /// When the shapes do not fit, or a condition is given to a model that has none.
+    pub fn forward(&self, input: UNetInput) -> Tensor<4> {
+        let dtype = self.conv_in.weight.val().dtype();
+        let sample_dtype = input.sample.dtype();
+        let context = cast_to(input.context, dtype);
+        let time = cast_to(
+            silu(self.embed_step(input.timesteps, input.condition)),
+            dtype,
+        );
+
+        let mut x = self.conv_in.forward(cast_to(input.sample, dtype));
+        let mut skips = vec![x.clone()];
+        for block in &self.down_blocks {
+            x = block.forward(x, &time, &context, &mut skips);
+        }
+        x = self.mid_block.forward(x, &time, &context);
+        for block in &self.up_blocks {
+            x = block.forward(x, &time, &context, &mut skips);
+        }
+        cast_to(
+            self.conv_out.forward(self.conv_norm_out.forward_silu(x)),
+            sample_dtype,
+        )
+    }
+
+    /// The embedding of step and condition that every residual block sees.
+    fn embed_step(&self, timesteps: Tensor<1>, condition: Option<Tensor<2>>) -> Tensor<2> {
+        let dtype = self.conv_in.weight.val().dtype();
+        let waves = sinusoidal_embedding(
+            timesteps,
+            self.time_channels,
+            self.cos_first,
+            self.frequency_shift,
+        );
+        let embedded = self.time_embedding.forward(cast_to(waves, dtype));
+        match (condition, &self.class_embedding) {
+            (None, _) => embedded,
+            (Some(condition), Some(layer)) => embedded + layer.forward(cast_to(condition, dtype)),
+            (Some(_), None) => panic!("this U-Net has no condition vector; give `None`"),
+        }
+    }
+}

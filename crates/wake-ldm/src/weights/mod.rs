@@ -1,0 +1,291 @@
+//! Weights in the files of diffusers and transformers: reading, checking by name, writing.
+
+mod files;
+mod lora;
+mod names;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::tensor::{DType, Device, Tensor, TensorData};
+use half::{bf16, f16};
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+
+use crate::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
+use crate::error::{Error, Mismatch, Misshapen, Result};
+use crate::text::{ClipText, ClipTextConfig};
+use crate::unet::{UNet, UNetConfig};
+use files::{MappedFiles, Stored};
+use names::Path as ModulePath;
+
+pub use lora::merge_lora;
+pub use names::Layout;
+
+/// No configuration file is longer than this.
+const LONGEST_TEXT: u64 = 16 << 20;
+
+/// Reads a configuration file.
+pub(crate) fn read_text(path: &Path) -> Result<String> {
+    let io = |source| Error::Io {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    };
+    if std::fs::metadata(path).map_err(io)?.len() > LONGEST_TEXT {
+        return Err(io(std::io::Error::other(
+            "longer than 16 MiB, so no configuration",
+        )));
+    }
+    std::fs::read_to_string(path).map_err(io)
+}
+
+/// Reads the text encoder of a folder with `config.json` and weights, and its configuration.
+///
+/// # Errors
+///
+/// As [`load`], and what [`ClipTextConfig::read`] finds.
+pub fn load_text_encoder(folder: &Path, device: &Device) -> Result<(ClipText, ClipTextConfig)> {
+    let config = ClipTextConfig::read(&folder.join("config.json"))?;
+    Ok((load(config.init(device), Layout::ClipText, folder)?, config))
+}
+
+/// Reads the U-Net of a folder with `config.json` and weights, and its configuration.
+///
+/// # Errors
+///
+/// As [`load`], and what [`UNetConfig::read`] finds.
+pub fn load_unet(folder: &Path, device: &Device) -> Result<(UNet, UNetConfig)> {
+    let config = UNetConfig::read(&folder.join("config.json"))?;
+    Ok((
+        load(config.init(device), Layout::Diffusers, folder)?,
+        config,
+    ))
+}
+
+/// Reads the autoencoder of a folder with `config.json` and weights, and its configuration.
+///
+/// # Errors
+///
+/// As [`load`], and what [`AutoencoderKlConfig::read`] finds.
+pub fn load_autoencoder(
+    folder: &Path,
+    device: &Device,
+) -> Result<(AutoencoderKl, AutoencoderKlConfig)> {
+    let config = AutoencoderKlConfig::read(&folder.join("config.json"))?;
+    Ok((
+        load(config.init(device), Layout::Diffusers, folder)?,
+        config,
+    ))
+}
+
+/// Reads weights into a model, as f32: all of them, or none.
+///
+/// `path` is a safetensors file, or a folder that holds one, in one piece or in shards with an index.
+/// Files are mapped, and tensors converted one by one. f16 and bf16 are widened. The attention names of
+/// early autoencoders (`query`, `key`, `value`, `proj_attn`) and the buffer `position_ids` are known.
+///
+/// # Errors
+///
+/// [`Error::MissingFile`], [`Error::Io`] and [`Error::InvalidSafetensors`] for files that are not there
+/// or not to be trusted; [`Error::WeightsMismatch`] with every tensor that is missing, unexpected or of
+/// another shape.
+pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
+    let files = MappedFiles::open(path)?;
+    let stored = files.tensors()?;
+    let expected = shapes(&model, layout);
+    let mismatch = compare(&expected, &stored);
+    if !mismatch.is_empty() {
+        return Err(Error::WeightsMismatch {
+            path: path.to_owned(),
+            mismatch: Box::new(mismatch),
+        });
+    }
+    Ok(model.map(&mut Loader {
+        path: ModulePath::default(),
+        layout,
+        stored: &stored,
+    }))
+}
+
+/// Whether a file has tensors below a prefix.
+pub(crate) fn has_prefix(path: &Path, prefix: &str) -> Result<bool> {
+    let files = MappedFiles::open(path)?;
+    Ok(files
+        .tensors()?
+        .keys()
+        .any(|name| name.split('.').next() == Some(prefix)))
+}
+
+/// Writes a model's weights as f32 into one safetensors file that diffusers or transformers read.
+///
+/// # Errors
+///
+/// [`Error::Io`] when the file cannot be written.
+pub fn save<M: Module>(model: &M, layout: Layout, path: &Path) -> Result<()> {
+    let mut saver = Saver {
+        path: ModulePath::default(),
+        layout,
+        tensors: BTreeMap::new(),
+    };
+    model.visit(&mut saver);
+    let failed = |error| Error::Io {
+        action: "write",
+        path: path.to_owned(),
+        source: std::io::Error::other(error),
+    };
+    let mut views = Vec::with_capacity(saver.tensors.len());
+    for (name, (shape, bytes)) in &saver.tensors {
+        let view = TensorView::new(Dtype::F32, shape.clone(), bytes);
+        views.push((name, view.map_err(|error| failed(error.to_string()))?));
+    }
+    let info = Some([("format".to_owned(), "pt".to_owned())].into());
+    safetensors::serialize_to_file(views, info, path).map_err(|error| failed(error.to_string()))
+}
+
+/// Names and shapes that a model has in a file, without making its weights.
+pub fn shapes<M: Module>(model: &M, layout: Layout) -> BTreeMap<String, Vec<usize>> {
+    let mut lister = Lister {
+        path: ModulePath::default(),
+        layout,
+        shapes: BTreeMap::new(),
+    };
+    model.visit(&mut lister);
+    lister.shapes
+}
+
+/// What does not fit between a model and its files.
+fn compare(
+    expected: &BTreeMap<String, Vec<usize>>,
+    stored: &BTreeMap<String, Stored<'_>>,
+) -> Mismatch {
+    let mut mismatch = Mismatch::default();
+    for (name, shape) in expected {
+        match stored.get(name) {
+            None => mismatch.missing.push(name.clone()),
+            Some(tensor) if fits(shape, tensor) => {}
+            Some(tensor) => mismatch.misshapen.push(Misshapen {
+                name: name.clone(),
+                expected: format!("float {shape:?}"),
+                found: format!("{:?} {:?}", tensor.view.dtype(), tensor.view.shape()),
+            }),
+        }
+    }
+    let unknown = |name: &&String| !expected.contains_key(*name) && !names::is_buffer(name);
+    mismatch.unexpected = stored.keys().filter(unknown).cloned().collect();
+    mismatch
+}
+
+/// Whether a tensor is a weight of that shape; matrices may be stored as 1 × 1 convolutions.
+fn fits(shape: &[usize], tensor: &Stored<'_>) -> bool {
+    let float = matches!(
+        tensor.view.dtype(),
+        Dtype::F32 | Dtype::F16 | Dtype::BF16 | Dtype::F64
+    );
+    let found = tensor.view.shape();
+    let as_convolution = shape.len() == 2 && found.len() == 4 && found[2..] == [1, 1];
+    float && (found == shape || (as_convolution && found[..2] == *shape))
+}
+
+struct Lister {
+    path: ModulePath,
+    layout: Layout,
+    shapes: BTreeMap<String, Vec<usize>>,
+}
+
+impl ModuleVisitor for Lister {
+    fn enter_module(&mut self, name: &str, container: &str) {
+        self.path.enter(name, container);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container: &str) {
+        self.path.exit();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let mut shape = param.lazy_shape().to_vec();
+        if self.path.is_transposed(D) {
+            shape.reverse();
+        }
+        self.shapes.insert(self.path.file_name(self.layout), shape);
+    }
+}
+
+struct Loader<'a> {
+    path: ModulePath,
+    layout: Layout,
+    stored: &'a BTreeMap<String, Stored<'a>>,
+}
+
+impl ModuleMapper for Loader<'_> {
+    fn enter_module(&mut self, name: &str, container: &str) {
+        self.path.enter(name, container);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container: &str) {
+        self.path.exit();
+    }
+
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let Some(tensor) = self.stored.get(&self.path.file_name(self.layout)) else {
+            return param;
+        };
+        let device = param.lazy_device();
+        let shape = tensor.view.shape()[..D].to_vec();
+        let data = TensorData::new(widened(&tensor.view), shape);
+        let mut value = Tensor::from_data(data, (&device, DType::F32));
+        if self.path.is_transposed(D) {
+            value = value.swap_dims(0, 1);
+        }
+        let id = param.id;
+        param.transform_for_load(value, id)
+    }
+}
+
+/// The numbers of a tensor as f32.
+fn widened(view: &TensorView<'_>) -> Vec<f32> {
+    let bytes = view.data();
+    match view.dtype() {
+        Dtype::F16 => numbers(bytes, |b: [u8; 2]| f16::from_le_bytes(b).to_f32()),
+        Dtype::BF16 => numbers(bytes, |b: [u8; 2]| bf16::from_le_bytes(b).to_f32()),
+        Dtype::F64 => numbers(bytes, |b: [u8; 8]| f64::from_le_bytes(b) as f32),
+        _ => numbers(bytes, f32::from_le_bytes),
+    }
+}
+
+fn numbers<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f32) -> Vec<f32> {
+    let (chunks, _) = bytes.as_chunks::<N>();
+    chunks.iter().map(|chunk| number(*chunk)).collect()
+}
+
+struct Saver {
+    path: ModulePath,
+    layout: Layout,
+    tensors: BTreeMap<String, (Vec<usize>, Vec<u8>)>,
+}
+
+impl ModuleVisitor for Saver {
+    fn enter_module(&mut self, name: &str, container: &str) {
+        self.path.enter(name, container);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container: &str) {
+        self.path.exit();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let mut value = param.val();
+        if self.path.is_transposed(D) {
+            value = value.swap_dims(0, 1);
+        }
+        let shape = value.dims().to_vec();
+        let bytes = value
+            .into_data()
+            .iter::<f32>()
+            .flat_map(f32::to_le_bytes)
+            .collect();
+        self.tensors
+            .insert(self.path.file_name(self.layout), (shape, bytes));
+    }
+}

@@ -1,0 +1,14 @@
+//! Our models, schedulers and pipeline against torch, diffusers and transformers.
+//!
+//! The reference files are those of the folder named by `WAKE_FIXTURES`, by default the copy in
+//! `tests/fixtures`; every case that their manifests list is run, on every CPU backend compiled in.
+#![cfg(feature = "ldm")]
+#![allow(clippy::unwrap_used, reason = "in tests, a panic is the report")]
+
+mod golden;
+mod hard_cases;
+mod models;
+mod pipeline;
+mod published;
+mod requests;
+mod schedulers;
