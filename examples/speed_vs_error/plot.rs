@@ -13,7 +13,11 @@ const STAGES: [(&str, RGBColor); 5] = [
 ];
 
 /// Draws the rows of one size: fast methods as joined dots, oracles as crosses of the same colour at their time.
-pub fn draw(path: &Path, rows: &[Row], size: usize) -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn draw(
+    path: &Path,
+    rows: &[Row],
+    size: usize,
+) -> Result<(), Box<dyn std::error::Error>> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.size == size).collect();
     let area = SVGBackend::new(path, (900, 620)).into_drawing_area();
     area.fill(&WHITE)?;

@@ -5,31 +5,31 @@ use std::time::Instant;
 
 /// One fast method against its oracle.
 #[derive(Debug, Clone, Serialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// Stage of the data flow.
-    pub stage: &'static str,
+    pub(crate) stage: &'static str,
     /// Pixels along each side.
-    pub size: usize,
+    pub(crate) size: usize,
     /// Tolerance asked for.
-    pub tolerance: f64,
+    pub(crate) tolerance: f64,
     /// Seconds of the fast method: the median of several runs.
-    pub fast_seconds: f64,
+    pub(crate) fast_seconds: f64,
     /// Seconds of the oracle.
-    pub oracle_seconds: f64,
+    pub(crate) oracle_seconds: f64,
     /// Whether the oracle ran on some pixels only and its time was scaled up.
-    pub extrapolated: bool,
+    pub(crate) extrapolated: bool,
     /// Seconds of the same sum as a matrix product, where there is one; scaled up from some rows above 256².
-    pub matrix_product_seconds: Option<f64>,
+    pub(crate) matrix_product_seconds: Option<f64>,
     /// Oracle over fast seconds.
-    pub ratio: f64,
+    pub(crate) ratio: f64,
     /// Largest error, relative to the root mean square (fields) or the mean (σ⁰, image); over all quantities.
-    pub max_error: f64,
+    pub(crate) max_error: f64,
     /// Root mean square error, likewise.
-    pub rms_error: f64,
+    pub(crate) rms_error: f64,
 }
 
 /// Median seconds of `runs` calls after one that is not counted, and the last result.
-pub fn median_seconds<T>(runs: usize, mut call: impl FnMut() -> T) -> (f64, T) {
+pub(crate) fn median_seconds<T>(runs: usize, mut call: impl FnMut() -> T) -> (f64, T) {
     let mut result = call();
     let mut seconds: Vec<f64> = (0..runs)
         .map(|_| {
@@ -43,7 +43,7 @@ pub fn median_seconds<T>(runs: usize, mut call: impl FnMut() -> T) -> (f64, T) {
 }
 
 /// Seconds of one call, and its result.
-pub fn seconds<T>(call: impl FnOnce() -> T) -> (f64, T) {
+pub(crate) fn seconds<T>(call: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let result = call();
     (start.elapsed().as_secs_f64(), result)
@@ -51,14 +51,14 @@ pub fn seconds<T>(call: impl FnOnce() -> T) -> (f64, T) {
 
 /// Largest and root-mean-square error of some values against exact ones.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Errors {
-    pub max: f64,
-    pub rms: f64,
+pub(crate) struct Errors {
+    pub(crate) max: f64,
+    pub(crate) rms: f64,
 }
 
 impl Errors {
     /// Errors relative to `scale`.
-    pub fn of(fast: impl Iterator<Item = f64>, exact: &[f64], scale: f64) -> Self {
+    pub(crate) fn of(fast: impl Iterator<Item = f64>, exact: &[f64], scale: f64) -> Self {
         let (mut max, mut sum) = (0.0f64, 0.0);
         for (a, b) in fast.zip(exact) {
             max = max.max((a - b).abs());
@@ -73,7 +73,7 @@ impl Errors {
     }
 
     /// The larger of each.
-    pub fn worst(self, other: Self) -> Self {
+    pub(crate) fn worst(self, other: Self) -> Self {
         Self {
             max: self.max.max(other.max),
             rms: self.rms.max(other.rms),

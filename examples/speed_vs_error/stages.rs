@@ -20,7 +20,7 @@ use wake_physics::{
 };
 
 /// Stages in the order of the data flow.
-pub const STAGES: [&str; 5] = ["sea", "kelvin", "backscatter", "bunching", "scene"];
+pub(crate) const STAGES: [&str; 5] = ["sea", "kelvin", "backscatter", "bunching", "scene"];
 
 /// Waves of sea and wake: the paper's scale.
 const WAVES: usize = 10_000;
@@ -52,7 +52,11 @@ const TRANSFER: Transfer = Transfer {
 };
 
 /// Measures one stage.
-pub fn measure(stage: &'static str, size: usize, tolerance: f64) -> wake_physics::Result<Row> {
+pub(crate) fn measure(
+    stage: &'static str,
+    size: usize,
+    tolerance: f64,
+) -> wake_physics::Result<Row> {
     let raster = Raster::image(size, size, 2.5);
     Ok(match stage {
         "sea" => sea(&raster, tolerance),

@@ -59,6 +59,7 @@ pub fn group_speed(wavenumber: f64, depth: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that must be the same bits")]
 mod tests {
     use super::*;
 

@@ -193,6 +193,7 @@ impl Field {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that must be the same bits")]
 mod tests {
     use super::*;
 

@@ -133,7 +133,7 @@ impl Setup {
         )
     }
 
-    /// Wavenumber of the radar k_e [rad/m].
+    /// Wavenumber of the radar `k_e` [rad/m].
     fn radar_wavenumber(&self) -> f64 {
         TAU / self.wavelength
     }

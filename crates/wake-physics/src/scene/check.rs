@@ -95,6 +95,7 @@ impl Radar {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that must be the same bits")]
 mod tests {
     use super::*;
 

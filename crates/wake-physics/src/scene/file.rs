@@ -99,6 +99,7 @@ fn toml_value(text: &str) -> Option<toml::Value> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that must be the same bits")]
 mod tests {
     use super::*;
     use crate::scene::{Grid, Model, Radar, Sea, Term, TermRule, Terms};

@@ -162,7 +162,7 @@ pub struct Ship {
     pub block_coefficient: Option<f64>,
     /// Whether the radar echo of the ship itself is drawn.
     pub echo: bool,
-    /// Weights the wake's spectrum with exp(−k·filter_depth) [m], 0 to 20.
+    /// Weights the wake's spectrum with `exp(−k·filter_depth)` [m], 0 to 20.
     pub filter_depth: f64,
 }
 

@@ -1,5 +1,12 @@
 //! Whole scenes: hard cases, fast against direct, the plan's bounds, and trends that radar images show.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::float_cmp, reason = "values that must be the same bits")]
+#![allow(
+    clippy::field_reassign_with_default,
+    reason = "a scene is a default with some values changed"
+)]
+
 mod hard_cases;
 mod methods;
 mod plan_bounds;
