@@ -8,6 +8,7 @@
 mod golden;
 #[cfg(feature = "train")]
 mod gradients;
+mod hard_cases;
 mod models;
 mod pipeline;
 mod precision;

@@ -265,3 +265,11 @@ fn requests_that_make_no_sense_are_refused_by_name() {
         assert_eq!(named, name, "{error}");
     }
 }
+
+#[test]
+#[cfg(feature = "flex")]
+fn every_compiled_device_passes_the_self_check() {
+    for (backend, device) in devices() {
+        wake_ldm::self_check(&device).unwrap_or_else(|error| panic!("{backend}: {error}"));
+    }
+}

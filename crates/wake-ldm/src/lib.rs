@@ -15,5 +15,9 @@ pub mod scheduler;
 pub mod weights;
 
 pub mod pipeline;
+#[cfg(feature = "flex")]
+mod self_check;
 
 pub use error::{Error, Mismatch, Misshapen, Result};
+#[cfg(feature = "flex")]
+pub use self_check::self_check;
