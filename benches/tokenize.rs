@@ -1,8 +1,10 @@
 //! Prompts per second, single and as a batch on all cores, beside the crate `instant-clip-tokenizer`.
 //!
-//! `cargo bench --no-default-features --bench tokenize` ends with the ratio of the two, measured in turns.
+//! `cargo bench --no-default-features --bench tokenize` ends with the ratios of the two, measured in turns:
+//! for the prompts of the paper's grid in every wording, and for random letters, which no cache knows.
 
 use criterion::{Criterion, Throughput};
+use rand::{RngExt, SeedableRng, rngs::StdRng};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Instant;
@@ -25,54 +27,94 @@ fn instant(tokenizer: &instant_clip_tokenizer::Tokenizer, prompt: &str) -> Ids {
 }
 
 /// The prompts of the paper's grid, in turn in each wording.
-fn prompts() -> Vec<String> {
+fn grid() -> Vec<String> {
     paper_grid()
         .zip(Wording::ALL.into_iter().cycle())
         .map(|(scene, wording)| wording.prompt(&scene).expect("the grid is valid"))
         .collect()
 }
 
-fn compare(criterion: &mut Criterion, prompts: &[String]) {
-    let other = instant_clip_tokenizer::Tokenizer::new();
-    let mut single = criterion.benchmark_group("single");
-    single.throughput(Throughput::Elements(prompts.len() as u64));
-    single.bench_function("wake-text", |b| {
-        b.iter(|| {
-            for p in prompts {
-                black_box(ours(p));
-            }
+/// Thirty words of 1 to 9 random letters a prompt.
+fn random_letters() -> Vec<String> {
+    let mut random = StdRng::seed_from_u64(1);
+    let mut word = || -> String {
+        let length = random.random_range(1..10);
+        (0..length)
+            .map(|_| random.random_range('a'..='z'))
+            .collect()
+    };
+    let mut prompt = || (0..30).map(|_| word()).collect::<Vec<_>>().join(" ");
+    (0..2000).map(|_| prompt()).collect()
+}
+
+/// The four things compared, each over all prompts.
+struct Contest<'a> {
+    prompts: &'a [String],
+    other: instant_clip_tokenizer::Tokenizer,
+}
+
+impl Contest<'_> {
+    fn ours(&self) {
+        for prompt in self.prompts {
+            black_box(ours(prompt));
+        }
+    }
+
+    fn instant(&self) {
+        for prompt in self.prompts {
+            black_box(instant(&self.other, prompt));
+        }
+    }
+
+    fn ours_batch(&self) {
+        black_box(Tokenizer::clip().encode_batch(self.prompts));
+    }
+
+    fn instant_batch(&self) {
+        let prompts = self.prompts.par_iter();
+        let ids: Vec<Ids> = prompts.map(|p| instant(&self.other, p)).collect();
+        black_box(ids);
+    }
+
+    /// Criterion's view of the four.
+    fn measure(&self, criterion: &mut Criterion, name: &str) {
+        let mut group = criterion.benchmark_group(name);
+        group.throughput(Throughput::Elements(self.prompts.len() as u64));
+        group.bench_function("wake-text", |b| b.iter(|| self.ours()));
+        group.bench_function("instant-clip-tokenizer", |b| b.iter(|| self.instant()));
+        group.bench_function("wake-text, batch", |b| b.iter(|| self.ours_batch()));
+        group.bench_function("instant-clip-tokenizer, rayon", |b| {
+            b.iter(|| self.instant_batch());
         });
-    });
-    single.bench_function("instant-clip-tokenizer", |b| {
-        b.iter(|| {
-            for p in prompts {
-                black_box(instant(&other, p));
-            }
-        });
-    });
-    single.finish();
-    let mut batch = criterion.benchmark_group("batch on all cores");
-    batch.throughput(Throughput::Elements(prompts.len() as u64));
-    batch.bench_function("wake-text", |b| {
-        b.iter(|| Tokenizer::clip().encode_batch(prompts));
-    });
-    batch.bench_function("instant-clip-tokenizer with rayon", |b| {
-        b.iter(|| -> Vec<Ids> { prompts.par_iter().map(|p| instant(&other, p)).collect() });
-    });
-    batch.finish();
+        group.finish();
+    }
+
+    /// Prints the ratios.
+    fn report(&self, name: &str) {
+        let single = medians(|| self.ours(), || self.instant());
+        let batch = medians(|| self.ours_batch(), || self.instant_batch());
+        for (how, [ours, instant]) in [("single", single), ("batch on all cores", batch)] {
+            println!(
+                "{name}, {how}: wake-text {:.0} prompts/s, instant-clip-tokenizer {:.0} prompts/s, ratio {:.2}",
+                self.prompts.len() as f64 / ours,
+                self.prompts.len() as f64 / instant,
+                instant / ours
+            );
+        }
+    }
 }
 
 /// Median seconds of two functions, run in turns so that both see the same machine.
-fn medians(mut first: impl FnMut(), mut second: impl FnMut()) -> [f64; 2] {
-    let seconds = |f: &mut dyn FnMut()| {
+fn medians(first: impl Fn(), second: impl Fn()) -> [f64; 2] {
+    let seconds = |f: &dyn Fn()| {
         let start = Instant::now();
         f();
         start.elapsed().as_secs_f64()
     };
     let mut times = [vec![], vec![]];
     for _ in 0..31 {
-        times[0].push(seconds(&mut first));
-        times[1].push(seconds(&mut second));
+        times[0].push(seconds(&first));
+        times[1].push(seconds(&second));
     }
     times.map(|mut times| {
         times.sort_by(f64::total_cmp);
@@ -80,47 +122,21 @@ fn medians(mut first: impl FnMut(), mut second: impl FnMut()) -> [f64; 2] {
     })
 }
 
-fn report(what: &str, count: usize, [ours, instant]: [f64; 2]) {
-    println!(
-        "{what}: wake-text {:.0} prompts/s, instant-clip-tokenizer {:.0} prompts/s, ratio {:.2}",
-        count as f64 / ours,
-        count as f64 / instant,
-        instant / ours
-    );
-}
-
 fn main() {
     let start = Instant::now();
     Tokenizer::clip();
     println!("first call: {:.0} ms", 1e3 * start.elapsed().as_secs_f64());
-    let prompts = prompts();
     let mut criterion = Criterion::default().configure_from_args();
-    compare(&mut criterion, &prompts);
+    let texts = [("paper grid", grid()), ("random letters", random_letters())];
+    let contests = texts.each_ref().map(|(name, prompts)| {
+        let other = instant_clip_tokenizer::Tokenizer::new();
+        (*name, Contest { prompts, other })
+    });
+    for (name, contest) in &contests {
+        contest.measure(&mut criterion, name);
+    }
     criterion.final_summary();
-    let other = instant_clip_tokenizer::Tokenizer::new();
-    let single = medians(
-        || {
-            for p in &prompts {
-                black_box(ours(p));
-            }
-        },
-        || {
-            for p in &prompts {
-                black_box(instant(&other, p));
-            }
-        },
-    );
-    let batch = medians(
-        || drop(black_box(Tokenizer::clip().encode_batch(&prompts))),
-        || {
-            drop(black_box(
-                prompts
-                    .par_iter()
-                    .map(|p| instant(&other, p))
-                    .collect::<Vec<_>>(),
-            ))
-        },
-    );
-    report("single", prompts.len(), single);
-    report("batch on all cores", prompts.len(), batch);
+    for (name, contest) in &contests {
+        contest.report(name);
+    }
 }

@@ -8,6 +8,7 @@
 use clap::Parser;
 use serde_json::{Value, json};
 use std::error::Error;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_physics::Scene;
@@ -25,7 +26,7 @@ struct Arguments {
     /// Sets a value of the scene, such as ship.speed=12; may be repeated.
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "text")]
     set: Vec<String>,
-    /// Prints {"prompt", "token_ids", "token_count", "truncated", "scene"} and nothing else.
+    /// Prints one JSON object: prompt, ids, count, whether cut off, and the scene read back (or null).
     #[arg(long)]
     json: bool,
 }
@@ -33,7 +34,8 @@ struct Arguments {
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(output) => {
-            println!("{output}");
+            // A reader such as `head` may have left.
+            let _ = writeln!(std::io::stdout(), "{output}");
             ExitCode::SUCCESS
         }
         Err(error) => {

@@ -37,7 +37,7 @@ fn fixtures() -> PathBuf {
 fn cases() -> Vec<Case> {
     let path = fixtures().join("tokenizer/prompts.json");
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let fixture: Fixture = serde_json::from_str(&text).unwrap();
+    let fixture: Fixture = serde_json::from_str(&text).expect("the layout of prompts.json");
     assert!(!fixture.cases.is_empty(), "{} has no case", path.display());
     fixture.cases
 }
@@ -218,8 +218,9 @@ fn unescape(text: &str) -> String {
     let mut parts = text.split("\\u{");
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let (code, rest) = part.split_once('}').unwrap();
-        out.push(char::from_u32(u32::from_str_radix(code, 16).unwrap()).unwrap());
+        let (code, rest) = part.split_once('}').expect("a closing brace");
+        let code = u32::from_str_radix(code, 16).expect("a hexadecimal number");
+        out.push(char::from_u32(code).expect("a character"));
         out.push_str(rest);
     }
     out

@@ -95,6 +95,24 @@ impl<T: Real> Synthesis<T> {
         &self,
         spectrum: &mut [Complex<T>],
         keep: [usize; 2],
+        out: (&mut [f32], &mut [f32]),
+        finish: F,
+    ) where
+        F: Fn(usize, &mut [Complex<T>]) + Sync,
+    {
+        self.run_window(spectrum, [0, 0], keep, out, finish);
+    }
+
+    /// [`Self::run`], keeping `keep` rows and columns from the row `start[0]` and the column `start[1]` on.
+    ///
+    /// # Panics
+    ///
+    /// If a length is another, or more is kept than there is.
+    pub fn run_window<F>(
+        &self,
+        spectrum: &mut [Complex<T>],
+        start: [usize; 2],
+        keep: [usize; 2],
         (re, im): (&mut [f32], &mut [f32]),
         finish: F,
     ) where
@@ -107,7 +125,7 @@ impl<T: Real> Synthesis<T> {
             "spectrum of another size"
         );
         assert!(
-            keep_rows <= self.rows && keep_columns <= self.columns,
+            start[0] + keep_rows <= self.rows && start[1] + keep_columns <= self.columns,
             "more kept than there is"
         );
         assert!(
@@ -128,19 +146,114 @@ impl<T: Real> Synthesis<T> {
                 |(block, scratch), (b, (re, im))| {
                     let first = b * BLOCK;
                     let rows = first..(first + BLOCK).min(keep_rows);
-                    self.gather(spectrum, rows.clone(), block);
+                    self.gather(spectrum, start[0] + rows.start..start[0] + rows.end, block);
                     let lines = block.chunks_exact_mut(self.columns);
                     let out = re.chunks_mut(keep_columns).zip(im.chunks_mut(keep_columns));
                     for ((i, row), (re, im)) in rows.zip(lines).zip(out) {
                         self.along_x.process_with_scratch(row, scratch);
-                        finish(i, &mut row[..keep_columns]);
-                        for ((v, re), im) in row.iter().zip(re).zip(im) {
-                            *re = v.re.to_f32();
-                            *im = v.im.to_f32();
-                        }
+                        let kept = &mut row[start[1]..start[1] + keep_columns];
+                        finish(i, kept);
+                        split(kept, re, im);
                     }
                 },
             );
+    }
+
+    /// Length of the workspace that [`Self::run_real`] needs.
+    #[must_use]
+    pub fn half_len(&self) -> usize {
+        2 * self.rows * self.columns.div_ceil(2)
+    }
+
+    /// Sums two real fields at once, each from its half spectrum.
+    ///
+    /// A real field has S[−b, −a] = conj S[b, a], so `fill(b, first, second)` is asked for the lines b = 0, 1, …
+    /// below columns/2 only and must overwrite both with the `rows` values of the line. Line 0 must have this
+    /// symmetry in itself; the Nyquist line of an even number of columns is 0.
+    ///
+    /// # Shapes
+    ///
+    /// - `half`: a workspace of [`Self::half_len`] values of any content
+    /// - `first`, `second`: `keep`, row after row
+    ///
+    /// # Panics
+    ///
+    /// If a length is another, or more is kept than there is.
+    pub fn run_real<F>(
+        &self,
+        half: &mut [Complex<T>],
+        keep: [usize; 2],
+        (first, second): (&mut [f32], &mut [f32]),
+        fill: F,
+    ) where
+        F: Fn(usize, &mut [Complex<T>], &mut [Complex<T>]) + Sync,
+    {
+        let [keep_rows, keep_columns] = keep;
+        assert_eq!(half.len(), self.half_len(), "workspace of another size");
+        assert!(
+            keep_rows <= self.rows && keep_columns <= self.columns,
+            "more kept than there is"
+        );
+        assert!(
+            first.len() == keep_rows * keep_columns && second.len() == first.len(),
+            "output of another size"
+        );
+        half.par_chunks_mut(2 * self.rows)
+            .enumerate()
+            .for_each_init(
+                || vec![Complex::new(T::zero(), T::zero()); self.along_y.get_inplace_scratch_len()],
+                |scratch, (b, lines)| {
+                    let (one, two) = lines.split_at_mut(self.rows);
+                    fill(b, one, two);
+                    self.along_y.process_with_scratch(lines, scratch);
+                },
+            );
+        let half = &*half;
+        let block_len = BLOCK * keep_columns.max(1);
+        first
+            .par_chunks_mut(block_len)
+            .zip(second.par_chunks_mut(block_len))
+            .enumerate()
+            .for_each_init(
+                || self.row_buffers(),
+                |(block, scratch), (n, (first, second))| {
+                    let rows = n * BLOCK..((n + 1) * BLOCK).min(keep_rows);
+                    let block = &mut block[..rows.len() * self.columns];
+                    self.gather_real(half, rows, block);
+                    self.along_x.process_with_scratch(block, scratch);
+                    let rows = block.chunks_exact(self.columns);
+                    let out = first
+                        .chunks_mut(keep_columns)
+                        .zip(second.chunks_mut(keep_columns));
+                    for (row, (re, im)) in rows.zip(out) {
+                        split(&row[..keep_columns], re, im);
+                    }
+                },
+            );
+    }
+
+    /// Transposes some rows of two half spectra into rows of the full spectrum of `first + i second`.
+    fn gather_real(
+        &self,
+        half: &[Complex<T>],
+        rows: std::ops::Range<usize>,
+        block: &mut [Complex<T>],
+    ) {
+        for (j, lines) in half.chunks_exact(2 * self.rows).enumerate() {
+            let (one, two) = lines.split_at(self.rows);
+            let pairs = one[rows.clone()].iter().zip(&two[rows.clone()]);
+            for ((one, two), row) in pairs.zip(block.chunks_exact_mut(self.columns)) {
+                row[j] = Complex::new(one.re - two.im, one.im + two.re);
+                if j > 0 {
+                    row[self.columns - j] = Complex::new(one.re + two.im, two.re - one.im);
+                }
+            }
+        }
+        if self.columns.is_multiple_of(2) {
+            for row in block.chunks_exact_mut(self.columns) {
+                row[self.columns / 2] = Complex::new(T::zero(), T::zero());
+            }
+        }
     }
 
     /// Transposes some rows into a block; reading a few rows at once touches each cache line once.
@@ -163,6 +276,14 @@ impl<T: Real> Synthesis<T> {
             vec![zero; BLOCK * self.columns],
             vec![zero; self.along_x.get_inplace_scratch_len()],
         )
+    }
+}
+
+/// Takes real and imaginary parts apart.
+fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
+    for ((v, re), im) in row.iter().zip(re).zip(im) {
+        *re = v.re.to_f32();
+        *im = v.im.to_f32();
     }
 }
 
@@ -224,6 +345,56 @@ mod tests {
                     let (c, s) = (phase.cos() as f32, phase.sin() as f32);
                     // Two roundings to f32 near 1.
                     assert!((re - c).abs() < 2e-7 && (im - s).abs() < 2e-7);
+                }
+            }
+        }
+    }
+
+    /// Two real fields from half spectra against the full transform of the same waves.
+    #[test]
+    fn half_spectra_are_the_full_ones() {
+        for (rows, columns) in [(1, 1), (4, 6), (5, 7), (16, 3), (20, 18), (40, 1)] {
+            let plan = Synthesis::<f64>::new(rows, columns);
+            let wave = |b: usize, a: usize, shift: f64| {
+                let angle = 0.7 * (a * a) as f64 + 1.3 * b as f64 + shift;
+                Complex::new(angle.sin(), (2.0 * angle).cos())
+            };
+            // Line 0 is made symmetric: the half with the smaller index is the partner's conjugate.
+            let value = |b: usize, a: usize, shift| match (b, (rows - a) % rows) {
+                (0, partner) if partner == a => Complex::new(wave(0, a, shift).re, 0.0),
+                (0, partner) if partner < a => wave(0, partner, shift).conj(),
+                _ => wave(b, a, shift),
+            };
+            let mut full = vec![Complex::new(0.0, 0.0); rows * columns];
+            for b in 0..columns.div_ceil(2) {
+                for a in 0..rows {
+                    let (one, two) = (value(b, a, 0.1), value(b, a, 0.9));
+                    let i = Complex::new(0.0, 1.0);
+                    let mirror = (columns - b) % columns * rows + (rows - a) % rows;
+                    full[b * rows + a] = one + i * two;
+                    full[mirror] = one.conj() + i * two.conj();
+                }
+            }
+            let n = rows * columns;
+            let (mut re, mut im) = (vec![0.0; n], vec![0.0; n]);
+            plan.run(&mut full, [rows, columns], (&mut re, &mut im), |_, _| ());
+            // Fewer rows and columns kept, and a workspace that is not clean.
+            let keep = [rows.div_ceil(2), columns.div_ceil(2)];
+            let mut half = vec![Complex::new(f64::NAN, 1.0); plan.half_len()];
+            let (mut first, mut second) =
+                (vec![0.0; keep[0] * keep[1]], vec![0.0; keep[0] * keep[1]]);
+            plan.run_real(&mut half, keep, (&mut first, &mut second), |b, one, two| {
+                for a in 0..rows {
+                    one[a] = value(b, a, 0.1);
+                    two[a] = value(b, a, 0.9);
+                }
+            });
+            for i in 0..keep[0] {
+                for j in 0..keep[1] {
+                    let (kept, all) = (i * keep[1] + j, i * columns + j);
+                    // Sums of up to 400 unit waves, rounded to f32.
+                    assert!((first[kept] - re[all]).abs() < 1e-4);
+                    assert!((second[kept] - im[all]).abs() < 1e-4);
                 }
             }
         }

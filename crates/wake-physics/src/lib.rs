@@ -1,12 +1,71 @@
-//! wake-physics
-pub mod constants;
-pub mod dispersion;
+//! Physics-based simulation of ship wakes in synthetic aperture radar (SAR) images.
+//!
+//! A [`Scene`] (ship, sea, radar, grid) becomes a SAR image with every intermediate field, labels, and a plan that
+//! says what was computed and bounds what was not:
+//!
+//! ```
+//! use wake_physics::{Scene, simulate};
+//!
+//! let mut scene = Scene::default(); // a 195 m ship at 10 m/s, wind 5 m/s, X band
+//! (scene.grid.rows, scene.grid.columns) = (64, 64);
+//! let simulation = simulate(&scene)?;
+//! assert_eq!(simulation.speckled.values.len(), 64 * 64);
+//! println!("{}", simulation.plan);
+//! # Ok::<(), wake_physics::Error>(())
+//! ```
+//!
+//! Data flows one way, and the modules below are listed in that order:
+//!
+//! ```text
+//! Scene ─► sea surface + Kelvin wake (+ turbulent wake) ─► slopes, velocities ─► σ⁰ ─► SAR image ─► labels
+//! ```
+//!
+//! # Axes and units
+//!
+//! SI units. x is ground range, growing away from the radar; y is azimuth, along the flight; z is up. Directions are
+//! degrees clockwise from +y and say where a thing goes to. Row 0 has the largest y; the pixel
+//! `[rows/2, columns/2]` is the origin. Formulas are functions of plain `f64`; fields are `f32`.
+//!
+//! # Speed and error
+//!
+//! Every fast method has a slow oracle in this crate ([`Method::Direct`]). [`scene::Model::tolerance`] bounds, for every
+//! field, the largest difference to it relative to the field's root mean square, and for the image before speckle the
+//! root mean square of the difference relative to the mean.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+// In the order of the data flow; docs/architecture.md is the same list.
 mod error;
-pub mod fft;
+pub mod constants;
 mod raster;
+pub mod quadrature;
+mod memory;
+pub mod output;
+pub mod fft;
+mod random;
+pub mod dispersion;
 pub mod scene;
+pub mod spectrum;
+pub mod spreading;
 pub mod waves;
+pub mod wind_sea;
+pub mod surface;
+mod track;
+pub mod hull;
+pub mod nufft;
+pub mod kelvin;
+pub mod turbulent;
+pub mod permittivity;
+pub mod scattering;
+pub mod sar;
+pub mod labels;
+pub mod grey;
+mod setup;
+mod plan;
+mod simulate;
 
 pub use error::{Error, Result};
+pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
+pub use simulate::{Method, Seconds, Simulation, simulate, simulate_with};
+pub use track::Track;

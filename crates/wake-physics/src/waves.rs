@@ -1,5 +1,9 @@
 //! Plane waves, what each carries, and the slow sum of them that everything fast is checked against.
 
+mod matrix_product;
+
+pub use matrix_product::matrix_product;
+
 use crate::raster::{Field, Raster};
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -99,7 +103,7 @@ pub struct Transfer {
 
 /// Strength of the hydrodynamic modulation for a spectrum falling with k⁻⁴ (Alpers, Ross and Rufenach 1981,
 /// J. Geophys. Res. 86, with γ = 1/2): 4 + γ.
-const BRAGG_SPECTRUM_STEEPNESS: f64 = 4.5;
+pub(crate) const BRAGG_SPECTRUM_STEEPNESS: f64 = 4.5;
 
 impl Transfer {
     /// Complex factor T of a quantity: the field is Σ Re[T·a·exp(i k·x)].

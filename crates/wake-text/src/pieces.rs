@@ -17,6 +17,8 @@ pub(crate) enum Kind<'a> {
     Word(&'a str),
     /// Punctuation within a sentence.
     Comma,
+    /// A colon or an equals sign.
+    Colon,
     /// The end of a sentence.
     Stop,
 }
@@ -45,7 +47,8 @@ pub(crate) fn pieces(text: &str) -> Vec<Piece<'_>> {
 fn mark(c: char) -> Option<Kind<'static>> {
     match c {
         '.' | '!' | '?' => Some(Kind::Stop),
-        ',' | ';' | ':' | '(' | ')' => Some(Kind::Comma),
+        ',' | ';' | '(' | ')' => Some(Kind::Comma),
+        ':' | '=' => Some(Kind::Colon),
         _ => None,
     }
 }

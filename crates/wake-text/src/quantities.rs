@@ -1,7 +1,7 @@
 //! Numbers with a unit, and what they belong to.
 
 use crate::pieces::{Kind, Piece, word_at};
-use crate::subjects::{Named, Subject};
+use crate::subjects::Named;
 use std::ops::Range;
 
 /// What a unit measures.
@@ -68,23 +68,33 @@ fn is_scale(word: &str) -> bool {
     )
 }
 
-/// The subject that a quantity belongs to.
+/// The subject that a quantity belongs to, and whether it stands right after it.
 pub(crate) fn owner<'a>(
     sentence: &[Piece<'_>],
     subjects: &'a [Named],
     quantity: &Quantity,
-) -> Option<&'a Named> {
-    let Range { start, end } = quantity.pieces;
-    let counts = |named: &&Named| ![Subject::NoShip, Subject::NoWind].contains(&named.subject);
-    let all = || subjects.iter().filter(counts);
-    let right_after = all().find(|named| named.at >= end && is_one_phrase(sentence, end..named.at));
-    right_after
-        .or_else(|| all().rfind(|named| named.at < start))
-        .or_else(|| all().find(|named| named.at >= end))
+) -> Option<(&'a Named, bool)> {
+    let (before, after) =
+        subjects.split_at(subjects.partition_point(|named| named.at < quantity.pieces.start));
+    let end = quantity.pieces.end;
+    let next = after.first();
+    let right_after = next
+        .filter(|named| is_one_phrase(sentence, end..named.at) && !is_label(sentence, named.at));
+    match right_after {
+        Some(named) => Some((named, true)),
+        None => before.last().or(next).map(|named| (named, false)),
+    }
+}
+
+/// Whether a colon follows a word, perhaps after two more: "wind speed: 3 mps".
+fn is_label(sentence: &[Piece<'_>], at: usize) -> bool {
+    let mut next = sentence.iter().skip(at + 1).take(3);
+    let mark = next.find(|piece| !matches!(piece.kind, Kind::Word(_)));
+    mark.is_some_and(|piece| piece.kind == Kind::Colon)
 }
 
 /// Whether what stands between a unit and a noun is at most two words that describe the noun.
-pub(crate) fn is_one_phrase(sentence: &[Piece<'_>], between: Range<usize>) -> bool {
+fn is_one_phrase(sentence: &[Piece<'_>], between: Range<usize>) -> bool {
     between.len() <= 2
         && between
             .into_iter()

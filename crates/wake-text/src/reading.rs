@@ -6,7 +6,7 @@
 
 use crate::error::{Error, Result};
 use crate::pieces::{Kind, Piece, pieces, word_at};
-use crate::quantities::{Dimension, Quantity, is_one_phrase, owner, quantity};
+use crate::quantities::{Dimension, Quantity, owner, quantity};
 use crate::statement::PartialScene;
 use crate::subjects::{Named, Subject, subjects};
 use std::ops::Range;
@@ -39,10 +39,12 @@ impl PartialScene {
         let pieces = pieces(&lower);
         let mut reading = Reading::new(prompt);
         for sentence in pieces.split(|piece| piece.kind == Kind::Stop) {
-            let subjects = subjects(sentence);
+            let mut subjects = subjects(sentence);
             for subject in &subjects {
                 reading.name(subject)?;
             }
+            let absent = [Subject::NoShip, Subject::NoWind];
+            subjects.retain(|named| !absent.contains(&named.subject));
             for at in 0..sentence.len() {
                 if let Some(quantity) = quantity(sentence, at) {
                     reading.measure(sentence, &subjects, quantity)?;
@@ -128,18 +130,14 @@ impl<'a> Reading<'a> {
         subjects: &[Named],
         quantity: Quantity,
     ) -> Result<()> {
-        let Some(owner) = owner(sentence, subjects, &quantity) else {
+        let Some((owner, right_after)) = owner(sentence, subjects, &quantity) else {
             return Ok(());
         };
         let Some(value) = Value::of(owner.subject, quantity.dimension) else {
             return Ok(());
         };
         let Range { start, end } = quantity.pieces;
-        let last = if owner.at >= end && is_one_phrase(sentence, end..owner.at) {
-            owner.at
-        } else {
-            end - 1
-        };
+        let last = if right_after { owner.at } else { end - 1 };
         let first = sentence[start].place.start;
         let from = start > 0 && word_at(sentence, start - 1) == Some("from");
         let turn = if from && value == Value::WindToward {
@@ -204,6 +202,8 @@ impl<'a> Reading<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+    use wake_physics::Scene;
 
     fn read(prompt: &str) -> PartialScene {
         PartialScene::read(prompt).unwrap()
@@ -243,6 +243,8 @@ mod tests {
              heading 135 degrees; angle of incidence 32 degrees",
             "At 10 mps and toward 135 degrees a ship sails. Wind from 270 degrees at 3 m/s.\nFetch: 1e1 km. \
              Incidence: 32 deg",
+            "Ship speed: 10 mps\nHeading: 135 deg\nWind speed: 3 mps\nWind direction = 90 deg\nFetch: 10 km\n\
+             Incidence angle: 32 deg\n",
             "ship 10mps toward -225 degrees, wind 3mps toward 450 degrees, fetch 10km, 32degree incidence",
         ];
         for prompt in prompts {
@@ -314,6 +316,50 @@ mod tests {
         assert_eq!(read("no ships").ship, Some(false));
         assert_eq!(read("a windless night").wind_speed, Some(0.0));
         assert_eq!(read("no wind at all, wind 0 mps").wind_speed, Some(0.0));
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(prompt in any::<String>()) {
+            let _ = PartialScene::read(&prompt);
+        }
+
+        /// What is read lies in the ranges of a scene; what is refused is quoted from the prompt.
+        #[test]
+        fn any_words_of_the_field_are_read_or_refused(
+            words in prop::collection::vec(
+                "-?[0-9]{1,3}(\\.[0-9])?|mps|m/s|km|meter|degrees|°|ship|no|without|a|wind|fetch|of|incidence|angle|\
+                 heading|from|toward|[.,;:]|É",
+                0..30,
+            )
+        ) {
+            let prompt = words.join(" ");
+            match PartialScene::read(&prompt) {
+                Ok(said) => prop_assert!(said.onto(&Scene { ship: None, ..Scene::default() }).is_ok(), "{}", prompt),
+                Err(Error::Impossible { words, .. }) => prop_assert!(prompt.contains(&words)),
+                Err(Error::Contradiction { first, second }) => {
+                    prop_assert!(prompt.contains(&first) && prompt.contains(&second));
+                }
+                Err(other) => prop_assert!(false, "{}", other),
+            }
+        }
+    }
+
+    #[test]
+    fn long_hostile_prompts_are_read_in_linear_time() {
+        for unit in [
+            "angle ",
+            "3 mps wind ",
+            "ship 1 ",
+            "no ship ",
+            "1,000",
+            "- ",
+            "a/",
+            "no no a ",
+        ] {
+            let prompt = unit.repeat(30_000);
+            let _ = PartialScene::read(&prompt);
+        }
     }
 
     #[test]

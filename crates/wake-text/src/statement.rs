@@ -10,17 +10,17 @@ use wake_physics::{Scene, scene::Ship};
 pub struct PartialScene {
     /// Whether there is a ship; `Some(false)`: open sea.
     pub ship: Option<bool>,
-    /// Ship speed [m/s].
+    /// Ship speed in m/s.
     pub ship_speed: Option<f64>,
-    /// Where the ship moves to [deg clockwise from azimuth], 0 up to 360.
+    /// Where the ship moves to, in degrees clockwise from azimuth, 0 up to 360.
     pub ship_heading: Option<f64>,
-    /// Wind speed at 10 m height [m/s].
+    /// Wind speed at 10 m height, in m/s.
     pub wind_speed: Option<f64>,
-    /// Where the wind blows to [deg clockwise from azimuth], 0 up to 360.
+    /// Where the wind blows to, in degrees clockwise from azimuth, 0 up to 360.
     pub wind_toward: Option<f64>,
-    /// Fetch [m].
+    /// Fetch in m.
     pub fetch: Option<f64>,
-    /// Incidence angle [deg].
+    /// Incidence angle in degrees.
     pub incidence: Option<f64>,
 }
 

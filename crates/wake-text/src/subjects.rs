@@ -13,6 +13,8 @@ pub(crate) enum Subject {
     Incidence,
     NoShip,
     NoWind,
+    /// An angle of its own.
+    Angle,
     /// Something a scene does not hold, such as a current.
     Other,
 }
@@ -41,32 +43,38 @@ pub(crate) fn subjects(sentence: &[Piece<'_>]) -> Vec<Named> {
 
 /// The subject that the word at a place names.
 fn subject(sentence: &[Piece<'_>], at: usize) -> Option<Subject> {
-    let absent = negation(sentence, at).is_some();
-    match word_at(sentence, at)? {
-        "ship" | "ships" | "vessel" | "vessels" | "boat" | "boats" if absent => {
-            Some(Subject::NoShip)
+    let noun = noun(word_at(sentence, at)?)?;
+    let before = word_before(sentence, at);
+    let owner = before.and_then(self::noun);
+    match noun {
+        Subject::Ship if negation(sentence, at).is_some() => Some(Subject::NoShip),
+        Subject::Wind if negation(sentence, at).is_some() => Some(Subject::NoWind),
+        // "wind heading toward" is about the wind, "incidence angle" about the incidence.
+        Subject::Heading if owner == Some(Subject::Wind) => None,
+        Subject::Angle if word_at(sentence, at + 2) == Some("incidence") => {
+            Some(Subject::Incidence)
         }
-        "ship" | "ships" | "vessel" | "vessels" | "boat" | "boats" => Some(Subject::Ship),
-        "wind" | "winds" if absent => Some(Subject::NoWind),
-        "windless" => Some(Subject::NoWind),
-        "wind" | "winds" | "breeze" => Some(Subject::Wind),
-        "heading" | "course" => match word_before(sentence, at) {
-            Some("wind" | "winds" | "breeze") => None,
-            _ => Some(Subject::Heading),
-        },
-        "fetch" => Some(Subject::Fetch),
-        "incidence" | "incident" => Some(Subject::Incidence),
-        "angle" if word_at(sentence, at + 2) == Some("incidence") => Some(Subject::Incidence),
-        "angle" => match subject(sentence, at.checked_sub(1)?) {
-            None => Some(Subject::Other),
-            named => named,
-        },
+        Subject::Angle => Some(owner.unwrap_or(Subject::Other)),
+        noun => Some(noun),
+    }
+}
+
+/// The subject that a word names by itself.
+fn noun(word: &str) -> Option<Subject> {
+    Some(match word {
+        "ship" | "ships" | "vessel" | "vessels" | "boat" | "boats" => Subject::Ship,
+        "wind" | "winds" | "breeze" => Subject::Wind,
+        "windless" => Subject::NoWind,
+        "heading" | "course" => Subject::Heading,
+        "fetch" => Subject::Fetch,
+        "incidence" | "incident" => Subject::Incidence,
+        "angle" => Subject::Angle,
         "wave" | "waves" | "swell" | "current" | "currents" | "satellite" | "aircraft"
         | "platform" | "kelvin" | "wedge" | "latitude" | "longitude" | "temperature" => {
-            Some(Subject::Other)
+            Subject::Other
         }
-        _ => None,
-    }
+        _ => return None,
+    })
 }
 
 /// The index of "no" or "without" before a noun, with or without an article between them.

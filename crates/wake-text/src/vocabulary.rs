@@ -215,6 +215,7 @@ pub(crate) fn to_symbols(word: &str) -> Cow<'_, str> {
 mod tests {
     use super::*;
     use crate::Tokenizer;
+    use proptest::prelude::*;
     use std::fs::write;
     use std::path::PathBuf;
     use tempfile::TempDir;
@@ -478,5 +479,32 @@ mod tests {
         );
         let missing = Tokenizer::from_tokenizer_json(Path::new("nowhere.json")).unwrap_err();
         assert!(matches!(missing, Error::File { .. }));
+    }
+
+    proptest! {
+        /// A file cut short, or with one byte changed, is refused or read; it never panics, and the line
+        /// named is one of the file.
+        #[test]
+        fn damaged_files_are_refused_with_a_line_of_theirs(
+            cut in 0..SMALL.len(), byte in 0..128_u8, shorten in any::<bool>()
+        ) {
+            let mut text = SMALL.as_bytes().to_vec();
+            text[cut] = byte;
+            text.truncate(if shorten { cut } else { text.len() });
+            let text = String::from_utf8(text).unwrap();
+            let lines = text.split('\n').count();
+            let whole = format!("{{\"model\": {{\"merges\": [], \"vocab\": {text}");
+            let results = [
+                parse_vocab(Path::new(""), &text).map(|_| ()),
+                parse_merges(Path::new(""), &text, Some(&Vocab::new())).map(|_| ()),
+                parse_tokenizer(Path::new(""), &whole).map(|_| ()),
+            ];
+            prop_assert!(!shorten || results[0].is_err());
+            for result in results {
+                if let Err(Error::Vocabulary { line, .. }) = result {
+                    prop_assert!((1..=lines).contains(&line), "line {} of {}", line, lines);
+                }
+            }
+        }
     }
 }

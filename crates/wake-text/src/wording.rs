@@ -320,6 +320,22 @@ mod tests {
         assert_eq!(Tokenizer::clip().encode(expected).token_count, 50);
     }
 
+    /// The examples in the documentation of each wording are its prompts of the paper's example.
+    #[test]
+    fn the_documented_examples_are_true() {
+        let scene = scene(&["ship.heading=135", "sea.wind_speed=3", "sea.fetch=10000"]);
+        let source = include_str!("wording.rs").replace("///", " ");
+        let words: Vec<&str> = source.split_whitespace().collect();
+        let documentation = words.join(" ");
+        for wording in Wording::ALL {
+            let prompt = wording.prompt(&scene).unwrap();
+            assert!(
+                documentation.contains(&format!("```text {prompt} ```")),
+                "{prompt}"
+            );
+        }
+    }
+
     #[test]
     fn no_ship_and_no_wind_have_their_own_words() {
         let mut scene = scene(&["sea.wind_speed=0.04"]);

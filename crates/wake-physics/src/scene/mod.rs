@@ -1,8 +1,12 @@
 //! The scene: what is simulated, in the units and ranges of a scene file.
 
-use crate::error::{Error, Result, finite, in_range};
+mod check;
+mod depth;
+mod file;
+mod paper;
+
+pub use paper::paper_grid;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// A ship, a sea and a radar over a grid of pixels.
 ///
@@ -85,7 +89,7 @@ pub struct Sea {
     /// How the resolved waves spread around the wind.
     pub spreading: SpreadingModel,
     /// Water depth [m], 1 to infinite (`inf`, or the word "infinite" where a format has no infinity).
-    #[serde(with = "depth_or_infinite")]
+    #[serde(with = "depth")]
     pub depth: f64,
     /// Time [s], 0 to 1e5; moves sea, ship and wake together.
     pub time: f64,
@@ -317,250 +321,21 @@ impl Term {
         Self::Coherence,
         Self::Speckle,
     ];
-}
 
-/// Depth as a number, or "infinite": JSON has no infinity.
-mod depth_or_infinite {
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    #[derive(Deserialize)]
-    #[serde(untagged, expecting = "a depth in metres, inf or \"infinite\"")]
-    enum Depth {
-        Metres(f64),
-        Word(Word),
-    }
-
-    #[derive(Deserialize)]
-    #[serde(rename_all = "lowercase")]
-    enum Word {
-        Infinite,
-    }
-
-    pub(super) fn serialize<S: Serializer>(depth: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-        if depth.is_finite() {
-            serializer.serialize_f64(*depth)
-        } else {
-            serializer.serialize_str("infinite")
+    /// Name in scene files and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sea => "sea",
+            Self::Kelvin => "kelvin",
+            Self::Turbulent => "turbulent",
+            Self::TiltAverage => "tilt_average",
+            Self::Specular => "specular",
+            Self::RangeBunching => "range_bunching",
+            Self::Hydrodynamic => "hydrodynamic",
+            Self::Bunching => "bunching",
+            Self::Coherence => "coherence",
+            Self::Speckle => "speckle",
         }
     }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-        Ok(match Depth::deserialize(deserializer)? {
-            Depth::Metres(metres) => metres,
-            Depth::Word(Word::Infinite) => f64::INFINITY,
-        })
-    }
-}
-
-/// Reading, writing and checking.
-impl Scene {
-    /// Reads a scene from the text of a scene file and checks it.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parse`] with line and key, or what [`Scene::validate`] finds.
-    pub fn from_toml(text: &str) -> Result<Self> {
-        let scene: Self = toml::from_str(text).map_err(|e| Error::Parse {
-            message: e.to_string().trim().to_owned(),
-        })?;
-        scene.validate()?;
-        Ok(scene)
-    }
-
-    /// Reads a scene file and checks it.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::File`] if the file cannot be read, else as [`Scene::from_toml`].
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::File {
-            action: "read",
-            path: path.to_owned(),
-            message: e.to_string(),
-        })?;
-        Self::from_toml(&text)
-    }
-
-    /// The scene as the text of a scene file.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Parse`] if a value has no form in TOML (a seed above 2⁶³ − 1).
-    pub fn to_toml(&self) -> Result<String> {
-        toml::to_string(self).map_err(|e| Error::Parse {
-            message: e.to_string(),
-        })
-    }
-
-    /// The scene with assignments such as `ship.speed=10` made, in order, then checked.
-    ///
-    /// The value is TOML; a bare word is a string. Setting a key of a ship where there is none makes the
-    /// default ship first.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Assignment`] for a text without `=`, an unknown key or a wrong type, else as
-    /// [`Scene::validate`].
-    pub fn with_assignments<S: AsRef<str>>(&self, assignments: &[S]) -> Result<Self> {
-        let mut scene = self.clone();
-        for text in assignments {
-            scene = scene.assigned(text.as_ref())?;
-        }
-        scene.validate()?;
-        Ok(scene)
-    }
-
-    fn assigned(&self, assignment: &str) -> Result<Self> {
-        let fail = |message: String| Error::Assignment {
-            assignment: assignment.to_owned(),
-            message,
-        };
-        let (key, value) = assignment
-            .split_once('=')
-            .ok_or_else(|| fail("there is no '='".to_owned()))?;
-        let value = toml_value(value.trim()).ok_or_else(|| fail("there is no value".to_owned()))?;
-        let mut root = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
-        let path: Vec<&str> = key.trim().split('.').collect();
-        let (last, tables) = path.split_last().unwrap_or((&"", &[]));
-        let mut table = &mut root;
-        for name in tables {
-            let entry = table
-                .entry((*name).to_owned())
-                .or_insert_with(|| toml::Table::new().into());
-            table = entry
-                .as_table_mut()
-                .ok_or_else(|| fail(format!("{name} is no table")))?;
-        }
-        table.insert((*last).to_owned(), value);
-        root.try_into()
-            .map_err(|e: toml::de::Error| fail(e.message().trim().to_owned()))
-    }
-
-    /// Checks every value against its closed range.
-    ///
-    /// # Errors
-    ///
-    /// The first value found outside, with name, value and range.
-    pub fn validate(&self) -> Result<()> {
-        self.grid.validate()?;
-        self.sea.validate()?;
-        if let Some(ship) = &self.ship {
-            ship.validate()?;
-        }
-        self.radar.validate()?;
-        in_range("model.tolerance", self.model.tolerance, 1e-6, 0.1, "")
-    }
-}
-
-/// Parses a TOML value; what is no TOML value is a string; nothing is `None`.
-fn toml_value(text: &str) -> Option<toml::Value> {
-    if text.is_empty() {
-        return None;
-    }
-    let mut table: toml::Table = toml::from_str(&format!("value = {text}"))
-        .unwrap_or_else(|_| toml::Table::from_iter([("value".to_owned(), text.into())]));
-    table.remove("value")
-}
-
-impl Grid {
-    fn validate(&self) -> Result<()> {
-        in_range("grid.rows", self.rows as f64, 1.0, 16384.0, "pixels")?;
-        in_range("grid.columns", self.columns as f64, 1.0, 16384.0, "pixels")?;
-        in_range("grid.spacing", self.spacing, 0.1, 100.0, "m")
-    }
-}
-
-impl Sea {
-    fn validate(&self) -> Result<()> {
-        in_range("sea.wind_speed", self.wind_speed, 0.0, 30.0, "m/s")?;
-        finite("sea.wind_toward", self.wind_toward, "degrees")?;
-        in_range("sea.fetch", self.fetch, 100.0, 1e7, "m")?;
-        in_range("sea.depth", self.depth, 1.0, f64::INFINITY, "m")?;
-        in_range("sea.time", self.time, 0.0, 1e5, "s")?;
-        in_range("sea.temperature", self.temperature, -2.0, 40.0, "°C")?;
-        in_range("sea.salinity", self.salinity, 0.0, 45.0, "psu")
-    }
-}
-
-impl Ship {
-    fn validate(&self) -> Result<()> {
-        in_range("ship.length", self.length, 1.0, 500.0, "m")?;
-        in_range("ship.beam", self.beam, 0.2, 100.0, "m")?;
-        in_range("ship.draft", self.draft, 0.1, 40.0, "m")?;
-        for (name, value) in [("ship.beam", self.beam), ("ship.draft", self.draft)] {
-            if value >= self.length {
-                return Err(Error::Conflict {
-                    name: name.to_owned(),
-                    value: format!("{value} m"),
-                    requirement: format!("but must be below ship.length, {} m", self.length),
-                });
-            }
-        }
-        in_range("ship.speed", self.speed, 0.0, 40.0, "m/s")?;
-        finite("ship.heading", self.heading, "degrees")?;
-        finite("ship.position[0]", self.position[0], "m")?;
-        finite("ship.position[1]", self.position[1], "m")?;
-        in_range("ship.filter_depth", self.filter_depth, 0.0, 20.0, "m")?;
-        match (self.hull, self.block_coefficient) {
-            (HullForm::Wigley, Some(value)) => Err(Error::Conflict {
-                name: "ship.block_coefficient".to_owned(),
-                value: value.to_string(),
-                requirement: "but the Wigley hull has 4/9; set ship.hull = \"full\" to choose it"
-                    .to_owned(),
-            }),
-            (HullForm::Full, Some(value)) => {
-                in_range("ship.block_coefficient", value, 0.45, 0.9, "")
-            }
-            (_, None) => Ok(()),
-        }
-    }
-}
-
-impl Radar {
-    fn validate(&self) -> Result<()> {
-        in_range("radar.frequency", self.frequency, 1e9, 2e10, "Hz")?;
-        in_range("radar.incidence", self.incidence, 5.0, 75.0, "degrees")?;
-        in_range(
-            "radar.range_to_velocity",
-            self.range_to_velocity,
-            0.0,
-            200.0,
-            "s",
-        )?;
-        in_range("radar.resolution", self.resolution, 0.5, 100.0, "m")?;
-        in_range("radar.looks", f64::from(self.looks), 1.0, 1000.0, "")?;
-        match self.relaxation_rate {
-            Some(rate) => in_range("radar.relaxation_rate", rate, 0.01, 100.0, "1/s"),
-            None => Ok(()),
-        }
-    }
-}
-
-/// The 3,456 scenes of the parameter grid of Kamirul, Pappas and Achim: ship 195 × 26 m; speed 6, 8, 10,
-/// 12 m/s; heading 0 to 315° by 45°; wind 3, 5, 7 m/s toward 0, 90, 180, 270°; fetch 10, 40, 70 km;
-/// incidence 16, 24, 32°. All other values are defaults.
-pub fn paper_grid() -> impl Iterator<Item = Scene> {
-    const SPEEDS: [f64; 4] = [6.0, 8.0, 10.0, 12.0];
-    const WINDS: [f64; 3] = [3.0, 5.0, 7.0];
-    const FETCHES: [f64; 3] = [10e3, 40e3, 70e3];
-    const INCIDENCES: [f64; 3] = [16.0, 24.0, 32.0];
-    (0..4 * 8 * 3 * 4 * 3 * 3).map(|index| {
-        let mut rest = index;
-        let mut pick = |n: usize| {
-            let i = rest % n;
-            rest /= n;
-            i
-        };
-        let mut scene = Scene::default();
-        scene.radar.incidence = INCIDENCES[pick(3)];
-        scene.sea.fetch = FETCHES[pick(3)];
-        scene.sea.wind_toward = 90.0 * pick(4) as f64;
-        scene.sea.wind_speed = WINDS[pick(3)];
-        scene.ship = Some(Ship {
-            heading: 45.0 * pick(8) as f64,
-            speed: SPEEDS[pick(4)],
-            ..Ship::default()
-        });
-        scene
-    })
 }

@@ -1,0 +1,112 @@
+//! The one mapping between backscatter and grey.
+
+use serde::{Deserialize, Serialize};
+
+/// Grey is linear in decibel between two fixed ends, the same for every scene.
+///
+/// ```text
+/// g = (10 log₁₀ σ⁰ − darkest)/(brightest − darkest),     cut to 0…1
+/// ```
+///
+/// Brightness carries wind and incidence, so an image is never stretched to its own range. [`GreyScale::default`]
+/// is −30 to +10 dB, 0.16 dB a level of 8 bits: at X band, 16 to 32° and wind of 3 to 7 m/s, mean σ⁰ lies between
+/// about −23 dB (crosswind) and +4 dB, which leaves 6 dB and more for waves and most of the speckle. The echo of a
+/// ship is white. Stored with data sets and weights: an image without its scale has no unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GreyScale {
+    /// σ⁰ of grey 0 [dB].
+    pub darkest_db: f64,
+    /// σ⁰ of grey 1 [dB], above `darkest_db`.
+    pub brightest_db: f64,
+}
+
+impl Default for GreyScale {
+    fn default() -> Self {
+        Self {
+            darkest_db: -30.0,
+            brightest_db: 10.0,
+        }
+    }
+}
+
+impl GreyScale {
+    /// Grey 0…1 of σ⁰ [1]; σ⁰ = 0 is black.
+    #[must_use]
+    pub fn grey(&self, sigma0: f64) -> f64 {
+        let db = 10.0 * sigma0.max(0.0).log10();
+        ((db - self.darkest_db) / (self.brightest_db - self.darkest_db)).clamp(0.0, 1.0)
+    }
+
+    /// σ⁰ [1] of grey: the inverse of [`Self::grey`] between its ends, and its continuation beyond them.
+    #[must_use]
+    pub fn sigma0(&self, grey: f64) -> f64 {
+        let db = self.darkest_db + grey * (self.brightest_db - self.darkest_db);
+        10f64.powf(0.1 * db)
+    }
+
+    /// Grey as the nearest level of 8 bits.
+    #[must_use]
+    pub fn level(&self, sigma0: f64) -> u8 {
+        (255.0 * self.grey(sigma0)).round() as u8
+    }
+
+    /// σ⁰ [1] of a level of 8 bits.
+    #[must_use]
+    pub fn sigma0_of_level(&self, level: u8) -> f64 {
+        self.sigma0(f64::from(level) / 255.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[allow(clippy::float_cmp, reason = "the ends are exact")]
+    fn the_ends_are_black_and_white() {
+        let scale = GreyScale::default();
+        for (sigma0, grey) in [
+            (0.0, 0.0),
+            (1e-9, 0.0),
+            (-1.0, 0.0),
+            (1e3, 1.0),
+            (f64::INFINITY, 1.0),
+        ] {
+            assert_eq!(scale.grey(sigma0), grey);
+        }
+        assert!((scale.grey(0.1) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn inverse_both_ways() {
+        let scale = GreyScale::default();
+        for level in 0..=255 {
+            assert_eq!(scale.level(scale.sigma0_of_level(level)), level);
+        }
+        for i in 1..40 {
+            let sigma0 = 10f64.powf(0.1 * f64::from(i - 30));
+            assert!((scale.sigma0(scale.grey(sigma0)) / sigma0 - 1.0).abs() < 1e-12);
+            let db = 10.0 * (scale.sigma0_of_level(scale.level(sigma0)) / sigma0).log10();
+            // Half a level of 40/255 dB.
+            assert!(db.abs() < 0.5 * 40.0 / 255.0 + 1e-9);
+        }
+    }
+
+    #[test]
+    fn brighter_is_never_darker() {
+        let scale = GreyScale::default();
+        let greys: Vec<f64> = (0..200)
+            .map(|i| scale.grey(1e-4 * 1.1f64.powi(i)))
+            .collect();
+        assert!(greys.windows(2).all(|w| w[0] <= w[1]));
+    }
+
+    #[test]
+    fn stored_and_read_again() {
+        let scale = GreyScale::default();
+        let text = serde_json::to_string(&scale).unwrap();
+        assert_eq!(text, r#"{"darkest_db":-30.0,"brightest_db":10.0}"#);
+        assert_eq!(serde_json::from_str::<GreyScale>(&text).unwrap(), scale);
+    }
+}

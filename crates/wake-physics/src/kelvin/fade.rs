@@ -1,0 +1,74 @@
+//! Where the free waves are shown: all of them astern, none ahead, and a smooth passage along the hull.
+
+use crate::raster::{Field, Raster};
+use crate::track::Track;
+
+/// Part of the free waves that is shown at ξ forward of midship.
+///
+/// ```text
+/// s = (L/2 − ξ)/L brought into [0, 1],     fade = s³ (10 − 15 s + 6 s²)
+/// ```
+///
+/// 0 ahead of the bow, 1 astern of the stern, twice differentiable between. The free waves alone are right
+/// only astern; near the hull there is a local disturbance as well, which is left out. The passage is a
+/// choice: it hides the wrong waves ahead without a step.
+///
+/// - `forward` ξ [m]
+/// - `length` L [m], above 0
+#[must_use]
+pub fn fade(forward: f64, length: f64) -> f64 {
+    let s = (0.5 - forward / length).clamp(0.0, 1.0);
+    s * s * s * (10.0 + s * (6.0 * s - 15.0))
+}
+
+/// [`fade`] at every pixel of a raster.
+#[must_use]
+pub fn fade_field(track: &Track, length: f64, raster: &Raster) -> Field {
+    let [fx, fy] = track.forward;
+    let corner = track.seen_from_ship([raster.x(0), raster.y(0)])[0];
+    let (down, right) = (-fy * raster.spacing, fx * raster.spacing);
+    Field::from_fn(raster, |i, j| {
+        fade(corner + i as f64 * down + j as f64 * right, length) as f32
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact outside the passage")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_ahead_everything_astern() {
+        assert_eq!(fade(50.1, 100.0), 0.0);
+        assert_eq!(fade(50.0, 100.0), 0.0);
+        assert_eq!(fade(-50.0, 100.0), 1.0);
+        assert_eq!(fade(-1e9, 100.0), 1.0);
+        assert_eq!(fade(0.0, 100.0), 0.5);
+    }
+
+    /// Falling toward the bow, and with no step in the slope: its difference is at most of second order.
+    #[test]
+    fn passage_is_smooth() {
+        let d = 0.01;
+        let mut last = 1.0;
+        for i in -6000..6000 {
+            let x = f64::from(i) * d;
+            let bend = fade(x + d, 100.0) - 2.0 * fade(x, 100.0) + fade(x - d, 100.0);
+            // |fade''| ≤ 10/√3/L².
+            assert!(bend.abs() <= 5.8e-4 * d * d + 1e-15);
+            assert!(fade(x, 100.0) <= last);
+            last = fade(x, 100.0);
+        }
+    }
+
+    #[test]
+    fn field_is_the_function() {
+        let raster = Raster::image(9, 12, 20.0);
+        let track = Track::new([10.0, -30.0], 210.0, 0.0);
+        let field = fade_field(&track, 100.0, &raster);
+        for (i, j) in [(0, 0), (3, 5), (8, 11), (4, 6)] {
+            let seen = track.seen_from_ship([raster.x(j), raster.y(i)]);
+            assert!((f64::from(field.at(i, j)) - fade(seen[0], 100.0)).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The Kelvin wake of a thin ship: the free waves that follow it, as plane waves.
+//!
+//! ```text
+//! ζ(ξ, η) = Re ∫ A(θ) e^{ik(ξ cos θ + η sin θ)} dθ = Re ∫ a(u) e^{i(αξ + βη)} du,     sec θ = cosh u
+//! ```
+//!
+//! with ξ forward of midship and η to port. The waves lie on one curve in the plane of wavenumbers, so the
+//! integral is a sum of plane waves as soon as its nodes are chosen ([`KelvinWake::plan`]); any field of
+//! them follows from [`synthesize`](crate::nufft::synthesize). Files: `steady` the curve, `zones` which part
+//! of it reaches a raster, `panels` the nodes, `fade` where the waves are shown, `resistance` the work the
+//! ship does for them, `direct` the slow integral that everything is checked against.
+
+mod direct;
+mod fade;
+mod panels;
+mod resistance;
+mod steady;
+mod zones;
+
+pub use direct::direct_quadrature;
+pub use fade::{fade, fade_field};
+pub use panels::{WakePlan, Zone};
+
+use crate::constants::GRAVITY;
+use crate::hull::Hull;
+use crate::track::Track;
+use crate::waves::PlaneWaves;
+use num_complex::Complex64;
+use steady::{SteadyWave, SteadyWaves};
+
+/// Kelvin's angle arcsin(1/3) [rad]: the wake's arms leave the track at it.
+pub const KELVIN_ANGLE: f64 = 0.339_836_909_454_121_9;
+
+/// The direction θ [rad] of the waves on the arms, atan(1/√2): transverse waves below, divergent above.
+pub const CUSP_ANGLE: f64 = 0.615_479_708_670_387_3;
+
+/// A thin ship under way: everything its free waves depend on.
+///
+/// # Validity
+///
+/// Linear, inviscid, steady speed and course for a long time past; gravity waves only. In water of finite
+/// depth the waves and their amplitudes are those of that depth.
+///
+/// # References
+///
+/// Michell (1898); Tuck, Scullen and Lazauskas (2002), 24th Symposium on Naval Hydrodynamics; Sretensky (1936).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KelvinWake {
+    /// Form and size of the hull.
+    pub hull: Hull,
+    /// Speed U [m/s], at least 0; a ship at rest makes no waves.
+    pub speed: f64,
+    /// Place and direction at the time of the picture.
+    pub track: Track,
+    /// Water depth h [m], above 0, may be infinite.
+    pub depth: f64,
+    /// Weights the spectrum with e^{−kd}, d this depth [m], at least 0.
+    pub filter_depth: f64,
+}
+
+impl KelvinWake {
+    /// Wavelength of the transverse waves on the track in deep water, 2πU²/g [m].
+    #[must_use]
+    pub fn transverse_wavelength(&self) -> f64 {
+        std::f64::consts::TAU * self.speed * self.speed / GRAVITY
+    }
+
+    /// Amplitude of the free waves by direction.
+    ///
+    /// ```text
+    /// A(θ) = −(2ν/π) sec³θ · F̄,    a du = A dθ
+    /// ```
+    ///
+    /// and in water of finite depth
+    ///
+    /// ```text
+    /// A(θ) = −(2/π) k sec θ · F̄/(1 − νh sec²θ/cosh²(kh)),    F with cosh(k(h − z))/cosh(kh)
+    /// ```
+    ///
+    /// - `direction` θ [rad] between the track and the way the wave runs, |θ| < π/2
+    /// - returns A [m]; 0 where no wave keeps station with the ship
+    #[must_use]
+    pub fn amplitude(&self, direction: f64) -> Complex64 {
+        let u = direction.tan().asinh();
+        let waves = self.steady_waves();
+        if self.speed == 0.0 || u.abs() <= waves.first() && waves.first() > 0.0 {
+            return Complex64::ZERO;
+        }
+        self.free_wave(&waves.at(u)) / direction.cos()
+    }
+
+    fn steady_waves(&self) -> SteadyWaves {
+        SteadyWaves::new(self.speed, self.depth)
+    }
+
+    /// a = −w F̄ e^{−kd}, d the filter depth, [m per unit u].
+    fn free_wave(&self, wave: &SteadyWave) -> Complex64 {
+        let michell = self
+            .hull
+            .michell_integral(wave.along, wave.wavenumber, self.depth);
+        let filter = (-wave.wavenumber * self.filter_depth).exp();
+        -michell.conj() * (wave.weight * filter)
+    }
+
+    /// The plane waves at the nodes of a plan, phases and time included.
+    #[must_use]
+    pub fn waves(&self, plan: &WakePlan) -> PlaneWaves {
+        let mut out = PlaneWaves::default();
+        let steady = self.steady_waves();
+        let [x, y] = self.track.position;
+        for (u, weight) in plan.quadrature() {
+            let wave = steady.at(u);
+            let k = self.track.turned([wave.along, wave.across]);
+            let phase = Complex64::cis(-(k[0] * x + k[1] * y));
+            let amplitude = self.free_wave(&wave) * phase * weight;
+            out.push(k, self.speed * wave.along, amplitude);
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact zeros")]
+mod tests;

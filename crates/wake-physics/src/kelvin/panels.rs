@@ -1,0 +1,274 @@
+//! The nodes of the wake integral: as many as the tolerance, the raster and the band ask for.
+
+use super::zones::{Piece, Reach};
+use super::{CUSP_ANGLE, KelvinWake};
+use crate::quadrature::{GaussLegendre, largest_phase};
+use crate::raster::Raster;
+
+/// Nodes of a panel: large panels need the fewest nodes a period (2.4 here, 2 is the limit for none smaller).
+const PANEL_NODES: usize = 32;
+
+/// Error of a panel as part of the tolerance: the sum of all amplitudes is some ten times a field's rms.
+const PANEL_SHARE: f64 = 0.01;
+
+/// A range of wave directions that is computed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Zone {
+    /// Smallest and largest direction θ to the track [rad], to port positive.
+    pub directions: [f64; 2],
+    /// Nodes in it.
+    pub nodes: usize,
+}
+
+/// How the wake integral is computed on a raster: its range of directions and its nodes.
+///
+/// A plan without nodes stands for a wake that cannot be seen: no wave is long enough for the pixels, the
+/// ship is at rest, or the whole raster lies ahead of the bow.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WakePlan {
+    /// Ranges of directions, in order.
+    pub zones: Vec<Zone>,
+    /// Nodes among the transverse waves, |θ| below [`CUSP_ANGLE`].
+    pub transverse_nodes: usize,
+    /// Nodes among the divergent waves.
+    pub divergent_nodes: usize,
+    /// Smallest and largest wavenumber [rad/m].
+    pub wavenumbers: [f64; 2],
+    /// Bound on the error of the quadrature at every pixel, relative to the sum of all |amplitude|.
+    pub error_bound: f64,
+    /// Nodes u and weights, window included.
+    quadrature: Vec<(f64, f64)>,
+}
+
+impl WakePlan {
+    /// Number of plane waves.
+    #[must_use]
+    pub fn nodes(&self) -> usize {
+        self.quadrature.len()
+    }
+
+    pub(super) fn quadrature(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.quadrature.iter().copied()
+    }
+}
+
+/// The plan.
+impl KelvinWake {
+    /// Chooses the nodes for a raster, so that the sum of plane waves is the integral to `tolerance`.
+    ///
+    /// The band is |k| ≤ π/spacing, a sharp disk; waves that `filter_depth` weakens below the tolerance are
+    /// left out. Panels of 32 Gauss–Legendre nodes each span as much phase as the remainder of the rule
+    /// allows, at the pixel where phases turn fastest. A raster far from the ship gets only the directions
+    /// that reach it. The number of nodes grows with the pixels on a side of the raster, never with the
+    /// distance of the ship.
+    ///
+    /// - `tolerance`: largest error relative to a field's rms, 1e-6 to 0.1
+    ///
+    /// # Validity
+    ///
+    /// Phases are accurate to 1e-16 of their size: ships beyond 1e9 m are not placed to the tolerance.
+    #[must_use]
+    pub fn plan(&self, raster: &Raster, tolerance: f64) -> WakePlan {
+        let corners = astern(&self.track.corners(raster), 0.5 * self.hull.length());
+        let Some(last) = self.last(raster, tolerance) else {
+            return WakePlan::default();
+        };
+        if corners.is_empty() {
+            return WakePlan::default();
+        }
+        let decay = self.hull.draft() + self.filter_depth;
+        let steady = self.steady_waves();
+        let reach = Reach::new(steady, corners, 0.5 * self.hull.length(), decay);
+        if !reach.fastest(last).is_finite() {
+            return WakePlan::default();
+        }
+        let error = PANEL_SHARE * tolerance;
+        let sharpness = -error.ln();
+        let mut builder = Builder::new(&reach, error, sharpness.sqrt());
+        for range in self.ranges(last) {
+            for piece in reach.pieces(range, 4.0 * sharpness) {
+                builder.add(piece, steady.first(), self.grading());
+            }
+        }
+        let mut plan = builder.plan;
+        plan.error_bound = error;
+        plan.wavenumbers = [
+            steady.at(plan.smallest_u()).wavenumber,
+            steady.at(plan.largest_u()).wavenumber,
+        ];
+        plan
+    }
+
+    /// Largest |u|: by the band of the raster, or where the filter leaves nothing.
+    fn last(&self, raster: &Raster, tolerance: f64) -> Option<f64> {
+        let steady = self.steady_waves();
+        let first = steady.at(steady.first()).wavenumber;
+        // The slopes of short waves are larger by k: a thousandth of the tolerance covers the band.
+        let filtered = first + (1e3 / tolerance).ln() / self.filter_depth;
+        steady.last(raster.nyquist_wavenumber().min(filtered))
+    }
+
+    /// The curve as one range of u, or two where it has no transverse waves.
+    fn ranges(&self, last: f64) -> Vec<[f64; 2]> {
+        let first = self.steady_waves().first();
+        if first > 0.0 {
+            vec![[-last, -first], [first, last]]
+        } else {
+            vec![[-last, last]]
+        }
+    }
+
+    /// How often panels are halved toward the beginning of the curve, which has a fine structure of the
+    /// width √|νh − 1| near the critical speed.
+    pub(super) fn grading(&self) -> i32 {
+        let width = self.steady_waves().subcriticality().abs().sqrt();
+        (0.5 / width.max(1e-6)).log2().ceil().max(0.0) as i32
+    }
+}
+
+impl WakePlan {
+    fn smallest_u(&self) -> f64 {
+        self.quadrature
+            .iter()
+            .map(|n| n.0.abs())
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    fn largest_u(&self) -> f64 {
+        self.quadrature
+            .iter()
+            .map(|n| n.0.abs())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Lays panels along pieces of the curve.
+struct Builder<'a> {
+    reach: &'a Reach,
+    rule: GaussLegendre,
+    /// Phase a panel may span [rad].
+    phase: f64,
+    sharpness: f64,
+    plan: WakePlan,
+}
+
+impl<'a> Builder<'a> {
+    fn new(reach: &'a Reach, error: f64, sharpness: f64) -> Self {
+        Self {
+            reach,
+            rule: GaussLegendre::new(PANEL_NODES),
+            phase: largest_phase(PANEL_NODES, error),
+            sharpness,
+            plan: WakePlan::default(),
+        }
+    }
+
+    /// Adds a piece; the curve begins at ±`first`, where panels are halved `grading` times.
+    fn add(&mut self, piece: Piece, first: f64, grading: i32) {
+        let before = self.plan.nodes();
+        let mut breaks = vec![piece.from, piece.to];
+        for side in [-1.0, 1.0] {
+            let start = side * first;
+            breaks.push(start);
+            breaks.extend((1..=grading).map(|level| start + side * 0.5f64.powi(level)));
+        }
+        breaks.retain(|&u| (piece.from..=piece.to).contains(&u));
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup();
+        for pair in breaks.windows(2) {
+            self.add_smooth(piece, [pair[0], pair[1]], first);
+        }
+        let nodes = self.plan.nodes() - before;
+        let directions = [piece.from, piece.to].map(|u| u.sinh().atan());
+        self.plan.zones.push(Zone { directions, nodes });
+    }
+
+    fn add_smooth(&mut self, piece: Piece, [from, to]: [f64; 2], first: f64) {
+        let mut start = from;
+        while start < to {
+            let end = self.panel_end(start, to).max(start.next_up());
+            // A curve that begins off the axis has no point between ±first.
+            let begins =
+                first > 0.0 && (start > 0.0 && start <= first || end < 0.0 && end >= -first);
+            for (t, w) in self.rule.on(0.0, 1.0) {
+                // Where the curve begins off the axis its points go as the square root of u: u ∝ t².
+                let (s, ds) = match (begins, start > 0.0) {
+                    (false, _) => (t, 1.0),
+                    (true, true) => (t * t, 2.0 * t),
+                    (true, false) => (t * (2.0 - t), 2.0 - 2.0 * t),
+                };
+                let u = start + (end - start) * s;
+                let weight = (end - start) * ds * w * piece.window(u, self.sharpness);
+                self.plan.quadrature.push((u, weight));
+                if u.sinh().atan().abs() < CUSP_ANGLE {
+                    self.plan.transverse_nodes += 1;
+                } else {
+                    self.plan.divergent_nodes += 1;
+                }
+            }
+            start = end;
+        }
+    }
+
+    /// Where a panel from `start` ends, so that no phase turns by more than allowed in it.
+    fn panel_end(&self, start: f64, to: f64) -> f64 {
+        let mut width = (to - start).min(1.0);
+        for _ in 0..12 {
+            let fastest = [0.02, 0.5, 1.0]
+                .map(|part| self.reach.fastest(start + part * width))
+                .into_iter()
+                .fold(0.0, f64::max);
+            if fastest * width <= self.phase {
+                break;
+            }
+            width = (self.phase / fastest).max(0.5 * width);
+        }
+        let panels = ((to - start) / width).ceil();
+        if panels <= 2.0 {
+            return start + (to - start) / panels;
+        }
+        start + width
+    }
+}
+
+/// Nodes and weights over a range of the curve with sharp ends.
+pub(super) fn unwindowed(
+    reach: &Reach,
+    [from, to]: [f64; 2],
+    (first, grading): (f64, i32),
+    error: f64,
+) -> Vec<(f64, f64)> {
+    let mut builder = Builder::new(reach, error, 1.0);
+    let piece = Piece {
+        from,
+        to,
+        rise: 0.0,
+        fall: 0.0,
+    };
+    builder.add(piece, first, grading);
+    builder.plan.quadrature
+}
+
+/// Nodes and weights of one piece, window included.
+#[cfg(test)]
+pub(super) fn nodes_of(reach: &Reach, piece: Piece, error: f64) -> Vec<(f64, f64)> {
+    let mut builder = Builder::new(reach, error, (-error.ln()).sqrt());
+    builder.add(piece, 0.0, 0);
+    builder.plan.quadrature
+}
+
+/// The part of a convex polygon that lies astern of `bow` [m]: corners (ξ, η) with ξ ≤ `bow`.
+fn astern(corners: &[[f64; 2]], bow: f64) -> Vec<[f64; 2]> {
+    let mut out = Vec::with_capacity(corners.len() + 1);
+    for (i, a) in corners.iter().enumerate() {
+        let b = corners[(i + 1) % corners.len()];
+        if a[0] <= bow {
+            out.push(*a);
+        }
+        if (a[0] - bow) * (b[0] - bow) < 0.0 {
+            let part = (bow - a[0]) / (b[0] - a[0]);
+            out.push([bow, a[1] + part * (b[1] - a[1])]);
+        }
+    }
+    out
+}

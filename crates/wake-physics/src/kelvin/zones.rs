@@ -1,0 +1,226 @@
+//! Which part of the curve of steady waves reaches a raster.
+//!
+//! The phase of wave u at the place (ξ, η) is αξ + βη; only where its derivative along the curve vanishes
+//! (stationary phase) does a wave reach the place. Seen from far away a raster receives a short piece of the
+//! curve. What lies outside may be cut off, if the cut is smooth over many periods.
+
+use super::steady::SteadyWaves;
+use crate::quadrature::GaussLegendre;
+use std::f64::consts::PI;
+
+/// Samples of the curve between which a change of sign is looked for.
+const SAMPLES: usize = 400;
+
+/// Places of interest, seen from the ship, and how fast phases turn there along the curve.
+#[derive(Debug, Clone)]
+pub(crate) struct Reach {
+    waves: SteadyWaves,
+    /// Corners (ξ, η) of a convex region [m].
+    corners: Vec<[f64; 2]>,
+    /// Half the length of the hull [m]: bow and stern are sources of their own.
+    half_length: f64,
+    /// Depth over which the hull and the filter weaken short waves [m].
+    decay: f64,
+}
+
+/// A piece of the curve with smooth ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    /// Width of the smooth rise after `from`; 0 for a sharp end.
+    pub(crate) rise: f64,
+    /// Width of the smooth fall before `to`; 0 for a sharp end.
+    pub(crate) fall: f64,
+}
+
+impl Piece {
+    /// The window over the piece: 1 inside, falling to 0 at smooth ends.
+    pub(crate) fn window(&self, u: f64, sharpness: f64) -> f64 {
+        let end = |distance: f64, width: f64| {
+            if width == 0.0 || distance >= width {
+                return 1.0;
+            }
+            0.5 + 0.5 * error_function(sharpness * (2.0 * distance / width - 1.0))
+        };
+        end(u - self.from, self.rise) * end(self.to - u, self.fall)
+    }
+}
+
+/// erf x, by Gauss quadrature of its integral; |x| up to 6.
+fn error_function(x: f64) -> f64 {
+    let rule = GaussLegendre::new(32);
+    2.0 / PI.sqrt() * rule.integrate([0.0, x], |t| (-t * t).exp())
+}
+
+impl Reach {
+    pub(crate) fn new(
+        waves: SteadyWaves,
+        corners: Vec<[f64; 2]>,
+        half_length: f64,
+        decay: f64,
+    ) -> Self {
+        Self {
+            waves,
+            corners,
+            half_length,
+            decay,
+        }
+    }
+
+    /// Smallest and largest derivative of the phase along the curve, over the region and the hull.
+    fn range(&self, u: f64) -> [f64; 2] {
+        let [_, along, across] = self.waves.at(u).rates;
+        let hull = self.half_length * along.abs();
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for [x, y] in &self.corners {
+            let rate = x * along + y * across;
+            range = [range[0].min(rate - hull), range[1].max(rate + hull)];
+        }
+        range
+    }
+
+    /// Smallest magnitude of the derivative; 0 where some place is stationary.
+    fn slowest(&self, u: f64) -> f64 {
+        let [low, high] = self.range(u);
+        low.max(-high).max(0.0)
+    }
+
+    /// A bound on how fast the integrand turns at u: phases, window, decay and the change of the amplitude.
+    pub(crate) fn fastest(&self, u: f64) -> f64 {
+        let [low, high] = self.range(u);
+        let decay = self.decay * self.waves.at(u).rates[0].abs();
+        low.abs().max(high.abs()) + self.slowest(u) + decay + 6.0
+    }
+
+    /// Pieces of [from, to] that matter, each reaching `phase` radians beyond what is stationary before its
+    /// end falls, over `phase` more. The ends of the curve are sharp and matter too.
+    pub(crate) fn pieces(&self, [from, to]: [f64; 2], phase: f64) -> Vec<Piece> {
+        let mut out: Vec<Piece> = Vec::new();
+        for seed in self.seeds([from, to]) {
+            let piece = self.widen(seed, [from, to], phase);
+            match out.last_mut() {
+                Some(last) if piece.from <= last.to => {
+                    if piece.to >= last.to {
+                        (last.to, last.fall) = (piece.to, piece.fall);
+                    }
+                }
+                _ => out.push(piece),
+            }
+        }
+        out
+    }
+
+    /// The ends, runs of stationary samples, changes of sign and the slowest points between, in order.
+    fn seeds(&self, [from, to]: [f64; 2]) -> Vec<[f64; 2]> {
+        let at = |i: usize| from + (to - from) * i as f64 / SAMPLES as f64;
+        let middle = |u: f64| {
+            let [low, high] = self.range(u);
+            low + high
+        };
+        let slow: Vec<f64> = (0..=SAMPLES).map(|i| self.slowest(at(i))).collect();
+        let mut seeds = vec![[from, from]];
+        for i in 0..=SAMPLES {
+            let after = (i + 1).min(SAMPLES);
+            if slow[i] == 0.0 {
+                seeds.push([at(i); 2]);
+                if slow[after] == 0.0 {
+                    seeds.push([at(i), at(after)]);
+                }
+            } else if slow[i] <= slow[i.saturating_sub(1)] && slow[i] <= slow[after] {
+                seeds.push([smallest(|u| self.slowest(u), at(i.saturating_sub(1)), at(after)); 2]);
+            }
+            if middle(at(i)) * middle(at(after)) < 0.0 {
+                seeds.push([root(middle, at(i), at(after)); 2]);
+            }
+        }
+        seeds.push([to, to]);
+        merged(seeds)
+    }
+
+    fn widen(&self, [low, high]: [f64; 2], [from, to]: [f64; 2], phase: f64) -> Piece {
+        let ([left, left_start], [right, right_start]) =
+            (self.end_of(low, from, phase), self.end_of(high, to, phase));
+        Piece {
+            from: left,
+            to: right,
+            rise: left_start - left,
+            fall: right - right_start,
+        }
+    }
+
+    /// From `start` toward `limit`: where the phase has turned by 2·`phase`, and where by `phase`; both are
+    /// `limit` if it comes first.
+    fn end_of(&self, start: f64, limit: f64, phase: f64) -> [f64; 2] {
+        let rule = GaussLegendre::new(4);
+        let (mut turned, mut begin, span) = (0.0, start, limit - start);
+        let mut step = span * 1e-9;
+        let mut fall = None;
+        while (limit - begin).abs() > span.abs() * 1e-12 {
+            let end = if (limit - begin).abs() <= step.abs() {
+                limit
+            } else {
+                begin + step
+            };
+            if (end - begin).abs() <= f64::EPSILON * begin.abs() {
+                // Phases turn within the rounding of u: a ship too far to be resolved.
+                return [begin, fall.unwrap_or(begin)];
+            }
+            let more = rule.integrate([begin, end], |u| self.slowest(u)).abs();
+            if more > 0.5 * phase {
+                step *= 0.5;
+                continue;
+            }
+            turned += more;
+            begin = end;
+            if turned >= phase && fall.is_none() {
+                fall = Some(begin);
+            }
+            if turned >= 2.0 * phase {
+                return [begin, fall.unwrap_or(begin)];
+            }
+            step *= 1.3;
+        }
+        [limit, limit]
+    }
+}
+
+/// Intervals that touch, joined.
+fn merged(mut seeds: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    seeds.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut out: Vec<[f64; 2]> = Vec::new();
+    for seed in seeds {
+        match out.last_mut() {
+            Some(last) if seed[0] <= last[1] => last[1] = last[1].max(seed[1]),
+            _ => out.push(seed),
+        }
+    }
+    out
+}
+
+/// A zero of `f` between two points of unlike sign, by halving.
+fn root(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    let sign = f(a) > 0.0;
+    for _ in 0..50 {
+        let middle = 0.5 * (a + b);
+        if (f(middle) > 0.0) == sign {
+            a = middle;
+        } else {
+            b = middle;
+        }
+    }
+    0.5 * (a + b)
+}
+
+/// The place of the smallest value of a function with one valley, by thirds.
+fn smallest(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    for _ in 0..40 {
+        let (p, q) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
+        if f(p) < f(q) {
+            b = q;
+        } else {
+            a = p;
+        }
+    }
+    0.5 * (a + b)
+}

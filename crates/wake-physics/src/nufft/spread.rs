@@ -1,0 +1,175 @@
+//! Spreading: each wave adds its kernel to the lattice points around its wavenumber.
+
+use super::kernel::{Kernel, WIDEST};
+use crate::fft::Real;
+use num_complex::Complex;
+use rayon::prelude::*;
+
+/// Lines of the transposed lattice that one task owns.
+const LINES: usize = 16;
+
+/// Where each wave and its mirror image (wavenumber −k) touch the lattice, and with which weights.
+///
+/// Sorted by line, so that a task finds the waves that touch its own lines.
+#[derive(Debug)]
+pub(crate) struct Footprints<T> {
+    width: usize,
+    lattice: [usize; 2],
+    /// (first column, first row, wave, mirrored), by column.
+    places: Vec<Place>,
+    /// Weights along x then along y, `2·width` for each place.
+    weights: Vec<T>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    column: u32,
+    row: u32,
+    wave: u32,
+    mirrored: bool,
+}
+
+impl<T: Real> Footprints<T> {
+    /// `waves` are wavenumbers in lattice steps (along y, along x).
+    pub(crate) fn new(waves: &[[f64; 2]], kernel: &Kernel, lattice: [usize; 2]) -> Self {
+        let width = kernel.width;
+        let mut places: Vec<Place> = (0..waves.len() as u32)
+            .flat_map(|wave| [false, true].map(|mirrored| (wave, mirrored)))
+            .map(|(wave, mirrored)| {
+                let [row, column] = [0, 1].map(|axis| {
+                    let g = signed(waves[wave as usize][axis], mirrored);
+                    first_point(g, width).rem_euclid(lattice[axis] as i64) as u32
+                });
+                Place {
+                    column,
+                    row,
+                    wave,
+                    mirrored,
+                }
+            })
+            .collect();
+        places.sort_unstable_by_key(|p| (p.column, p.row));
+        let mut weights = vec![T::zero(); 2 * width * places.len()];
+        weights
+            .par_chunks_mut(2 * width)
+            .zip(&places)
+            .with_min_len(256)
+            .for_each(|(out, place)| {
+                let [along_y, along_x] =
+                    waves[place.wave as usize].map(|g| signed(g, place.mirrored));
+                let (x, y) = out.split_at_mut(width);
+                fill(x, along_x, kernel);
+                fill(y, along_y, kernel);
+            });
+        Self {
+            width,
+            lattice,
+            places,
+            weights,
+        }
+    }
+
+    /// Clears the transposed lattice `[columns, rows]` and adds all waves.
+    ///
+    /// `strengths` holds for each wave what its wavenumber k and what −k carries.
+    pub(crate) fn spread(&self, strengths: &[[Complex<T>; 2]], lattice: &mut [Complex<T>]) {
+        let rows = self.lattice[0];
+        lattice
+            .par_chunks_mut(LINES * rows)
+            .enumerate()
+            .for_each(|(bin, lines)| {
+                lines.fill(Complex::new(T::zero(), T::zero()));
+                let first = bin * LINES;
+                let last = first + lines.len() / rows;
+                // Kernels that begin in the bin or up to width − 1 columns before it, around the end too.
+                let before = first as i64 - self.width as i64 + 1;
+                self.add(
+                    self.range(before.max(0), last as i64),
+                    first,
+                    strengths,
+                    lines,
+                );
+                if before < 0 {
+                    let wrapped = before + self.lattice[1] as i64;
+                    let from = wrapped.max(last as i64);
+                    self.add(
+                        self.range(from, self.lattice[1] as i64),
+                        first,
+                        strengths,
+                        lines,
+                    );
+                }
+            });
+    }
+
+    /// Places whose first column lies in [from, to).
+    fn range(&self, from: i64, to: i64) -> std::ops::Range<usize> {
+        let start = self.places.partition_point(|p| i64::from(p.column) < from);
+        let end = self.places.partition_point(|p| i64::from(p.column) < to);
+        start..end.max(start)
+    }
+
+    fn add(
+        &self,
+        places: std::ops::Range<usize>,
+        first: usize,
+        strengths: &[[Complex<T>; 2]],
+        lines: &mut [Complex<T>],
+    ) {
+        let [rows, columns] = self.lattice;
+        let w = self.width;
+        for index in places {
+            let place = self.places[index];
+            let strength = strengths[place.wave as usize][usize::from(place.mirrored)];
+            let (along_x, along_y) = self.weights[2 * w * index..2 * w * (index + 1)].split_at(w);
+            for (dx, &weight) in along_x.iter().enumerate() {
+                let column = (place.column as usize + dx) % columns;
+                let Some(line) = column.checked_sub(first).filter(|l| l * rows < lines.len())
+                else {
+                    continue;
+                };
+                let line = &mut lines[line * rows..(line + 1) * rows];
+                add_wrapped(line, place.row as usize, strength * weight, along_y);
+            }
+        }
+    }
+}
+
+/// Adds `strength` times the weights to a line from `start` on, around its end.
+fn add_wrapped<T: Real>(
+    line: &mut [Complex<T>],
+    start: usize,
+    strength: Complex<T>,
+    weights: &[T],
+) {
+    let until_end = weights.len().min(line.len() - start);
+    let (here, beyond) = weights.split_at(until_end);
+    for (v, &w) in line[start..].iter_mut().zip(here) {
+        *v = *v + strength * w;
+    }
+    for (v, &w) in line.iter_mut().zip(beyond) {
+        *v = *v + strength * w;
+    }
+}
+
+fn signed(g: f64, mirrored: bool) -> f64 {
+    if mirrored { -g } else { g }
+}
+
+/// The first of `width` lattice points around g.
+fn first_point(g: f64, width: usize) -> i64 {
+    (g - 0.5 * width as f64).ceil() as i64
+}
+
+/// Kernel weights around g, with the sign (−1)^index that moves the field's origin to the middle.
+fn fill<T: Real>(out: &mut [T], g: f64, kernel: &Kernel) {
+    let first = first_point(g, kernel.width);
+    let mut values = [0.0; WIDEST];
+    let values = &mut values[..kernel.width];
+    kernel.values(first as f64 - g, values);
+    let mut sign = if first.rem_euclid(2) == 0 { 1.0 } else { -1.0 };
+    for (v, value) in out.iter_mut().zip(values) {
+        *v = <T as Real>::from_f64(sign * *value);
+        sign = -sign;
+    }
+}

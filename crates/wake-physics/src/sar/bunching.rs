@@ -1,0 +1,350 @@
+//! Velocity bunching: every source pixel goes where its motion puts it, as wide as its motion makes it.
+//!
+//! ```text
+//! I(y, x) = Σ σ⁰ P(y − y' − (R/V) u_r; ρ') Λ(x − x' + ζ cot θ),     P(y; ρ) ∝ exp(−(π/ρ)² y²)
+//! ```
+//!
+//! P is sampled at the pixels and normalised to the sum 1; Λ is the linear (cloud-in-cell) weight of range, whose
+//! resolution is the pixel. So all power arrives, none twice. What is displaced out of the image is lost, what the
+//! margin displaces into it is there; nothing wraps.
+//!
+//! # Validity
+//!
+//! A source pixel is a point: where ρ' is smaller than the distance between the images of neighbours, the image
+//! is grainy. Coherence or many looks fill the gaps; without them a finer grid does.
+//!
+//! # References
+//!
+//! Alpers and Rufenach (1979), IEEE Trans. Antennas Propag. 27; Hasselmann et al. (1985), J. Geophys. Res. 90.
+
+use crate::raster::{Field, Raster};
+use crate::sar::AzimuthResolution;
+use crate::sar::response::{Response, largest, reach};
+use crate::sar::spread::{LANES, Steps, gaussian};
+use rayon::prelude::*;
+use std::f64::consts::{LOG2_E, PI, SQRT_2};
+use std::ops::Range;
+
+/// The radar's part of velocity bunching.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Imaging {
+    /// Range over platform speed R/V [s], at least 0.
+    pub range_to_velocity: f64,
+    /// Incidence angle θ [rad], between 0 and π/2.
+    pub incidence: f64,
+    /// Azimuth resolution ρ' and how it depends on acceleration.
+    pub resolution: AzimuthResolution,
+}
+
+/// What the radar looks at: fields on a raster that has a margin around the image, all finite.
+///
+/// An absent field is an absent effect, and costs nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Sources<'a> {
+    /// The pixels of the fields.
+    pub raster: Raster,
+    /// Backscatter σ⁰ [1].
+    pub sigma0: &'a Field,
+    /// Velocity toward the radar `u_r` [m/s]: displaces in azimuth.
+    pub radial_velocity: Option<&'a Field>,
+    /// Acceleration toward the radar `a_r` [m/s²]: defocuses.
+    pub radial_acceleration: Option<&'a Field>,
+    /// Elevation ζ [m]: displaces in range.
+    pub elevation: Option<&'a Field>,
+}
+
+/// Largest absolute values of what displaces and defocuses.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Extremes {
+    /// Of the velocity toward the radar `u_r` [m/s].
+    pub radial_velocity: f64,
+    /// Of the acceleration toward the radar `a_r` [m/s²].
+    pub radial_acceleration: f64,
+    /// Of the elevation ζ [m].
+    pub elevation: f64,
+}
+
+impl Imaging {
+    /// Rows and columns around the image from which power can reach it.
+    ///
+    /// ```text
+    /// rows = ((R/V) max|u_r| + z ρ'/(√2 π))/spacing,     columns = max|ζ| cot θ/spacing
+    /// ```
+    ///
+    /// rounded up, with one pixel more; z is the number of standard deviations that `tolerance` asks for.
+    #[must_use]
+    pub fn margin(&self, spacing: f64, extremes: &Extremes, tolerance: f64) -> [usize; 2] {
+        let width = self.resolution.at(extremes.radial_acceleration) / (SQRT_2 * PI);
+        let azimuth = self.range_to_velocity * extremes.radial_velocity + reach(tolerance) * width;
+        let range = extremes.elevation / self.incidence.tan();
+        [azimuth, range].map(|d| (d / spacing).ceil() as usize + 1)
+    }
+
+    /// The image before speckle, in the unit of σ⁰, on the raster `image`.
+    ///
+    /// - `tolerance`: largest sum of |error| in the response of any one source, relative to its power; so the mean
+    ///   |error| of the image is within `tolerance` of its mean. The rounding of `f32` adds about 1e-6.
+    ///
+    /// The result does not depend on the number of threads.
+    ///
+    /// # Panics
+    ///
+    /// If a field is not of the size of its raster or the rasters' spacings differ.
+    #[must_use]
+    pub fn image(&self, sources: &Sources<'_>, image: &Raster, tolerance: f64) -> Field {
+        sources.check();
+        let sum = Sum::new(self, sources, image, tolerance);
+        let width = sum.block_width();
+        let blocks: Vec<Vec<f32>> = (0..image.columns.div_ceil(width))
+            .into_par_iter()
+            .map(|b| sum.block(b * width..((b + 1) * width).min(image.columns)))
+            .collect();
+        sum.filled(&blocks, width)
+    }
+}
+
+/// One image in the making.
+///
+/// Columns are summed in blocks, each by one thread, with the sources of the neighbouring columns that lean into
+/// it; rows of a block are steps of [`Steps`].
+struct Sum<'a> {
+    sources: &'a Sources<'a>,
+    image: &'a Raster,
+    response: Response,
+    steps: Steps,
+    /// Columns that a source may be displaced by, rounded up.
+    lean: usize,
+    /// Steps before row 0 of the image, and after its last.
+    pad: usize,
+    /// Number of steps.
+    count: usize,
+    filling_first: i64,
+    filling: Vec<Vec<f32>>,
+}
+
+impl<'a> Sum<'a> {
+    fn new(imaging: &Imaging, sources: &'a Sources<'a>, image: &'a Raster, tolerance: f64) -> Self {
+        let response = Response::new(imaging, &sources.raster, image);
+        let steps = Steps::new(response.variance_at(0.0), tolerance);
+        let (filling_first, filling) = steps.filling_taps();
+        let widest = response.variance_at(largest(sources.radial_acceleration));
+        let lean = largest(sources.elevation) * response.columns_per_elevation;
+        let pad = steps.taps(widest as f32) + filling_first.unsigned_abs() as usize + 1;
+        Self {
+            sources,
+            image,
+            response,
+            lean: lean.ceil() as usize + usize::from(lean > 0.0),
+            pad,
+            count: image.rows.div_ceil(steps.step) + 2 * pad,
+            steps,
+            filling_first,
+            filling,
+        }
+    }
+
+    /// Columns of a block: enough blocks for many threads, few sources looked at twice.
+    fn block_width(&self) -> usize {
+        (self.image.columns / 16).clamp(8, 32).max(2 * self.lean)
+    }
+
+    /// Columns of the sources that can reach these columns of the image.
+    fn reaching(&self, columns: &Range<usize>) -> Range<usize> {
+        let to_source = |column: usize, lean: i64| {
+            let j = column as i64 + lean - self.response.offset[1];
+            j.clamp(0, self.sources.raster.columns as i64) as usize
+        };
+        let lean = self.lean as i64;
+        to_source(columns.start, -lean)..to_source(columns.end, lean)
+    }
+
+    /// The steps of these columns, `[steps, columns]`.
+    fn block(&self, columns: Range<usize>) -> Vec<f32> {
+        let reaching = self.reaching(&columns);
+        let mut lines = Lines {
+            values: vec![0.0; self.count * columns.len()],
+            count: self.count,
+            columns: columns.len() as i32,
+        };
+        let first = reaching.start as i64 + self.response.offset[1] - columns.start as i64;
+        let mut taps = Taps::default();
+        for i in 0..self.sources.raster.rows {
+            let row = SourceRow::new(self.sources, i, &reaching);
+            self.add_row(i, &row, first as i32, &mut taps, &mut lines);
+        }
+        lines.transposed()
+    }
+
+    /// Adds the sources of one row; `first` is the column of the first in the block.
+    fn add_row(
+        &self,
+        i: usize,
+        row: &SourceRow<'_>,
+        first: i32,
+        taps: &mut Taps,
+        lines: &mut Lines,
+    ) {
+        let step = self.steps.step as f64;
+        let place = (i as i64 + self.response.offset[0]) as f64 / step + self.pad as f64;
+        let (start, fraction) = (place.floor() as i64, place.fract() as f32);
+        let per_velocity = (self.response.rows_per_velocity / step) as f32;
+        let per_elevation = self.response.columns_per_elevation as f32;
+        for (j, &sigma0) in row.sigma0.iter().enumerate() {
+            let at = fraction - per_velocity * value(row.velocity, j);
+            let whole = floor(at);
+            taps.set(self, at - whole as f32, value(row.acceleration, j));
+            let from = start + i64::from(whole) - taps.before as i64;
+            let Ok(from) = usize::try_from(from) else {
+                continue;
+            };
+            let column = -per_elevation * value(row.elevation, j);
+            let left = floor(column);
+            let share = column - left as f32;
+            let power = sigma0 * taps.scale;
+            let target = first + j as i32 + left;
+            lines.add(
+                target,
+                from,
+                &taps.values[..taps.count],
+                power * (1.0 - share),
+            );
+            if share > 0.0 {
+                lines.add(target + 1, from, &taps.values[..taps.count], power * share);
+            }
+        }
+    }
+
+    /// Fills the rows between the steps, row by row.
+    fn filled(&self, blocks: &[Vec<f32>], width: usize) -> Field {
+        let mut image = Field::constant(self.image, 0.0);
+        let columns = self.image.columns.max(1);
+        image
+            .values
+            .par_chunks_mut(columns)
+            .enumerate()
+            .for_each(|(m, row)| {
+                let weights = &self.filling[m % self.steps.step];
+                let first = (m / self.steps.step + self.pad) as i64 + self.filling_first;
+                for (out, block) in row.chunks_mut(width).zip(blocks) {
+                    let start = first as usize * out.len();
+                    let steps = block[start..].chunks_exact(out.len());
+                    for (&weight, step) in weights.iter().zip(steps).filter(|(w, _)| **w > 0.0) {
+                        for (out, &value) in out.iter_mut().zip(step) {
+                            *out += weight * value;
+                        }
+                    }
+                }
+            });
+        image
+    }
+}
+
+/// One row of the sources, cut to the columns that matter.
+struct SourceRow<'a> {
+    sigma0: &'a [f32],
+    velocity: Option<&'a [f32]>,
+    acceleration: Option<&'a [f32]>,
+    elevation: Option<&'a [f32]>,
+}
+
+impl<'a> SourceRow<'a> {
+    fn new(sources: &Sources<'a>, row: usize, columns: &Range<usize>) -> Self {
+        let start = row * sources.raster.columns;
+        let range = start + columns.start..start + columns.end.max(columns.start);
+        let cut = |field: &'a Field| &field.values[range.clone()];
+        Self {
+            sigma0: cut(sources.sigma0),
+            velocity: sources.radial_velocity.map(cut),
+            acceleration: sources.radial_acceleration.map(cut),
+            elevation: sources.elevation.map(cut),
+        }
+    }
+}
+
+fn value(row: Option<&[f32]>, column: usize) -> f32 {
+    row.map_or(0.0, |row| row[column])
+}
+
+/// Largest integer not above x: [`f32::floor`] is a call without SSE 4.1.
+fn floor(x: f32) -> i32 {
+    let cut = x as i32;
+    cut - i32::from(x < cut as f32)
+}
+
+/// The taps of the last source, kept as long as the next has the same place between steps and the same width.
+#[derive(Default)]
+struct Taps {
+    key: Option<(f32, f32)>,
+    values: Vec<f32>,
+    count: usize,
+    /// Taps before the step at or before the source.
+    before: usize,
+    /// What makes their sum 1.
+    scale: f32,
+}
+
+impl Taps {
+    #[inline]
+    fn set(&mut self, sum: &Sum<'_>, fraction: f32, acceleration: f32) {
+        if self.key == Some((fraction, acceleration)) {
+            return;
+        }
+        let smallest = crate::sar::response::SMALLEST_VARIANCE as f32;
+        let response = &sum.response;
+        let variance = (response.variance as f32
+            + response.variance_per_square as f32 * acceleration * acceleration)
+            .max(smallest);
+        self.count = sum.steps.taps(variance);
+        if self.values.len() < self.count {
+            self.values.resize(self.count, 0.0);
+        }
+        self.before = self.count / 2 - 1;
+        let step = sum.steps.step as f32;
+        let scale = 0.5 * LOG2_E as f32 * step * step / (variance - sum.steps.filling as f32);
+        let centre = self.before as f32 + fraction;
+        self.scale = 1.0 / gaussian(&mut self.values[..self.count], centre, scale);
+        self.key = Some((fraction, acceleration));
+    }
+}
+
+/// The columns of a block, each contiguous.
+struct Lines {
+    /// `[columns, count]`.
+    values: Vec<f32>,
+    count: usize,
+    columns: i32,
+}
+
+impl Lines {
+    /// Adds `power × taps` from step `from` of a column on; what lies outside is lost.
+    #[inline]
+    fn add(&mut self, column: i32, from: usize, taps: &[f32], power: f32) {
+        if column < 0 || column >= self.columns || from + taps.len() > self.count {
+            return;
+        }
+        let start = column as usize * self.count + from;
+        let line = &mut self.values[start..start + taps.len()];
+        let groups = line.as_chunks_mut::<LANES>().0;
+        for (line, taps) in groups.iter_mut().zip(taps.as_chunks::<LANES>().0) {
+            for (line, tap) in line.iter_mut().zip(taps) {
+                *line += power * tap;
+            }
+        }
+    }
+
+    /// `[count, columns]`.
+    fn transposed(&self) -> Vec<f32> {
+        let columns = self.columns as usize;
+        let mut values = vec![0.0; self.values.len()];
+        for (j, line) in self.values.chunks_exact(self.count).enumerate() {
+            for (n, &v) in line.iter().enumerate() {
+                values[n * columns + j] = v;
+            }
+        }
+        values
+    }
+}
+
+#[cfg(test)]
+#[path = "bunching_tests.rs"]
+mod tests;

@@ -1,0 +1,22 @@
+//! From σ⁰ and motion to a SAR image: velocity bunching, resolution, speckle and the ship's echo.
+//!
+//! ```text
+//! σ⁰, radial velocity, acceleration, elevation ─► Imaging ─► (+ Echo) ─► intensity ─► speckle ─► image
+//! ```
+//!
+//! The radar looks toward +x (ground range) and flies toward +y (azimuth, row 0 at the largest y).
+//! Intensity has the unit of σ⁰: every source pixel gives all its power, somewhere.
+
+pub mod bunching;
+pub mod coherence;
+pub mod direct;
+pub mod echo;
+pub mod geometry;
+pub mod speckle;
+
+mod response;
+mod spread;
+
+pub use bunching::{Imaging, Sources};
+pub use coherence::AzimuthResolution;
+pub use echo::Echo;

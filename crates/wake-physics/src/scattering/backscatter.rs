@@ -1,0 +1,386 @@
+//! All of σ⁰, evaluated exactly: the oracle of the table, and the figures by which a plan leaves terms out.
+
+use crate::raster::Field;
+use crate::scattering::{FacetFields, SlopeCovariance, Specular, TwoScale};
+use rayon::prelude::*;
+
+/// Spacing of slopes for figures that need two digits only [1].
+const COARSE_SLOPES: f64 = 0.06;
+
+/// Backscatter of facets: Bragg return averaged over unresolved tilt, and specular return.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Backscatter {
+    /// Bragg scattering by tilted facets.
+    pub two_scale: TwoScale,
+    /// Unresolved slopes over which the Bragg return is averaged; [`SlopeCovariance::NONE`] for no average.
+    pub tilt: SlopeCovariance,
+    /// The specular return; [`Specular::NONE`] for none.
+    pub specular: Specular,
+}
+
+/// What σ⁰ would lose without a term: root mean square over the sea, relative to the mean σ⁰ [1].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// Mean Bragg and specular σ⁰ [1].
+    pub mean: [f64; 2],
+    /// Without the average over unresolved tilt; 0 if σ⁰ is 0.
+    pub tilt_average: f64,
+    /// Without the specular return; 0 if σ⁰ is 0.
+    pub specular: f64,
+}
+
+impl Backscatter {
+    /// Bragg and specular cross-section of a facet of resolved slope (`s_x`, `s_y`), by direct quadrature.
+    #[must_use]
+    pub fn parts(&self, slope: [f64; 2]) -> [f64; 2] {
+        [
+            self.two_scale.tilt_averaged(slope, &self.tilt),
+            self.specular.sigma0(slope),
+        ]
+    }
+
+    /// [`Self::parts`] to about two digits, in microseconds.
+    pub(crate) fn coarse_parts(&self, slope: [f64; 2]) -> [f64; 2] {
+        [
+            self.two_scale.average(slope, &self.tilt, COARSE_SLOPES),
+            self.specular.sigma0(slope),
+        ]
+    }
+
+    /// σ⁰ of every pixel, exactly: the oracle of
+    /// [`BackscatterTable::sigma0_field`](super::BackscatterTable::sigma0_field).
+    #[must_use]
+    pub fn sigma0_field(&self, fields: &FacetFields<'_>) -> Field {
+        let size = fields.slope_x.values.len();
+        let columns = fields.slope_x.columns;
+        let pixels: Vec<[usize; 2]> = (0..size).map(|n| [n / columns, n % columns]).collect();
+        Field {
+            rows: fields.slope_x.rows,
+            columns,
+            values: self.sigma0_pixels(fields, &pixels),
+        }
+    }
+
+    /// σ⁰ of some pixels (row, column), exactly.
+    #[must_use]
+    pub fn sigma0_pixels(&self, fields: &FacetFields<'_>, pixels: &[[usize; 2]]) -> Vec<f32> {
+        let columns = fields.slope_x.columns;
+        pixels
+            .par_iter()
+            .map(|&[row, column]| {
+                let n = row * columns + column;
+                fields.combine(n, self.parts(fields.slope(n)))
+            })
+            .collect()
+    }
+
+    /// Mean Bragg and specular σ⁰ over resolved Gaussian slopes, to about two digits.
+    #[must_use]
+    pub fn mean_over(&self, resolved: &SlopeCovariance) -> [f64; 2] {
+        let tilt = self.tilt.plus(resolved);
+        [
+            self.two_scale.average([0.0; 2], &tilt, COARSE_SLOPES),
+            self.specular.mean_over(resolved),
+        ]
+    }
+
+    /// How much each term of σ⁰ matters over resolved Gaussian slopes.
+    ///
+    /// The specular return has a closed form. The tilt average is taken away on three by three Gauss–Hermite nodes
+    /// of the resolved slopes: within 10 % at 32°, a third too low at 18°, where few facets near nadir dominate.
+    #[must_use]
+    pub fn sensitivity(&self, resolved: &SlopeCovariance) -> Sensitivity {
+        let mean = self.mean_over(resolved);
+        let relative = |value: f64| {
+            let total = mean[0] + mean[1];
+            if total > 0.0 { value / total } else { 0.0 }
+        };
+        Sensitivity {
+            mean,
+            tilt_average: relative(self.rms_of_tilt_average(resolved)),
+            specular: relative(self.specular.rms_over(resolved)),
+        }
+    }
+
+    fn rms_of_tilt_average(&self, resolved: &SlopeCovariance) -> f64 {
+        let axes = resolved.principal_axes();
+        let [std_u, std_v] = axes.variance.map(f64::sqrt);
+        let square: f64 = (0..9)
+            .into_par_iter()
+            .map(|n| {
+                let ([u, weight_u], [v, weight_v]) = (HERMITE_3[n / 3], HERMITE_3[n % 3]);
+                let slope = axes.slope([u * std_u, v * std_v]);
+                let averaged = self.two_scale.average(slope, &self.tilt, COARSE_SLOPES);
+                weight_u * weight_v * (averaged - self.two_scale.facet(slope)).powi(2)
+            })
+            .sum();
+        square.sqrt()
+    }
+}
+
+/// Nodes and weights of the mean over a unit Gaussian, exact to the fifth power: 0 and ±√3.
+const HERMITE_3: [[f64; 2]; 3] = [
+    [-1.7320508075688772, 1.0 / 6.0],
+    [0.0, 2.0 / 3.0],
+    [1.7320508075688772, 1.0 / 6.0],
+];
+
+/// Gates against tables of other programmes and an empirical model.
+#[cfg(test)]
+#[allow(
+    clippy::float_cmp,
+    reason = "exact zeros and values that nothing may change"
+)]
+mod tests {
+    use super::*;
+    use crate::constants::SPEED_OF_LIGHT;
+    use crate::permittivity::sea_water;
+    use crate::scattering::slopes::gaussian_nodes;
+    use crate::scattering::{Polarization, cmod5n};
+    use crate::spectrum::Elfouhaily;
+    use crate::spectrum::elfouhaily::{DragLaw, FULLY_DEVELOPED};
+    use std::f64::consts::PI;
+
+    struct Case {
+        frequency: f64,
+        degrees: f64,
+        wind_speed: f64,
+        wind: [f64; 2],
+        polarization: Polarization,
+        drag: DragLaw,
+    }
+
+    const X_BAND: Case = Case {
+        frequency: 9.6e9,
+        degrees: 32.0,
+        wind_speed: 5.0,
+        wind: [-1.0, 0.0],
+        polarization: Polarization::VV,
+        drag: DragLaw::Wu,
+    };
+    const C_BAND: Case = Case {
+        frequency: 5.3e9,
+        ..X_BAND
+    };
+
+    impl Case {
+        /// The mean over a whole developed sea, waves longer than the split as Gaussian slopes.
+        fn scene_mean(&self) -> Backscatter {
+            let incidence = self.degrees.to_radians();
+            let permittivity = sea_water(self.frequency, 20.0, 35.0);
+            let two_scale = TwoScale::new(
+                incidence,
+                2.0 * PI * self.frequency / SPEED_OF_LIGHT,
+                self.polarization,
+                permittivity,
+                Elfouhaily::of_age(self.wind_speed, FULLY_DEVELOPED, self.drag),
+                self.wind,
+            );
+            let tilt = two_scale.slopes_from(0.0);
+            Backscatter {
+                specular: Specular::new(permittivity, incidence, &tilt, 0.0),
+                two_scale,
+                tilt,
+            }
+        }
+
+        /// Bragg without tilt, with tilt, specular and sum [dB].
+        fn decibels(&self) -> [f64; 4] {
+            let model = self.scene_mean();
+            let [bragg, specular] = model.parts([0.0; 2]);
+            let flat = model.two_scale.facet([0.0; 2]);
+            [flat, bragg, specular, bragg + specular].map(|s| 10.0 * s.log10())
+        }
+    }
+
+    /// ECKV and two-scale model of an independent programme at C band: upwind and crosswind within 0.3 dB.
+    #[test]
+    fn c_band_two_scale_meets_the_reference() {
+        let table = [
+            (5.0, [[-14.5, -17.4], [-17.1, -19.6], [-18.9, -21.3]]),
+            (10.0, [[-9.4, -12.5], [-11.7, -14.6], [-13.3, -16.3]]),
+        ];
+        for (wind_speed, rows) in table {
+            for (degrees, row) in [30.0, 35.0, 40.0].into_iter().zip(rows) {
+                for (wind, expected) in [[-1.0, 0.0], [0.0, 1.0]].into_iter().zip(row) {
+                    let case = Case {
+                        degrees,
+                        wind_speed,
+                        wind,
+                        ..C_BAND
+                    };
+                    let db = case.decibels()[1];
+                    assert!(
+                        (db - expected).abs() < 0.3,
+                        "{wind_speed} {degrees} {wind:?}: {db}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// The same programme at X band: Bragg, two-scale, specular, sum, all within 0.3 dB but one value, see below.
+    /// Where the specular return is far below the rest the table has none.
+    #[test]
+    fn x_band_parts_meet_the_reference() {
+        let none = f64::NAN;
+        let table = [
+            (3.0, 16.0, [-8.1, none, 0.6, 1.8]),
+            (3.0, 24.0, [-15.9, -11.4, -20.4, -10.9]),
+            (3.0, 32.0, [-20.9, -18.8, none, -18.8]),
+            (5.0, 16.0, [-7.1, -4.2, 2.5, 3.3]),
+            (5.0, 24.0, [-12.8, -9.9, -14.6, -8.6]),
+            (5.0, 32.0, [-16.3, -15.0, none, -15.0]),
+            (7.0, 16.0, [-5.1, -2.7, 3.2, 4.2]),
+            (7.0, 24.0, [-10.4, -7.9, -12.1, -6.5]),
+            (7.0, 32.0, [-13.8, -12.5, none, -12.5]),
+        ];
+        for (wind_speed, degrees, expected) in table {
+            let case = Case {
+                degrees,
+                wind_speed,
+                ..X_BAND
+            };
+            for (db, expected) in case.decibels().into_iter().zip(expected) {
+                assert!(
+                    expected.is_nan() || (db - expected).abs() < 0.3,
+                    "{wind_speed} {degrees}: {db} {expected}"
+                );
+            }
+        }
+    }
+
+    /// The one value left out above: two-scale, 3 m/s, 16°, −4.6 dB there and −3.7 dB here. Many facets come within
+    /// reach of nadir, where the two scales part by choice: a sharp limit at `k_d` gives −4.3 dB. It lies 4 dB
+    /// below the specular return.
+    #[test]
+    fn bragg_near_nadir_depends_on_where_the_scales_part() {
+        let case = Case {
+            degrees: 16.0,
+            wind_speed: 3.0,
+            ..X_BAND
+        };
+        let [_, bragg, specular, _] = case.decibels();
+        assert!((bragg + 4.3).abs() < 0.7, "{bragg}");
+        assert!(specular > bragg + 4.0);
+    }
+
+    /// The external gate: CMOD5.N within 2.5 dB from 30 to 40°, 3 to 10 m/s, up- and crosswind.
+    #[test]
+    fn cmod5n_agrees_at_c_band() {
+        for wind_speed in [3.0, 5.0, 7.0, 10.0] {
+            for degrees in [30.0, 35.0, 40.0] {
+                for (wind, phi) in [([-1.0, 0.0], 0.0), ([0.0, 1.0], PI / 2.0)] {
+                    let case = Case {
+                        degrees,
+                        wind_speed,
+                        wind,
+                        ..C_BAND
+                    };
+                    let expected = 10.0 * cmod5n::sigma0(wind_speed, phi, degrees).log10();
+                    let db = case.decibels()[3];
+                    assert!(
+                        (db - expected).abs() < 2.5,
+                        "{wind_speed} {degrees} {phi}: {db}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// VV over HH of the tilted Bragg return at X band, 5 m/s: within 0.3 dB of the reference.
+    #[test]
+    fn polarization_ratio_meets_the_reference() {
+        for (degrees, expected) in [
+            (20.0, 0.73),
+            (24.0, 1.12),
+            (28.0, 1.89),
+            (32.0, 2.82),
+            (40.0, 5.02),
+        ] {
+            let db = |polarization| {
+                Case {
+                    degrees,
+                    polarization,
+                    ..X_BAND
+                }
+                .decibels()[1]
+            };
+            let ratio = db(Polarization::VV) - db(Polarization::HH);
+            assert!((ratio - expected).abs() < 0.3, "{degrees}: {ratio}");
+        }
+    }
+
+    /// The documented variant of the drag law: 2.2 dB at 3 m/s, 0.7 dB at 5 and 7, none at 10.
+    #[test]
+    fn drag_law_matters_at_low_wind() {
+        for (wind_speed, expected) in [(3.0, 2.2), (5.0, 0.7), (7.0, 0.7), (10.0, 0.0)] {
+            let db = |drag| {
+                Case {
+                    wind_speed,
+                    drag,
+                    ..X_BAND
+                }
+                .decibels()[3]
+            };
+            let change = db(DragLaw::Fixed) - db(DragLaw::Wu);
+            assert!((change - expected).abs() < 0.3, "{wind_speed}: {change}");
+        }
+    }
+
+    /// A pixel that resolves part of the slopes: the mean over those of the facets' σ⁰ is the mean over all, and
+    /// the figures of the plan agree with quadrature over resolved slopes.
+    #[test]
+    fn resolved_and_unresolved_slopes_make_the_whole() {
+        for degrees in [18.0, 32.0] {
+            let mut model = Case { degrees, ..X_BAND }.scene_mean();
+            let whole = model.parts([0.0; 2]);
+            let resolved = model.tilt.times(0.3);
+            model.tilt = model.tilt.times(0.7);
+            let incidence = degrees.to_radians();
+            let permittivity = sea_water(9.6e9, 20.0, 35.0);
+            model.specular = Specular::new(permittivity, incidence, &model.tilt, 0.0);
+            let axes = resolved.principal_axes();
+            let [along, across] = axes.variance.map(|v| gaussian_nodes(v.sqrt(), 0.03));
+            let (mut mean, mut tilt, mut glint) = ([0.0; 2], 0.0, 0.0);
+            for [u, wu] in &along {
+                for [v, wv] in &across {
+                    let slope = axes.slope([*u, *v]);
+                    let weight = wu * wv;
+                    let specular = model.specular.sigma0(slope);
+                    let bragg = model.two_scale.average(slope, &model.tilt, 0.03);
+                    mean[0] += weight * bragg;
+                    mean[1] += weight * specular;
+                    tilt += weight * (bragg - model.two_scale.facet(slope)).powi(2);
+                    glint += weight * specular * specular;
+                }
+            }
+            let sensitivity = model.sensitivity(&resolved);
+            for n in 0..2 {
+                assert!(
+                    (mean[n] / whole[n] - 1.0).abs() < 0.01,
+                    "{mean:?} {whole:?}"
+                );
+                assert!((sensitivity.mean[n] / whole[n] - 1.0).abs() < 0.05);
+            }
+            let total = whole[0] + whole[1];
+            assert!((sensitivity.specular * total / glint.sqrt() - 1.0).abs() < 0.05);
+            // The stated accuracy of three nodes: 0.93 at 32°, 0.71 at 18°.
+            let ratio = sensitivity.tilt_average * total / tilt.sqrt();
+            assert!((ratio - 1.0).abs() < 0.35, "{degrees}: {ratio}");
+        }
+    }
+
+    /// Nothing is lost from nothing.
+    #[test]
+    fn calm_sea_has_no_sensitivity() {
+        let model = Case {
+            wind_speed: 0.0,
+            ..X_BAND
+        }
+        .scene_mean();
+        let sensitivity = model.sensitivity(&SlopeCovariance::NONE);
+        assert_eq!(sensitivity.mean, [0.0; 2]);
+        assert_eq!([sensitivity.tilt_average, sensitivity.specular], [0.0; 2]);
+    }
+}

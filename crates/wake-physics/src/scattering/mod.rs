@@ -1,0 +1,35 @@
+//! Radar backscatter of the sea: the cross-section σ⁰ of each pixel from its slope.
+//!
+//! ```text
+//! σ⁰ = σ_Bragg(slope) · max(0, 1 + m) · damping + σ_specular(slope)
+//! ```
+//!
+//! Waves come in three bands. Those a pixel resolves tilt its facet. Those between the pixel and the radar's
+//! split wavenumber `k_d` are averaged over, as Gaussian slopes. Those shorter than `k_d` scatter (Bragg).
+//! The tilt lives in `σ_Bragg` and nowhere else; m is the hydrodynamic modulation alone.
+//!
+//! Linear units, per unit area of the horizontal plane. The radar looks toward +x, so a slope ∂ζ/∂x > 0, which
+//! rises away from the radar, faces it and is bright.
+
+pub mod bragg;
+mod facet_fields;
+pub mod hydrodynamic;
+mod lattice;
+mod slopes;
+mod specular;
+mod table;
+mod two_scale;
+
+mod backscatter;
+mod bicubic;
+#[cfg(test)]
+mod cmod5n;
+
+pub use backscatter::{Backscatter, Sensitivity};
+pub use facet_fields::FacetFields;
+pub use slopes::SlopeCovariance;
+pub use specular::Specular;
+pub use table::BackscatterTable;
+pub use two_scale::TwoScale;
+
+pub use crate::scene::Polarization;

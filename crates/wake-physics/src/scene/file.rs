@@ -1,0 +1,213 @@
+//! Scene files: reading, writing, and assignments such as `ship.speed=10`.
+
+use super::Scene;
+use crate::error::{Error, Result};
+use std::path::Path;
+
+impl Scene {
+    /// Reads a scene from the text of a scene file and checks it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parse`] with line and key, or what [`Scene::validate`] finds.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        let scene: Self = toml::from_str(text).map_err(|e| Error::Parse {
+            message: e.to_string().trim().to_owned(),
+        })?;
+        scene.validate()?;
+        Ok(scene)
+    }
+
+    /// Reads a scene file and checks it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::File`] if the file cannot be read, else as [`Scene::from_toml`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::File {
+            action: "read",
+            path: path.to_owned(),
+            message: e.to_string(),
+        })?;
+        Self::from_toml(&text)
+    }
+
+    /// The scene as the text of a scene file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parse`] if a value has no form in TOML (a seed above 2⁶³ − 1).
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self).map_err(|e| Error::Parse {
+            message: e.to_string(),
+        })
+    }
+
+    /// The scene with assignments such as `ship.speed=10` made, in order, then checked.
+    ///
+    /// The value is TOML; a bare word is a string. Setting a key of a ship where there is none makes the
+    /// default ship first.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Assignment`] for a text without `=`, an unknown key or a wrong type, else as
+    /// [`Scene::validate`].
+    pub fn with_assignments<S: AsRef<str>>(&self, assignments: &[S]) -> Result<Self> {
+        let mut scene = self.clone();
+        for text in assignments {
+            scene = scene.assigned(text.as_ref())?;
+        }
+        scene.validate()?;
+        Ok(scene)
+    }
+
+    fn assigned(&self, assignment: &str) -> Result<Self> {
+        let fail = |message: String| Error::Assignment {
+            assignment: assignment.to_owned(),
+            message,
+        };
+        let (key, value) = assignment
+            .split_once('=')
+            .ok_or_else(|| fail("there is no '='".to_owned()))?;
+        let value = toml_value(value.trim()).ok_or_else(|| fail("there is no value".to_owned()))?;
+        let mut root = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
+        let path: Vec<&str> = key.trim().split('.').collect();
+        let (last, tables) = path.split_last().unwrap_or((&"", &[]));
+        let mut table = &mut root;
+        for name in tables {
+            let entry = table
+                .entry((*name).to_owned())
+                .or_insert_with(|| toml::Table::new().into());
+            table = entry
+                .as_table_mut()
+                .ok_or_else(|| fail(format!("{name} is no table")))?;
+        }
+        table.insert((*last).to_owned(), value);
+        root.try_into()
+            .map_err(|e: toml::de::Error| fail(e.message().trim().to_owned()))
+    }
+}
+
+/// Parses a TOML value; what is no TOML value is a string; nothing is `None`.
+fn toml_value(text: &str) -> Option<toml::Value> {
+    if text.is_empty() {
+        return None;
+    }
+    let mut table: toml::Table = toml::from_str(&format!("value = {text}"))
+        .unwrap_or_else(|_| toml::Table::from_iter([("value".to_owned(), text.into())]));
+    table.remove("value")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Grid, Model, Radar, Sea, Term, TermRule, Terms};
+
+    #[test]
+    fn an_empty_file_is_an_open_sea_with_defaults() {
+        let scene = Scene::from_toml("").unwrap();
+        assert_eq!(scene.ship, None);
+        assert_eq!(scene.seed, 7);
+        assert_eq!(scene.grid, Grid::default());
+        assert_eq!(scene.sea, Sea::default());
+        assert_eq!(scene.radar, Radar::default());
+        assert_eq!(scene.model, Model::default());
+        let ship = Scene::from_toml("[ship]").unwrap();
+        assert_eq!(ship, Scene::default());
+    }
+
+    #[test]
+    fn text_and_back() {
+        for scene in crate::scene::paper_grid().step_by(97) {
+            assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        }
+        let mut scene = Scene::default();
+        scene.sea.depth = 12.5;
+        scene.model.terms = Terms::List(vec![Term::Sea, Term::TiltAverage]);
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        scene.sea.depth = f64::INFINITY;
+        let json = serde_json::to_string(&scene).unwrap();
+        assert_eq!(serde_json::from_str::<Scene>(&json).unwrap(), scene);
+    }
+
+    #[test]
+    fn unknown_keys_and_wrong_types_are_errors_that_say_where() {
+        for (text, word) in [
+            ("sead = 1", "sead"),
+            ("[sea]\nwind = 3", "wind"),
+            ("[ship]\nspeed = \"fast\"", "speed"),
+            ("[radar]\npolarization = \"VH\"", "polarization"),
+            ("[model]\nterms = [\"waves\"]", "terms"),
+            ("[sea\nwind_speed = 3", "line 1"),
+            ("[grid]\nrows = -4", "rows"),
+        ] {
+            let message = Scene::from_toml(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn depth_can_be_infinite() {
+        for text in ["depth = inf", "depth = \"infinite\""] {
+            let scene = Scene::from_toml(&format!("[sea]\n{text}")).unwrap();
+            assert_eq!(scene.sea.depth, f64::INFINITY);
+        }
+        assert!(Scene::from_toml("[sea]\ndepth = 5").unwrap().sea.depth == 5.0);
+        assert!(Scene::from_toml("[sea]\ndepth = \"deep\"").is_err());
+    }
+
+    #[test]
+    fn assignments_take_toml_values_and_bare_words() {
+        let scene = Scene::default()
+            .with_assignments(&[
+                "ship.speed=8",
+                "ship.position=[10.0, -20]",
+                "sea.spectrum = jonswap",
+                "radar.polarization=\"HH\"",
+                "model.terms=all",
+                "seed=11",
+            ])
+            .unwrap();
+        let ship = scene.ship.unwrap();
+        assert_eq!((ship.speed, ship.position), (8.0, [10.0, -20.0]));
+        assert_eq!(scene.model.terms, Terms::Rule(TermRule::All));
+        assert_eq!(scene.seed, 11);
+        let open = Scene::from_toml("").unwrap();
+        assert!(
+            open.with_assignments(&["ship.speed=8"])
+                .unwrap()
+                .ship
+                .is_some()
+        );
+    }
+
+    #[test]
+    fn assignments_that_mean_nothing_say_so() {
+        for text in [
+            "ship.speed",
+            "ship.speed=",
+            "=3",
+            "ship.sped=3",
+            "seed.x=1",
+            "a.b.c=1",
+            "seed=x",
+        ] {
+            let message = Scene::default()
+                .with_assignments(&[text])
+                .unwrap_err()
+                .to_string();
+            assert!(message.contains(text), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let message = Scene::read(Path::new("no/such.toml"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("no/such.toml") && message.contains("read"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,135 @@
+//! From a scene to a SAR image: the only file that knows the order of the stages.
+//!
+//! `stages` calls the method of each stage, `clock` times them, `report` writes what came out.
+
+use crate::error::Result;
+use crate::labels::Labels;
+use crate::plan::Plan;
+use crate::raster::{Field, Raster};
+use crate::scene::Scene;
+use crate::setup::Setup;
+use clock::Clock;
+pub use clock::Seconds;
+use serde::Serialize;
+use stages::Run;
+
+mod clock;
+mod report;
+mod stages;
+
+/// How fields are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// FFT, non-uniform FFT, table, scattered kernels.
+    Fast,
+    /// The oracles: harmonic sums over the same waves, σ⁰ by quadrature at each pixel, the dense bunching
+    /// integral. Cost grows with waves × pixels.
+    Direct,
+}
+
+/// Everything a simulation makes. Fields are `[rows, columns]` of the image.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    /// Places of the pixels.
+    pub raster: Raster,
+    /// Elevation ζ [m].
+    pub elevation: Field,
+    /// Slope ∂ζ/∂x [1].
+    pub slope_x: Field,
+    /// Slope ∂ζ/∂y [1].
+    pub slope_y: Field,
+    /// Velocity of the water along x [m/s].
+    pub velocity_x: Field,
+    /// Velocity of the water along y [m/s].
+    pub velocity_y: Field,
+    /// Velocity of the water upward [m/s].
+    pub velocity_z: Field,
+    /// Velocity toward the radar [m/s].
+    pub radial_velocity: Field,
+    /// Cross-section σ⁰ per unit area, linear.
+    pub sigma0: Field,
+    /// Image intensity before speckle, linear, in the unit of σ⁰.
+    pub intensity: Field,
+    /// Image intensity with speckle.
+    pub speckled: Field,
+    /// Where ship and wake are.
+    pub labels: Labels,
+    /// What was computed, and bounds on what was not.
+    pub plan: Plan,
+    /// Seconds by stage.
+    pub seconds: Seconds,
+    /// How fields were computed.
+    pub method: Method,
+    /// The scene.
+    pub scene: Scene,
+}
+
+/// Simulates a scene with the fast methods.
+///
+/// # Errors
+///
+/// A value of the scene out of its range, or a grid that does not fit in memory.
+pub fn simulate(scene: &Scene) -> Result<Simulation> {
+    simulate_with(scene, Method::Fast)
+}
+
+/// Simulates a scene.
+///
+/// # Errors
+///
+/// As [`simulate`].
+pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
+    scene.validate()?;
+    let mut clock = Clock::start();
+    let mut seconds = Seconds::default();
+    let setup = Setup::new(scene);
+    let mut plan = Plan::of(scene, &setup)?;
+    let run = Run::new(scene, &setup, &plan, method);
+    seconds.plan = clock.lap();
+    let (mut fields, lattice) = run.sea(&plan);
+    plan.sizes.sea_lattice = lattice;
+    seconds.sea = clock.lap();
+    run.add_wake(&plan, &mut fields);
+    seconds.kelvin = clock.lap();
+    let damping = run.damping(&plan);
+    seconds.turbulent = clock.lap();
+    let (sigma0, table) = run.sigma0(&plan, &fields, damping.as_ref());
+    plan.sizes.table = table;
+    seconds.backscatter = clock.lap();
+    let radial_velocity = fields.radial_velocity(setup.incidence);
+    let intensity = run.image(&plan, &sigma0, &radial_velocity, &fields);
+    seconds.imaging = clock.lap();
+    let speckled = run.speckle(&plan, &intensity);
+    seconds.speckle = clock.lap();
+    let labels = run.labels();
+    let [
+        elevation,
+        slope_x,
+        slope_y,
+        velocity_x,
+        velocity_y,
+        velocity_z,
+    ] = fields.outputs.map(|field| run.crop(&field));
+    let (radial_velocity, sigma0) = (run.crop(&radial_velocity), run.crop(&sigma0));
+    seconds.labels = clock.lap();
+    seconds.total = clock.total();
+    Ok(Simulation {
+        raster: setup.image,
+        elevation,
+        slope_x,
+        slope_y,
+        velocity_x,
+        velocity_y,
+        velocity_z,
+        radial_velocity,
+        sigma0,
+        intensity,
+        speckled,
+        labels,
+        plan,
+        seconds,
+        method,
+        scene: scene.clone(),
+    })
+}

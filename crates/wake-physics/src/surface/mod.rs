@@ -1,0 +1,277 @@
+//! One random sea: its waves, and any field of them on a raster by FFT.
+
+mod amplitude;
+mod draw;
+mod factor;
+mod lattice;
+mod vector;
+
+use crate::dispersion::angular_frequency;
+use crate::fft::{Synthesis, signed_index};
+use crate::raster::{Field, Raster};
+use crate::waves::{PlaneWaves, Quantity, Transfer};
+use crate::wind_sea::DirectionalSpectrum;
+use draw::{Draw, Scatter};
+use factor::Factors;
+use lattice::Lattice;
+use num_complex::{Complex, Complex32, Complex64};
+use std::f64::consts::TAU;
+use vector::Lane;
+
+/// From this tolerance on single precision is enough: its error stays below a quarter of it.
+const SINGLE_PRECISION_TOLERANCE: f64 = 2e-5;
+
+/// One realisation of a wind sea at one instant, around one raster.
+///
+/// ```text
+/// ζ(x, y) = Σ Re[c(k) exp(i(kx·x + ky·y))],   c(k) = √(2Ψ(k) dkx dky) · g · e^{−iωt},   ⟨|g|²⟩ = 1
+/// ```
+///
+/// over the waves k of a periodic lattice, larger than the raster by a guard so that nothing wraps, with
+/// |k| ≤ π/spacing. The g are complex Gaussian. Where the lattice is too coarse for the spectral peak, Ψ is
+/// averaged over cells, so that the variance is right all the same; what no wave of the lattice can carry is
+/// [`Self::left_out`].
+///
+/// The seed fixes every wave, whatever the number of threads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surface {
+    raster: Raster,
+    lattice: Lattice,
+    depth: f64,
+    /// ½(c(k) + c*(−k)) of the lines b ≥ 0, phases at pixel `[0, 0]`.
+    even: Vec<Complex32>,
+    /// ½(c(k) − c*(−k)).
+    odd: Vec<Complex32>,
+    carried: f64,
+    left_out: f64,
+}
+
+impl Surface {
+    /// Draws a sea.
+    ///
+    /// - `spectrum` what the waves are drawn from
+    /// - `seed` which of all seas
+    /// - `time` t [s], from 0 to 10⁵: each wave has moved along its k by ωt
+    /// - `raster` where the sea will be seen, margins included
+    #[must_use]
+    pub fn new(spectrum: &DirectionalSpectrum, seed: u64, time: f64, raster: &Raster) -> Self {
+        Self::draw(spectrum, (seed, time), raster, Scatter::Gaussian)
+    }
+
+    fn draw(
+        spectrum: &DirectionalSpectrum,
+        seed_and_time: (u64, f64),
+        raster: &Raster,
+        scatter: Scatter,
+    ) -> Self {
+        let lattice = Lattice::new(raster, TAU / spectrum.peak_wavenumber());
+        let band = spectrum.moments(0.0, lattice.cutoff(), 0.0).elevation;
+        let ([even, odd], carried) = if band > 0.0 {
+            Draw::new(spectrum, lattice, raster, seed_and_time, scatter).run()
+        } else {
+            ([Vec::new(), Vec::new()], 0.0)
+        };
+        Self {
+            raster: *raster,
+            lattice,
+            depth: spectrum.depth(),
+            even,
+            odd,
+            carried,
+            left_out: if band > 0.0 {
+                (1.0 - carried / band).max(0.0)
+            } else {
+                0.0
+            },
+        }
+    }
+
+    /// Whether there is no resolved wave.
+    #[must_use]
+    pub fn is_flat(&self) -> bool {
+        self.carried <= 0.0
+    }
+
+    /// Variance ⟨ζ²⟩ that the waves have on average over seeds [m²].
+    #[must_use]
+    pub fn variance(&self) -> f64 {
+        self.carried
+    }
+
+    /// Share of the resolved variance, |k| from 0 to π/spacing, that no wave of the lattice carries [1]: waves
+    /// longer than the period. 0 to about 10⁻³, the accuracy of sum and integral, where the peak is resolved.
+    #[must_use]
+    pub fn left_out(&self) -> f64 {
+        self.left_out
+    }
+
+    /// Rows and columns of the periodic lattice the FFTs run on.
+    #[must_use]
+    pub fn lattice_size(&self) -> [usize; 2] {
+        [self.lattice.rows, self.lattice.columns]
+    }
+
+    /// The waves one by one, for a harmonic sum: exactly those that [`Self::fields`] adds up.
+    #[must_use]
+    pub fn modes(&self) -> PlaneWaves {
+        let mut waves = PlaneWaves::default();
+        for line in 0..self.lines() {
+            for index in self.lattice.disk(line).into_iter().flatten() {
+                for (sign, amplitude) in [1.0, -1.0].into_iter().zip(self.pair(line, index)) {
+                    if amplitude != Complex64::ZERO {
+                        self.push(&mut waves, [line, index], sign, amplitude);
+                    }
+                }
+            }
+        }
+        waves
+    }
+
+    /// Number of lines drawn: none on a flat sea.
+    fn lines(&self) -> usize {
+        self.even.len() / self.lattice.rows
+    }
+
+    /// c(k) and c(−k); on line 0 the second is 0, being another wave of the line.
+    fn pair(&self, line: usize, index: usize) -> [Complex64; 2] {
+        let n = line * self.lattice.rows + index;
+        let [even, odd] = [self.even[n], self.odd[n]].map(widen);
+        let mirrored = if line == 0 {
+            Complex64::ZERO
+        } else {
+            (even - odd).conj()
+        };
+        [even + odd, mirrored]
+    }
+
+    /// Adds the wave sign·k, with its phase moved from pixel `[0, 0]` to the origin.
+    fn push(&self, waves: &mut PlaneWaves, [line, index]: [usize; 2], sign: f64, c: Complex64) {
+        let (rows, columns) = (self.lattice.rows as i64, self.lattice.columns as i64);
+        let k = [sign * self.lattice.kx(line), sign * self.lattice.ky(index)];
+        // Whole turns are taken off in integers: the phase is right for any origin.
+        let by_column = (line as i64 * self.raster.origin_column.rem_euclid(columns)) % columns;
+        let by_row =
+            signed_index(index, self.lattice.rows) * self.raster.origin_row.rem_euclid(rows) % rows;
+        let turns = by_column as f64 / columns as f64 - by_row as f64 / rows as f64;
+        let omega = angular_frequency(k[0].hypot(k[1]), self.depth);
+        waves.push(k, omega, c * Complex64::cis(sign * TAU * turns));
+    }
+
+    /// The same sea with only its `count` strongest waves.
+    #[must_use]
+    pub fn strongest(&self, count: usize) -> Self {
+        let mut strengths: Vec<f64> = Vec::new();
+        for n in 0..self.even.len() {
+            let pair = self.pair(n / self.lattice.rows, n % self.lattice.rows);
+            strengths.extend(pair.map(|c| c.norm_sqr()));
+        }
+        if count >= strengths.len() {
+            return self.clone();
+        }
+        let (_, &mut threshold, _) = strengths.select_nth_unstable_by(count, |a, b| b.total_cmp(a));
+        self.masked(|c| c.norm_sqr() > threshold)
+    }
+
+    /// The same sea with only the waves whose amplitude is kept.
+    fn masked(&self, keep: impl Fn(Complex64) -> bool) -> Self {
+        let rows = self.lattice.rows;
+        let mut masked = self.clone();
+        for n in 0..self.even.len() {
+            let (line, index) = (n / rows, n % rows);
+            let of = |c: Complex64| if keep(c) { c } else { Complex64::ZERO };
+            let [c, mut mirrored] = self.pair(line, index);
+            if line == 0 {
+                [mirrored, _] = self.pair(line, (rows - index) % rows);
+            }
+            let (c, mirrored) = (of(c), of(mirrored).conj());
+            masked.even[n] = narrow(0.5 * (c + mirrored));
+            masked.odd[n] = narrow(0.5 * (c - mirrored));
+        }
+        masked
+    }
+
+    /// Fields of the sea on its raster, in the order asked for: two for one FFT.
+    ///
+    /// - `transfer` whose depth is that of the sea
+    /// - `tolerance` largest error relative to the root mean square of a field, down to 10⁻⁶; from 2·10⁻⁵ on
+    ///   in single precision
+    #[must_use]
+    pub fn fields(
+        &self,
+        transfer: &Transfer,
+        quantities: &[Quantity],
+        tolerance: f64,
+    ) -> Vec<Field> {
+        if tolerance >= SINGLE_PRECISION_TOLERANCE {
+            self.fields_in::<f32>(transfer, quantities)
+        } else {
+            self.fields_in::<f64>(transfer, quantities)
+        }
+    }
+
+    fn fields_in<T: Lane>(&self, transfer: &Transfer, quantities: &[Quantity]) -> Vec<Field> {
+        let mut fields = vec![Field::constant(&self.raster, 0.0); quantities.len()];
+        if self.is_flat() || self.raster.is_empty() {
+            return fields;
+        }
+        let plan = Synthesis::<T>::new(self.lattice.rows, self.lattice.columns);
+        let factors = Factors::new(&self.lattice, transfer);
+        let mut half = vec![Complex::new(T::zero(), T::zero()); plan.half_len()];
+        for (pair, quantities) in fields.chunks_mut(2).zip(quantities.chunks(2)) {
+            let mut unused = Vec::new();
+            let out = match pair {
+                [first, second] => (&mut first.values[..], &mut second.values[..]),
+                [first] => {
+                    unused.resize(first.values.len(), 0.0);
+                    (&mut first.values[..], &mut unused[..])
+                }
+                _ => continue,
+            };
+            plan.run_real(
+                &mut half,
+                [self.raster.rows, self.raster.columns],
+                out,
+                |line, one, two| {
+                    self.half_spectra(&factors, line, quantities, [one, two]);
+                },
+            );
+        }
+        fields
+    }
+
+    /// Writes line `line` of the half spectra of one or two quantities.
+    fn half_spectra<T: Lane>(
+        &self,
+        factors: &Factors<'_, T>,
+        line: usize,
+        quantities: &[Quantity],
+        out: [&mut [Complex<T>]; 2],
+    ) {
+        let rows = self.lattice.rows;
+        let parts = [&self.even, &self.odd].map(|part| &part[line * rows..(line + 1) * rows]);
+        let waves = factors.waves(line);
+        let [up, down] = self.lattice.disk(line);
+        for (n, out) in out.into_iter().enumerate() {
+            let Some(&quantity) = quantities.get(n) else {
+                out.fill(Complex::new(T::zero(), T::zero()));
+                continue;
+            };
+            out[up.end..down.start].fill(Complex::new(T::zero(), T::zero()));
+            for range in [up.clone(), down.clone()] {
+                let parts = parts.map(|part| &part[range.clone()]);
+                factors.fill(quantity, &waves, range.clone(), parts, &mut out[range]);
+            }
+        }
+    }
+}
+
+fn widen(c: Complex32) -> Complex64 {
+    Complex64::new(f64::from(c.re), f64::from(c.im))
+}
+
+fn narrow(c: Complex64) -> Complex32 {
+    Complex32::new(c.re as f32, c.im as f32)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,309 @@
+//! Cases at the edge of what a scene may be: a right answer, never NaN, a hang or garbage.
+
+use crate::{assert_sound, open_sea, run, small};
+use proptest::prelude::*;
+use wake_physics::scene::Term;
+use wake_physics::{Error, Scene, simulate};
+
+#[test]
+fn every_corner_of_a_scene_is_sound() {
+    let cases: [&[&str]; 34] = [
+        &["sea.wind_speed=0"],
+        &["sea.wind_speed=0", "radar.incidence=5"],
+        &["sea.wind_speed=0.5"],
+        &["sea.wind_speed=2.6"],
+        &["sea.wind_speed=2.8"],
+        &["sea.wind_speed=30"],
+        &["sea.wind_speed=3", "sea.fetch=1e7", "sea.spectrum=jonswap"],
+        &["sea.wind_speed=10", "sea.fetch=100"],
+        &["sea.spectrum=pierson-moskowitz", "sea.spreading=elfouhaily"],
+        &["sea.spreading=mitsuyasu", "sea.wind_toward=-1e9"],
+        &["sea.depth=1"],
+        &["sea.depth=1", "sea.wind_speed=20"],
+        &["sea.time=1e5"],
+        &["ship.speed=0"],
+        &["ship.speed=0.05"],
+        // Froude number 0.05 and 1.5 of a 20 m boat.
+        &[
+            "ship.length=20",
+            "ship.beam=4",
+            "ship.draft=1",
+            "ship.speed=0.7",
+        ],
+        &[
+            "ship.length=20",
+            "ship.beam=4",
+            "ship.draft=1",
+            "ship.speed=21",
+        ],
+        &["ship.speed=40", "sea.depth=5"],
+        &["ship.length=1", "ship.beam=0.2", "ship.draft=0.1"],
+        &[
+            "ship.length=500",
+            "ship.beam=100",
+            "ship.draft=40",
+            "ship.hull=full",
+        ],
+        &["ship.hull=full", "ship.block_coefficient=0.45"],
+        &["ship.hull=full", "ship.block_coefficient=0.9"],
+        &["ship.position=[1e6, 0]"],
+        &["ship.position=[-300, 400]", "ship.heading=1e7"],
+        &["ship.filter_depth=20"],
+        // Transverse waves of 5.1 m on pixels of 2.5 m.
+        &["ship.speed=2.83"],
+        &["radar.incidence=5"],
+        &["radar.incidence=75", "radar.polarization=HH"],
+        &["radar.range_to_velocity=0"],
+        &["radar.range_to_velocity=150"],
+        &["radar.frequency=1e9", "grid.spacing=100"],
+        &[
+            "radar.frequency=2e10",
+            "grid.spacing=0.1",
+            "radar.resolution=0.5",
+        ],
+        &["radar.relaxation_rate=0.01", "radar.looks=1"],
+        &["model.tolerance=1e-6", "ship.echo=true", "radar.looks=1000"],
+    ];
+    for case in cases {
+        for terms in ["needed", "all"] {
+            let scene = small(40, 36, case)
+                .with_assignments(&[format!("model.terms={terms}")])
+                .unwrap();
+            assert_sound(&run(&scene), &format!("{case:?} {terms}"));
+        }
+    }
+}
+
+#[test]
+fn every_shape_of_a_grid_is_sound() {
+    for (rows, columns) in [(1, 1), (1, 97), (97, 1), (2, 3), (31, 64), (127, 101)] {
+        let simulation = run(&small(rows, columns, &[]));
+        assert_sound(&simulation, &format!("{rows} x {columns}"));
+    }
+}
+
+/// Still air: the sea is flat; without a ship nothing moves and nothing scatters but a mirror.
+#[test]
+fn no_wind_is_a_flat_sea() {
+    let simulation = run(&open_sea(small(32, 32, &["sea.wind_speed=0"])));
+    assert!(simulation.elevation.values.iter().all(|&v| v == 0.0));
+    assert!(
+        simulation
+            .intensity
+            .values
+            .iter()
+            .all(|&v| v == simulation.intensity.values[0])
+    );
+    assert!(!simulation.plan.uses(Term::Sea));
+    assert!(!simulation.plan.notes.is_empty(), "the report says why");
+    // With a ship its wake is there, on a flat sea.
+    let wake = run(&small(32, 32, &["sea.wind_speed=0"]));
+    assert!(wake.elevation.rms() > 0.01);
+}
+
+/// A ship that is far away leaves no wake here, nor does anything lie ahead of the bow.
+#[test]
+fn ahead_of_the_ship_there_is_no_wake() {
+    for position in ["[1e6, 0]", "[-400, 0]"] {
+        let assignments = [
+            "sea.wind_speed=0".to_owned(),
+            format!("ship.position={position}"),
+            format!("ship.heading={}", 90),
+        ];
+        let refs: Vec<&str> = assignments.iter().map(String::as_str).collect();
+        let simulation = run(&small(48, 48, &refs));
+        let rms = simulation.elevation.rms();
+        if position.starts_with("[-") {
+            assert_eq!(rms, 0.0, "the image lies ahead of the bow");
+        } else {
+            assert!(rms.is_finite());
+        }
+        assert_sound(&simulation, position);
+    }
+}
+
+#[test]
+fn the_same_scene_twice_is_the_same_image() {
+    let scene = small(50, 70, &["ship.echo=true"]);
+    let (a, b) = (run(&scene), run(&scene));
+    for ((name, x), (_, y)) in a.named_fields().into_iter().zip(b.named_fields()) {
+        assert_eq!(x, y, "{name}");
+    }
+    let other = run(&scene.with_assignments(&["seed=8"]).unwrap());
+    assert_ne!(other.speckled, a.speckled);
+}
+
+/// One thread, two threads: the same bits.
+#[test]
+fn threads_change_nothing() {
+    let scene = small(60, 52, &[]);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| run(&scene))
+    };
+    let (one, two) = (on(1), on(3));
+    for ((name, x), (_, y)) in one.named_fields().into_iter().zip(two.named_fields()) {
+        assert_eq!(x, y, "{name}");
+    }
+}
+
+#[test]
+fn a_grid_too_large_for_memory_is_refused_with_what_it_needs() {
+    let scene = small(16384, 16384, &["sea.wind_speed=30"]);
+    match simulate(&scene) {
+        Err(Error::TooLarge { needed_gib, .. }) => assert!(needed_gib > 30.0),
+        // Only where the machine really has that much, or does not tell.
+        other => assert!(other.is_ok(), "{other:?}"),
+    }
+}
+
+fn scenes() -> impl Strategy<Value = Scene> {
+    let sea = (
+        0.0..=30.0f64,
+        -720.0..720.0f64,
+        2.0..7.0f64,
+        0..3usize,
+        0..3usize,
+        0.0..4.0f64,
+    );
+    let ship = (
+        1.0..400.0f64,
+        0.05..0.3f64,
+        0.03..0.1f64,
+        0.0..25.0f64,
+        -400.0..400.0f64,
+    );
+    let radar = (
+        9.0..10.3f64,
+        5.0..75.0f64,
+        0.0..200.0f64,
+        0.5..100.0f64,
+        1..100u32,
+    );
+    let grid = (
+        1..40usize,
+        1..40usize,
+        -1.0..2.0f64,
+        any::<u64>(),
+        1.0..6.0f64,
+    );
+    let shape = (
+        any::<[bool; 4]>(),
+        -600.0..600.0f64,
+        -600.0..600.0f64,
+        0.0..1e5f64,
+    );
+    (sea, ship, radar, grid, shape).prop_map(|(sea, ship, radar, grid, shape)| {
+        let mut s = Scene::default();
+        s.seed = grid.3;
+        (s.grid.rows, s.grid.columns, s.grid.spacing) = (grid.0, grid.1, 10f64.powf(grid.2));
+        (s.sea.wind_speed, s.sea.wind_toward) = (sea.0, sea.1);
+        s.sea.fetch = 10f64.powf(sea.2);
+        use wake_physics::scene::{HullForm, Polarization, SpectrumModel, SpreadingModel};
+        s.sea.spectrum = [
+            SpectrumModel::Elfouhaily,
+            SpectrumModel::Jonswap,
+            SpectrumModel::PiersonMoskowitz,
+        ][sea.3];
+        s.sea.spreading = [
+            SpreadingModel::Hasselmann,
+            SpreadingModel::Mitsuyasu,
+            SpreadingModel::Elfouhaily,
+        ][sea.4];
+        s.sea.depth = if shape.0[3] {
+            f64::INFINITY
+        } else {
+            10f64.powf(sea.5)
+        };
+        s.sea.time = shape.3;
+        let vessel = s.ship.as_mut().unwrap();
+        vessel.length = ship.0;
+        vessel.beam = (ship.0 * ship.1).clamp(0.2, 100.0).min(0.9 * ship.0);
+        vessel.draft = (ship.0 * ship.2).clamp(0.1, 40.0).min(0.9 * ship.0);
+        (vessel.speed, vessel.heading) = (ship.3, ship.4);
+        vessel.position = [shape.1, shape.2];
+        vessel.hull = if shape.0[0] {
+            HullForm::Full
+        } else {
+            HullForm::Wigley
+        };
+        vessel.echo = shape.0[1];
+        s.radar.frequency = 10f64.powf(radar.0);
+        s.radar.polarization = if shape.0[2] {
+            Polarization::HH
+        } else {
+            Polarization::VV
+        };
+        s.radar.incidence = radar.1;
+        s.radar.range_to_velocity = radar.2;
+        s.radar.resolution = radar.3;
+        s.radar.looks = radar.4;
+        s.model.tolerance = 10f64.powf(-grid.4);
+        s
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, max_shrink_iters: 10, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_scenes_are_sound_and_reproducible(scene in scenes()) {
+        let a = run(&scene);
+        assert_sound(&a, "random scene");
+        let b = run(&scene);
+        prop_assert_eq!(&a.speckled, &b.speckled);
+        prop_assert!(a.plan.bound() <= 0.5 * scene.model.tolerance);
+    }
+}
+
+/// Mean square elevation over seeds against the integral of the spectrum over the resolved band.
+///
+/// The mean of N seas of M independent patches has the relative spread √(2/(N·M)); here N = 24 and M is at least
+/// 4 (patches a peak wavelength wide): 0.15 as one standard deviation, four allowed.
+#[test]
+fn the_variance_is_what_the_spectrum_says() {
+    use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
+    for (wind, spacing, spectrum) in [
+        (3.0, 1.0, "elfouhaily"),
+        (7.0, 2.5, "jonswap"),
+        (12.0, 5.0, "elfouhaily"),
+    ] {
+        let mut sum = 0.0;
+        let count = 24;
+        let mut expected = 0.0;
+        for seed in 0..count {
+            let scene = open_sea(small(
+                96,
+                96,
+                &[
+                    &format!("sea.wind_speed={wind}"),
+                    &format!("grid.spacing={spacing}"),
+                    &format!("sea.spectrum={spectrum}"),
+                    &format!("seed={seed}"),
+                ],
+            ));
+            let simulation = run(&scene);
+            sum += simulation.elevation.rms().powi(2);
+            let sea = WindSea {
+                wind_speed: wind,
+                wind_toward: scene.sea.wind_toward.to_radians(),
+                fetch: scene.sea.fetch,
+                depth: scene.sea.depth,
+                spectrum: scene.sea.spectrum,
+                spreading: scene.sea.spreading,
+            };
+            let band = simulation.raster.nyquist_wavenumber();
+            expected = DirectionalSpectrum::new(&sea)
+                .moments(0.0, band, 0.5)
+                .elevation;
+        }
+        let mean = sum / f64::from(count);
+        assert!(
+            (mean / expected - 1.0).abs() < 0.6,
+            "{wind} m/s: {mean} {expected}"
+        );
+    }
+}

@@ -1,0 +1,57 @@
+//! Whole scenes: hard cases, fast against direct, the plan's bounds, and trends that radar images show.
+
+mod hard_cases;
+mod methods;
+mod plan_bounds;
+mod trends;
+
+use wake_physics::{Scene, Simulation, simulate};
+
+/// The default scene on a small grid, with assignments.
+fn small(rows: usize, columns: usize, assignments: &[&str]) -> Scene {
+    let mut scene = Scene::default();
+    (scene.grid.rows, scene.grid.columns) = (rows, columns);
+    scene.with_assignments(assignments).expect("a valid scene")
+}
+
+fn open_sea(mut scene: Scene) -> Scene {
+    scene.ship = None;
+    scene
+}
+
+fn run(scene: &Scene) -> Simulation {
+    simulate(scene).expect("a valid scene is simulated")
+}
+
+/// Every field finite, everything that is a power at least 0.
+fn assert_sound(simulation: &Simulation, what: &str) {
+    for (name, field) in simulation.named_fields() {
+        assert_eq!(
+            (field.rows, field.columns),
+            (simulation.raster.rows, simulation.raster.columns),
+            "{what}: {name}"
+        );
+        assert!(
+            field.values.iter().all(|v| v.is_finite()),
+            "{what}: {name} is not finite"
+        );
+    }
+    for field in [
+        &simulation.sigma0,
+        &simulation.intensity,
+        &simulation.speckled,
+    ] {
+        assert!(
+            field.values.iter().all(|&v| v >= 0.0),
+            "{what}: a negative power"
+        );
+    }
+    let plan = &simulation.plan;
+    assert_eq!(plan.terms.len(), 10, "{what}");
+    assert!(
+        plan.terms
+            .iter()
+            .all(|t| t.bound.is_finite() && t.bound >= 0.0),
+        "{what}: {plan}"
+    );
+}

@@ -1,0 +1,62 @@
+//! The fast methods against the oracles, whole scenes, at the tolerance asked for.
+
+use crate::small;
+use wake_physics::{Method, simulate_with};
+
+/// Every field and the image, at several tolerances, on a small grid with ship, sea and all terms.
+#[test]
+fn the_tolerance_is_met_at_every_level() {
+    for (tolerance, assignments) in [
+        (1e-1, &["ship.position=[30, 30]"][..]),
+        (
+            1e-2,
+            &["ship.position=[30, 30]", "radar.range_to_velocity=30"],
+        ),
+        (1e-3, &["ship.position=[30, 30]", "sea.wind_toward=20"]),
+        (
+            1e-3,
+            &[
+                "ship.position=[60, 0]",
+                "ship.heading=90",
+                "radar.incidence=20",
+            ],
+        ),
+        (
+            1e-4,
+            &[
+                "ship.position=[30, 30]",
+                "radar.range_to_velocity=40",
+                "radar.polarization=HH",
+            ],
+        ),
+        (
+            1e-5,
+            &["ship.position=[30, 30]", "radar.range_to_velocity=20"],
+        ),
+    ] {
+        let mut scene = small(28, 24, assignments);
+        scene.model.tolerance = tolerance;
+        let fast = simulate_with(&scene, Method::Fast).unwrap();
+        let direct = simulate_with(&scene, Method::Direct).unwrap();
+        assert_eq!(fast.plan.terms, direct.plan.terms);
+        for ((name, a), (_, b)) in fast.named_fields().into_iter().zip(direct.named_fields()) {
+            let (max, rms) = a.difference(b);
+            match name {
+                "speckled" => {}
+                "intensity" | "sigma0" => {
+                    assert!(
+                        rms <= tolerance * b.mean(),
+                        "{tolerance} {name}: {rms} of {}",
+                        b.mean()
+                    );
+                }
+                // A field's own rounding to f32 is part of the tolerance: 6e-8 of its largest value.
+                _ => assert!(
+                    max <= tolerance * b.rms(),
+                    "{tolerance} {name}: {max} of {}",
+                    b.rms()
+                ),
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! One measured row, and how it is timed.
+
+use serde::Serialize;
+use std::time::Instant;
+
+/// One fast method against its oracle.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// Stage of the data flow.
+    pub stage: &'static str,
+    /// Pixels along each side.
+    pub size: usize,
+    /// Tolerance asked for.
+    pub tolerance: f64,
+    /// Seconds of the fast method: the median of several runs.
+    pub fast_seconds: f64,
+    /// Seconds of the oracle.
+    pub oracle_seconds: f64,
+    /// Whether the oracle ran on some pixels only and its time was scaled up.
+    pub extrapolated: bool,
+    /// Seconds of the same sum as a matrix product, where there is one; scaled up from some rows above 256².
+    pub matrix_product_seconds: Option<f64>,
+    /// Oracle over fast seconds.
+    pub ratio: f64,
+    /// Largest error, relative to the root mean square (fields) or the mean (σ⁰, image); over all quantities.
+    pub max_error: f64,
+    /// Root mean square error, likewise.
+    pub rms_error: f64,
+}
+
+/// Median seconds of `runs` calls after one that is not counted, and the last result.
+pub fn median_seconds<T>(runs: usize, mut call: impl FnMut() -> T) -> (f64, T) {
+    let mut result = call();
+    let mut seconds: Vec<f64> = (0..runs)
+        .map(|_| {
+            let start = Instant::now();
+            result = call();
+            start.elapsed().as_secs_f64()
+        })
+        .collect();
+    seconds.sort_by(f64::total_cmp);
+    (seconds[runs / 2], result)
+}
+
+/// Seconds of one call, and its result.
+pub fn seconds<T>(call: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let result = call();
+    (start.elapsed().as_secs_f64(), result)
+}
+
+/// Largest and root-mean-square error of some values against exact ones.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Errors {
+    pub max: f64,
+    pub rms: f64,
+}
+
+impl Errors {
+    /// Errors relative to `scale`.
+    pub fn of(fast: impl Iterator<Item = f64>, exact: &[f64], scale: f64) -> Self {
+        let (mut max, mut sum) = (0.0f64, 0.0);
+        for (a, b) in fast.zip(exact) {
+            max = max.max((a - b).abs());
+            sum += (a - b).powi(2);
+        }
+        let rms = (sum / exact.len().max(1) as f64).sqrt();
+        let scale = if scale > 0.0 { scale } else { 1.0 };
+        Self {
+            max: max / scale,
+            rms: rms / scale,
+        }
+    }
+
+    /// The larger of each.
+    pub fn worst(self, other: Self) -> Self {
+        Self {
+            max: self.max.max(other.max),
+            rms: self.rms.max(other.rms),
+        }
+    }
+}
