@@ -6,9 +6,13 @@
 #![allow(clippy::unwrap_used, reason = "in tests, a panic is the report")]
 
 mod golden;
+#[cfg(feature = "train")]
+mod gradients;
 mod hard_cases;
 mod models;
 mod pipeline;
+mod precision;
 mod published;
 mod requests;
 mod schedulers;
+mod units;

@@ -2,8 +2,9 @@
 
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
-use burn::tensor::activation::gelu;
 use burn::tensor::{Device, Tensor};
+
+use super::activation::gelu;
 
 /// Widens every token to four times its channels, gates, and narrows again.
 ///

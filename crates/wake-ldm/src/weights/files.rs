@@ -9,6 +9,7 @@ use safetensors::SafeTensors;
 use safetensors::tensor::TensorView;
 use serde_json::Value;
 
+use super::header;
 use super::names::modern;
 use super::read_text;
 use crate::error::{Error, Result};
@@ -81,6 +82,7 @@ impl MappedFiles {
                 path: path.clone(),
                 reason,
             };
+            header::refuse_duplicates(bytes).map_err(invalid)?;
             let file =
                 SafeTensors::deserialize(bytes).map_err(|error| invalid(error.to_string()))?;
             for (name, view) in file.tensors() {

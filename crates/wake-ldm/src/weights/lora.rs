@@ -69,7 +69,7 @@ impl Factors<'_> {
 ///
 /// # References
 ///
-/// Hu et al. (2022), "LoRA: Low-Rank Adaptation of Large Language Models", Eq. 3.
+/// Hu et al. (2022), "Low-Rank Adaptation of Large Language Models", Eq. 3.
 pub fn merge_lora<M: Module>(
     model: M,
     layout: Layout,

@@ -1,14 +1,18 @@
 //! Weights in the files of diffusers and transformers: reading, checking by name, writing.
 
+mod atomic;
 mod files;
+mod header;
 mod lora;
 mod names;
+mod precision;
+mod save;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{DType, Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData};
 use half::{bf16, f16};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
@@ -22,6 +26,8 @@ use names::Path as ModulePath;
 
 pub use lora::merge_lora;
 pub use names::Layout;
+pub use precision::Precision;
+pub use save::{save_as, save_folder};
 
 /// No configuration file is longer than this.
 const LONGEST_TEXT: u64 = 16 << 20;
@@ -80,18 +86,33 @@ pub fn load_autoencoder(
     ))
 }
 
-/// Reads weights into a model, as f32: all of them, or none.
+/// Reads weights into a model, as f32; see [`load_as`].
+///
+/// # Errors
+///
+/// As [`load_as`].
+pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
+    load_as(model, layout, path, Precision::F32)
+}
+
+/// Reads weights into a model: all of them, or none.
 ///
 /// `path` is a safetensors file, or a folder that holds one, in one piece or in shards with an index.
-/// Files are mapped, and tensors converted one by one. f16 and bf16 are widened. The attention names of
+/// Files are mapped, and tensors converted to `precision` one by one, whatever the file holds. The attention names of
 /// early autoencoders (`query`, `key`, `value`, `proj_attn`) and the buffer `position_ids` are known.
 ///
 /// # Errors
 ///
 /// [`Error::MissingFile`], [`Error::Io`] and [`Error::InvalidSafetensors`] for files that are not there
 /// or not to be trusted; [`Error::WeightsMismatch`] with every tensor that is missing, unexpected or of
-/// another shape.
-pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
+/// another shape; [`Error::UnsupportedPrecision`] where the device cannot compute with it.
+pub fn load_as<M: Module>(
+    model: M,
+    layout: Layout,
+    path: &Path,
+    precision: Precision,
+) -> Result<M> {
+    precision.check(&model.devices())?;
     let files = MappedFiles::open(path)?;
     let stored = files.tensors()?;
     let expected = shapes(&model, layout);
@@ -105,6 +126,7 @@ pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
     Ok(model.map(&mut Loader {
         path: ModulePath::default(),
         layout,
+        precision,
         stored: &stored,
     }))
 }
@@ -118,30 +140,13 @@ pub(crate) fn has_prefix(path: &Path, prefix: &str) -> Result<bool> {
         .any(|name| name.split('.').next() == Some(prefix)))
 }
 
-/// Writes a model's weights as f32 into one safetensors file that diffusers or transformers read.
+/// Writes a model's weights as f32; see [`save_as`].
 ///
 /// # Errors
 ///
-/// [`Error::Io`] when the file cannot be written.
+/// As [`save_as`].
 pub fn save<M: Module>(model: &M, layout: Layout, path: &Path) -> Result<()> {
-    let mut saver = Saver {
-        path: ModulePath::default(),
-        layout,
-        tensors: BTreeMap::new(),
-    };
-    model.visit(&mut saver);
-    let failed = |error| Error::Io {
-        action: "write",
-        path: path.to_owned(),
-        source: std::io::Error::other(error),
-    };
-    let mut views = Vec::with_capacity(saver.tensors.len());
-    for (name, (shape, bytes)) in &saver.tensors {
-        let view = TensorView::new(Dtype::F32, shape.clone(), bytes);
-        views.push((name, view.map_err(|error| failed(error.to_string()))?));
-    }
-    let info = Some([("format".to_owned(), "pt".to_owned())].into());
-    safetensors::serialize_to_file(views, info, path).map_err(|error| failed(error.to_string()))
+    save_as(model, layout, path, Precision::F32)
 }
 
 /// Names and shapes that a model has in a file, without making its weights.
@@ -215,6 +220,7 @@ impl ModuleVisitor for Lister {
 struct Loader<'a> {
     path: ModulePath,
     layout: Layout,
+    precision: Precision,
     stored: &'a BTreeMap<String, Stored<'a>>,
 }
 
@@ -234,7 +240,7 @@ impl ModuleMapper for Loader<'_> {
         let device = param.lazy_device();
         let shape = tensor.view.shape()[..D].to_vec();
         let data = TensorData::new(widened(&tensor.view), shape);
-        let mut value = Tensor::from_data(data, (&device, DType::F32));
+        let mut value = Tensor::from_data(data, (&device, self.precision.dtype()));
         if self.path.is_transposed(D) {
             value = value.swap_dims(0, 1);
         }
@@ -257,35 +263,4 @@ fn widened(view: &TensorView<'_>) -> Vec<f32> {
 fn numbers<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f32) -> Vec<f32> {
     let (chunks, _) = bytes.as_chunks::<N>();
     chunks.iter().map(|chunk| number(*chunk)).collect()
-}
-
-struct Saver {
-    path: ModulePath,
-    layout: Layout,
-    tensors: BTreeMap<String, (Vec<usize>, Vec<u8>)>,
-}
-
-impl ModuleVisitor for Saver {
-    fn enter_module(&mut self, name: &str, container: &str) {
-        self.path.enter(name, container);
-    }
-
-    fn exit_module(&mut self, _name: &str, _container: &str) {
-        self.path.exit();
-    }
-
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let mut value = param.val();
-        if self.path.is_transposed(D) {
-            value = value.swap_dims(0, 1);
-        }
-        let shape = value.dims().to_vec();
-        let bytes = value
-            .into_data()
-            .iter::<f32>()
-            .flat_map(f32::to_le_bytes)
-            .collect();
-        self.tensors
-            .insert(self.path.file_name(self.layout), (shape, bytes));
-    }
 }

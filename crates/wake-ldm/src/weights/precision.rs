@@ -1,0 +1,51 @@
+//! The kinds of number that weights are held or stored in.
+
+use burn::tensor::{DType, Device};
+
+use crate::error::{Error, Result};
+
+/// A kind of floating-point number.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// 32 bits; the default.
+    #[default]
+    F32,
+    /// 16 bits, 10 of them for the fraction; the largest number is 65,504.
+    F16,
+    /// 16 bits, 7 of them for the fraction; the range of f32.
+    BF16,
+}
+
+impl Precision {
+    /// burn's name for it.
+    pub fn dtype(self) -> DType {
+        match self {
+            Self::F32 => DType::F32,
+            Self::F16 => DType::F16,
+            Self::BF16 => DType::BF16,
+        }
+    }
+
+    /// Its name in a safetensors header.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "F32",
+            Self::F16 => "F16",
+            Self::BF16 => "BF16",
+        }
+    }
+
+    /// An error unless all devices compute with it.
+    pub(super) fn check(self, devices: &[Device]) -> Result<()> {
+        match devices
+            .iter()
+            .find(|device| !device.supports_dtype(self.dtype()))
+        {
+            None => Ok(()),
+            Some(device) => Err(Error::UnsupportedPrecision {
+                device: format!("{device:?}"),
+                precision: self.name(),
+            }),
+        }
+    }
+}
