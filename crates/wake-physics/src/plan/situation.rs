@@ -166,17 +166,19 @@ fn sampled_wake(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
         .map(|c| -0.5 * length - c[0])
         .fold(f64::INFINITY, f64::min);
     let nodes = wake.waves(&wake.plan(image, COARSE));
-    let area = image.len() as f64 * image.spacing.powi(2);
-    let diagonal = (area
-        * (image.rows as f64 / image.columns as f64
-            + image.columns as f64 / image.rows as f64
-            + 2.0))
-        .sqrt();
-    let track_length = farthest.min(diagonal).min(farthest - nearest.min(0.0));
+    if nodes.is_empty() || farthest <= 0.0 {
+        return (Vec::new(), 1.0);
+    }
+    let [height, across] = [image.rows, image.columns].map(|n| n as f64 * image.spacing);
+    let track_length = farthest
+        .min(height.hypot(across))
+        .min(farthest - nearest.min(0.0));
+    // The wedge is 0.71 of the distance wide, counted from half a length astern of midship: the energy across the
+    // track stands on this width, also where the image is narrower.
+    let wedge = track_length * 0.71 * (0.5 * length).max(nearest);
+    let area = (height * across).max(wedge);
     let waves = sample::wake(&nodes, wake.track.forward, track_length, area);
-    // The wedge is 0.71 of the distance wide: a length astern of midship the same energy stands on this width.
-    let width = 0.71 * length.max(nearest);
-    (waves, (area / (track_length * width)).max(1.0))
+    (waves, area / wedge)
 }
 
 fn slopes(waves: &[WaveSample]) -> SlopeCovariance {

@@ -60,6 +60,7 @@ fn every_corner_of_a_scene_is_sound() {
             "radar.frequency=2e10",
             "grid.spacing=0.1",
             "radar.resolution=0.5",
+            "radar.range_to_velocity=2",
         ],
         &["radar.relaxation_rate=0.01", "radar.looks=1"],
         &["model.tolerance=1e-6", "ship.echo=true", "radar.looks=1000"],
