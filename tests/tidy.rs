@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Longest source file [lines], its tests and comments not counted.
+/// Longest source file [lines of code]: tests, comments and blank lines are not counted.
 const LONGEST_FILE: usize = 300;
 
 fn root() -> PathBuf {
@@ -157,7 +157,10 @@ fn files_stay_small() {
     let mut files = Vec::new();
     sources(&root().join("crates"), &mut files);
     for path in files.iter().filter(|p| p.iter().any(|part| part == "src")) {
-        let lines = code(path).lines().count();
+        let lines = code(path)
+            .lines()
+            .filter(|line| !line.trim().is_empty())
+            .count();
         if lines > LONGEST_FILE {
             wrong.push(format!("{}: {lines} lines", path.display()));
         }
