@@ -68,7 +68,7 @@ fn attention_is_finite_for_huge_logits() {
     for (backend, device) in devices() {
         // Short and long enough for both of flex's algorithms.
         for tokens in [16, 600] {
-            let sign = |i: usize| if i % 2 == 0 { 1.0_f32 } else { -1.0 };
+            let sign = |i: usize| if i.is_multiple_of(2) { 1.0_f32 } else { -1.0 };
             let query: Vec<f32> = (0..tokens * 4).map(|i| 100.0 * sign(i / 4)).collect();
             // Key 0 points one way and key 1 the other; the rest are at right angles to both.
             let key: Vec<f32> = (0..tokens * 4)
