@@ -9,7 +9,7 @@ use crate::constants::{GRAVITY, KINEMATIC_SURFACE_TENSION};
 /// ```
 ///
 /// - `wavenumber` k [rad/m], at least 0
-/// - `depth` h [m], above 0, may be infinite
+/// - `depth` h \[m\], above 0, may be infinite
 /// - returns ω [rad/s]; 0 at k = 0
 ///
 /// # References

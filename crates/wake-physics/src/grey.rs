@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GreyScale {
-    /// σ⁰ of grey 0 [dB].
+    /// σ⁰ of grey 0 \[dB\].
     pub darkest_db: f64,
-    /// σ⁰ of grey 1 [dB], above `darkest_db`.
+    /// σ⁰ of grey 1 \[dB\], above `darkest_db`.
     pub brightest_db: f64,
 }
 
@@ -31,14 +31,14 @@ impl Default for GreyScale {
 }
 
 impl GreyScale {
-    /// Grey 0…1 of σ⁰ [1]; σ⁰ = 0 is black.
+    /// Grey 0…1 of σ⁰ \[1\]; σ⁰ = 0 is black.
     #[must_use]
     pub fn grey(&self, sigma0: f64) -> f64 {
         let db = 10.0 * sigma0.max(0.0).log10();
         ((db - self.darkest_db) / (self.brightest_db - self.darkest_db)).clamp(0.0, 1.0)
     }
 
-    /// σ⁰ [1] of grey: the inverse of [`Self::grey`] between its ends, and its continuation beyond them.
+    /// σ⁰ \[1\] of grey: the inverse of [`Self::grey`] between its ends, and its continuation beyond them.
     #[must_use]
     pub fn sigma0(&self, grey: f64) -> f64 {
         let db = self.darkest_db + grey * (self.brightest_db - self.darkest_db);
@@ -51,7 +51,7 @@ impl GreyScale {
         (255.0 * self.grey(sigma0)).round() as u8
     }
 
-    /// σ⁰ [1] of a level of 8 bits.
+    /// σ⁰ \[1\] of a level of 8 bits.
     #[must_use]
     pub fn sigma0_of_level(&self, level: u8) -> f64 {
         self.sigma0(f64::from(level) / 255.0)

@@ -33,7 +33,7 @@ impl Hull {
     /// f = (B/2) (1 − (2x/L)²) (1 − (z/T)²)
     /// ```
     ///
-    /// - `length` L, `beam` B, `draft` T [m], all above 0
+    /// - `length` L, `beam` B, `draft` T \[m\], all above 0
     #[must_use]
     pub fn wigley(length: f64, beam: f64, draft: f64) -> Self {
         Self {
@@ -79,19 +79,19 @@ impl Hull {
         }
     }
 
-    /// Length at the waterline L [m].
+    /// Length at the waterline L \[m\].
     #[must_use]
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// Beam B [m].
+    /// Beam B \[m\].
     #[must_use]
     pub fn beam(&self) -> f64 {
         self.beam
     }
 
-    /// Draft T [m].
+    /// Draft T \[m\].
     #[must_use]
     pub fn draft(&self) -> f64 {
         self.draft
@@ -103,14 +103,14 @@ impl Hull {
         speed / (crate::constants::GRAVITY * self.length).sqrt()
     }
 
-    /// Half-breadth f [m] at `x` [m] forward of midship and depth `z` [m]; 0 off the hull.
+    /// Half-breadth f \[m\] at `x` \[m\] forward of midship and depth `z` \[m\]; 0 off the hull.
     #[must_use]
     pub fn half_breadth(&self, x: f64, z: f64) -> f64 {
         let along = profile(2.0 * x.abs() / self.length, self.parallel).0;
         0.5 * self.beam * along * profile(z / self.draft, self.flat).0
     }
 
-    /// Slopes (∂f/∂x, ∂f/∂z) of the half-breadth [1]; 0 off the hull.
+    /// Slopes (∂f/∂x, ∂f/∂z) of the half-breadth \[1\]; 0 off the hull.
     #[must_use]
     pub fn slopes(&self, x: f64, z: f64) -> [f64; 2] {
         let (along, along_slope) = profile(2.0 * x.abs() / self.length, self.parallel);
@@ -121,19 +121,19 @@ impl Hull {
         ]
     }
 
-    /// Block coefficient ∇/(L B T) [1].
+    /// Block coefficient ∇/(L B T) \[1\].
     #[must_use]
     pub fn block_coefficient(&self) -> f64 {
         (2.0 + self.parallel) * (2.0 + self.flat) / 9.0
     }
 
-    /// Displaced volume ∇ [m³].
+    /// Displaced volume ∇ \[m³\].
     #[must_use]
     pub fn volume(&self) -> f64 {
         self.block_coefficient() * self.length * self.beam * self.draft
     }
 
-    /// Wetted surface S [m²], both sides.
+    /// Wetted surface S \[m²\], both sides.
     ///
     /// ```text
     /// S = 2 ∬ √(1 + f_x² + f_z²) dx dz
@@ -181,8 +181,8 @@ impl Hull {
     ///
     /// - `along` α, wavenumber along the track [rad/m]
     /// - `wavenumber` k [rad/m], at least 0
-    /// - `depth` h [m], may be infinite; a draft beyond it is cut off at the bottom
-    /// - returns F [m²]
+    /// - `depth` h \[m\], may be infinite; a draft beyond it is cut off at the bottom
+    /// - returns F \[m²\]
     ///
     /// # References
     ///
@@ -194,7 +194,7 @@ impl Hull {
         Complex64::new(0.0, amplitude)
     }
 
-    /// ∫ (d/dx) g(x/h) sin(αx) dx [1].
+    /// ∫ (d/dx) g(x/h) sin(αx) dx \[1\].
     ///
     /// ```text
     /// −4 Im[e^{iαmh} M(αe)],    e = (1 − m)h,   M(q) = ∫₀¹ t e^{iqt} dt
@@ -206,7 +206,7 @@ impl Hull {
         -4.0 * (turned * first_moment(along * entrance)).im
     }
 
-    /// ∫ v(z/T) V(z) dz [m].
+    /// ∫ v(z/T) V(z) dz \[m\].
     fn vertical(&self, k: f64, depth: f64) -> f64 {
         let draft = self.draft.min(depth);
         let (side, bilge) = (self.flat * draft, (1.0 - self.flat) * draft);

@@ -10,7 +10,7 @@ use crate::sar::geometry::direction;
 use clip::{Polygon, Rectangle};
 use serde::{Deserialize, Serialize};
 
-/// Half-angle of the Kelvin wake in deep water, asin(1/3) [rad]: 19.47°.
+/// Half-angle of the Kelvin wake in deep water, asin(1/3) \[rad\]: 19.47°.
 pub const KELVIN_HALF_ANGLE: f64 = 0.339_836_909_454_121_9;
 
 /// A place in the image, (column, row), with fractions.
@@ -51,17 +51,17 @@ impl Class {
 /// A ship under way, as labels see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Track {
-    /// Midship (x, y) at the time of the image [m].
+    /// Midship (x, y) at the time of the image \[m\].
     pub position: [f64; 2],
     /// Where it moves to [deg clockwise from azimuth].
     pub heading: f64,
     /// Speed [m/s].
     pub speed: f64,
-    /// Length [m].
+    /// Length \[m\].
     pub length: f64,
-    /// Beam [m].
+    /// Beam \[m\].
     pub beam: f64,
-    /// Azimuth displacement of its echo [m], see [`crate::sar::geometry::azimuth_displacement`].
+    /// Azimuth displacement of its echo \[m\], see [`crate::sar::geometry::azimuth_displacement`].
     pub azimuth_displacement: f64,
 }
 
@@ -81,7 +81,7 @@ pub struct Labels {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShipLabel {
-    /// Midship (x, y) [m], also outside the image.
+    /// Midship (x, y) \[m\], also outside the image.
     #[serde(with = "empty_list")]
     pub position_m: Option<[f64; 2]>,
     /// Midship, if in the image.
@@ -97,7 +97,7 @@ pub struct ShipLabel {
     pub heading: Option<f64>,
     /// Speed [m/s].
     pub speed: Option<f64>,
-    /// Azimuth of the echo less that of the ship [m].
+    /// Azimuth of the echo less that of the ship \[m\].
     pub azimuth_displacement_m: Option<f64>,
 }
 
@@ -163,7 +163,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The point `ahead` and `starboard` of another [m].
+    /// The point `ahead` and `starboard` of another \[m\].
     fn offset(&self, from: [f64; 2], ahead: f64, starboard: f64) -> [f64; 2] {
         [0, 1].map(|a| from[a] + ahead * self.ahead[a] + starboard * self.starboard[a])
     }

@@ -13,7 +13,7 @@ const CONDUCTIVITY_SCALE: f64 = 17.97510;
 /// ε = (ε0 − ε1)/(1 − i f/ν1) + (ε1 − ε2)/(1 − i f/ν2) + ε2 + i σ·17.97510/f      (f, ν in GHz)
 /// ```
 ///
-/// - `frequency` [Hz], `temperature` T [°C], `salinity` S [psu]
+/// - `frequency` \[Hz\], `temperature` T [°C], `salinity` S \[psu\]
 ///
 /// # Validity
 ///
@@ -34,7 +34,7 @@ pub fn sea_water(frequency: f64, temperature: f64, salinity: f64) -> Complex64 {
     relaxation(e0 - e1, f1) + relaxation(e1 - e2, f2) + Complex64::new(e2, loss)
 }
 
-/// The two relaxations: permittivities before, between and after them, and their frequencies [GHz].
+/// The two relaxations: permittivities before, between and after them, and their frequencies \[GHz\].
 struct DoubleDebye {
     levels: [f64; 3],
     relaxation: [f64; 2],
@@ -81,7 +81,7 @@ fn salt_shift(t: f64) -> f64 {
     2.3232e-3 + t * (-7.9208e-5 + t * (3.6764e-6 + t * (-3.5594e-7 + t * 8.9795e-9)))
 }
 
-/// Electrical conductivity σ of sea water [S/m] at T [°C] and S [psu].
+/// Electrical conductivity σ of sea water [S/m] at T [°C] and S \[psu\].
 ///
 /// # References
 ///
@@ -95,7 +95,7 @@ pub fn conductivity(temperature: f64, salinity: f64) -> f64 {
     at_35_psu * ratio_at_15_degrees(s) * (1.0 + (t - 15.0) * a0 / (a1 + t))
 }
 
-/// Conductivity at 15 °C relative to 35 psu, R15 [1].
+/// Conductivity at 15 °C relative to 35 psu, R15 \[1\].
 fn ratio_at_15_degrees(s: f64) -> f64 {
     s * (37.5109 + 5.45216 * s + 0.014409 * s * s) / (1004.75 + 182.283 * s + s * s)
 }

@@ -70,7 +70,7 @@ fn legendre(n: usize, t: f64) -> (f64, f64) {
 ///
 /// - `count` n, nodes of the rule
 /// - `error` |E|, above 0
-/// - returns the phase 2ω [rad]
+/// - returns the phase 2ω \[rad\]
 ///
 /// # References
 ///

@@ -16,7 +16,7 @@ pub struct Raster {
     pub rows: usize,
     /// Number of columns, along ground range, at least 1.
     pub columns: usize,
-    /// Pixel size [m], above 0.
+    /// Pixel size \[m\], above 0.
     pub spacing: f64,
     /// Row of the origin; may lie outside the raster.
     pub origin_row: i64,
@@ -61,19 +61,19 @@ impl Raster {
         self.len() == 0
     }
 
-    /// Ground range of a column [m].
+    /// Ground range of a column \[m\].
     #[must_use]
     pub fn x(&self, column: usize) -> f64 {
         (column as i64 - self.origin_column) as f64 * self.spacing
     }
 
-    /// Azimuth of a row [m].
+    /// Azimuth of a row \[m\].
     #[must_use]
     pub fn y(&self, row: usize) -> f64 {
         (self.origin_row - row as i64) as f64 * self.spacing
     }
 
-    /// Pixel coordinates (column, row), with fractions, of the point (x, y) [m].
+    /// Pixel coordinates (column, row), with fractions, of the point (x, y) \[m\].
     #[must_use]
     pub fn pixel(&self, x: f64, y: f64) -> [f64; 2] {
         [

@@ -25,11 +25,11 @@ const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
 pub(crate) struct Setup {
     /// Pixels of the image.
     pub(crate) image: Raster,
-    /// Incidence angle [rad].
+    /// Incidence angle \[rad\].
     pub(crate) incidence: f64,
-    /// R/V [s].
+    /// R/V \[s\].
     pub(crate) range_to_velocity: f64,
-    /// Radar wavelength [m].
+    /// Radar wavelength \[m\].
     pub(crate) wavelength: f64,
     /// From amplitudes of waves to fields.
     pub(crate) transfer: Transfer,
@@ -39,7 +39,7 @@ pub(crate) struct Setup {
     pub(crate) two_scale: TwoScale,
     /// Relative permittivity of the water.
     pub(crate) permittivity: Complex64,
-    /// Single-look azimuth resolution [m].
+    /// Single-look azimuth resolution \[m\].
     pub(crate) azimuth_resolution: f64,
     /// The ship's wake, if there is a ship.
     pub(crate) wake: Option<KelvinWake>,

@@ -7,7 +7,7 @@ use crate::raster::Raster;
 /// Places seen from the ship are (ξ, η): ξ forward of midship along the track, η to port of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Track {
-    /// Midship (x, y) [m].
+    /// Midship (x, y) \[m\].
     pub position: [f64; 2],
     /// Unit vector (x, y) the ship moves along.
     pub forward: [f64; 2],
@@ -20,9 +20,9 @@ impl Track {
     /// forward = (sin χ, cos χ),    position = start + U t · forward
     /// ```
     ///
-    /// - `start` (x, y) [m]
+    /// - `start` (x, y) \[m\]
     /// - `heading` χ [deg clockwise from +y], any finite value
-    /// - `distance` U t run since time 0 [m]
+    /// - `distance` U t run since time 0 \[m\]
     #[must_use]
     pub fn new(start: [f64; 2], heading: f64, distance: f64) -> Self {
         let (sin, cos) = heading.rem_euclid(360.0).to_radians().sin_cos();
@@ -38,7 +38,7 @@ impl Track {
         [-self.forward[1], self.forward[0]]
     }
 
-    /// The place (x, y) [m] as seen from the ship, (ξ, η) [m].
+    /// The place (x, y) \[m\] as seen from the ship, (ξ, η) \[m\].
     #[must_use]
     pub fn seen_from_ship(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (dx, dy) = (x - self.position[0], y - self.position[1]);
@@ -46,7 +46,7 @@ impl Track {
         [dx * fx + dy * fy, dx * px + dy * py]
     }
 
-    /// The place (x, y) [m] of what is seen from the ship at (ξ, η) [m].
+    /// The place (x, y) \[m\] of what is seen from the ship at (ξ, η) \[m\].
     #[must_use]
     pub fn on_sea(&self, seen: [f64; 2]) -> [f64; 2] {
         let [dx, dy] = self.turned(seen);

@@ -25,7 +25,7 @@ pub const RECOVERY_TIME: f64 = 1000.0;
 /// J. Geophys. Res. 98, who found the power 1/5.
 const WIDTH_FACTOR: f64 = 4.0;
 
-/// Full width W of the wake [m]: twice the distance off the track at which the damping falls to e^{−1/2}.
+/// Full width W of the wake \[m\]: twice the distance off the track at which the damping falls to e^{−1/2}.
 ///
 /// ```text
 /// W(d) = B (1 + 4 d/B)^{1/5}
@@ -33,21 +33,21 @@ const WIDTH_FACTOR: f64 = 4.0;
 ///
 /// the law W ∝ x^{1/5} of Milgram et al. (1993), begun so that the wake is as wide as the ship at the stern.
 ///
-/// - `beam` B [m], above 0
-/// - `distance` d astern of the stern [m]; B where negative
+/// - `beam` B \[m\], above 0
+/// - `distance` d astern of the stern \[m\]; B where negative
 #[must_use]
 pub fn width(beam: f64, distance: f64) -> f64 {
     beam * (1.0 + WIDTH_FACTOR * distance.max(0.0) / beam).powf(0.2)
 }
 
-/// Damping D of the Bragg spectrum on the centreline [1].
+/// Damping D of the Bragg spectrum on the centreline \[1\].
 ///
 /// ```text
 /// D(d) = 0.6 exp(−d/(U · 1000 s))
 /// ```
 ///
 /// - `speed` U [m/s]; 0 behind a ship at rest
-/// - `distance` d astern of the stern [m]
+/// - `distance` d astern of the stern \[m\]
 #[must_use]
 pub fn centre_damping(speed: f64, distance: f64) -> f64 {
     if speed <= 0.0 {
@@ -63,14 +63,14 @@ pub struct TurbulentWake {
     pub track: Track,
     /// Speed U [m/s], at least 0.
     pub speed: f64,
-    /// Length of the hull L [m].
+    /// Length of the hull L \[m\].
     pub length: f64,
-    /// Beam of the hull B [m].
+    /// Beam of the hull B \[m\].
     pub beam: f64,
 }
 
 impl TurbulentWake {
-    /// Damping of the Bragg spectrum [1] at ξ forward of midship and η to port [m]: 0 ahead of the bow, rising
+    /// Damping of the Bragg spectrum \[1\] at ξ forward of midship and η to port \[m\]: 0 ahead of the bow, rising
     /// smoothly along the hull as the Kelvin wake does ([`fade`]).
     #[must_use]
     pub fn damping(&self, [forward, port]: [f64; 2]) -> f64 {
@@ -96,17 +96,17 @@ impl TurbulentWake {
         })
     }
 
-    /// Distance astern of the stern [m] at which the damping on the centreline has fallen to `threshold`;
+    /// Distance astern of the stern \[m\] at which the damping on the centreline has fallen to `threshold`;
     /// 0 where it never reaches it.
     ///
-    /// - `threshold` [1], above 0
+    /// - `threshold` \[1\], above 0
     #[must_use]
     pub fn extent(&self, threshold: f64) -> f64 {
         let decades = (STERN_DAMPING / threshold).ln().max(0.0);
         self.speed * RECOVERY_TIME * decades
     }
 
-    /// The centreline as a segment on the sea [m], from the stern to the end of its [`Self::extent`].
+    /// The centreline as a segment on the sea \[m\], from the stern to the end of its [`Self::extent`].
     #[must_use]
     pub fn centreline(&self, threshold: f64) -> [[f64; 2]; 2] {
         let stern = -0.5 * self.length;

@@ -25,7 +25,7 @@ pub struct PlaneWaves {
     pub ky: Vec<f64>,
     /// Angular frequency ω [rad/s], at least 0.
     pub omega: Vec<f64>,
-    /// Complex amplitude a [m], the time factor e^{−iωt} included.
+    /// Complex amplitude a \[m\], the time factor e^{−iωt} included.
     pub amplitude: Vec<Complex64>,
 }
 
@@ -72,11 +72,11 @@ impl PlaneWaves {
 /// A field that is linear in the waves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
-    /// Elevation ζ [m].
+    /// Elevation ζ \[m\].
     Elevation,
-    /// Slope ∂ζ/∂x [1].
+    /// Slope ∂ζ/∂x \[1\].
     SlopeX,
-    /// Slope ∂ζ/∂y [1].
+    /// Slope ∂ζ/∂y \[1\].
     SlopeY,
     /// Velocity of the water at the surface along x [m/s].
     VelocityX,
@@ -86,16 +86,16 @@ pub enum Quantity {
     VelocityZ,
     /// Acceleration toward the radar [m/s²].
     RadialAcceleration,
-    /// Relative modulation of the Bragg waves by the orbital current [1].
+    /// Relative modulation of the Bragg waves by the orbital current \[1\].
     Hydrodynamic,
 }
 
 /// Turns the amplitude of a wave into the amplitude of any [`Quantity`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transfer {
-    /// Water depth h [m], may be infinite.
+    /// Water depth h \[m\], may be infinite.
     pub depth: f64,
-    /// Incidence angle θ [rad].
+    /// Incidence angle θ \[rad\].
     pub incidence: f64,
     /// Relaxation rate μ of the Bragg waves [1/s].
     pub relaxation_rate: f64,

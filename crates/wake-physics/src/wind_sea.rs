@@ -15,9 +15,9 @@ pub struct WindSea {
     pub wind_speed: f64,
     /// Where the wind blows to [rad clockwise from +y].
     pub wind_toward: f64,
-    /// Distance over which the wind has blown F [m], above 0.
+    /// Distance over which the wind has blown F \[m\], above 0.
     pub fetch: f64,
-    /// Water depth h [m], above 0, may be infinite.
+    /// Water depth h \[m\], above 0, may be infinite.
     pub depth: f64,
     /// Spectrum of the waves.
     pub spectrum: SpectrumModel,
@@ -44,13 +44,13 @@ pub struct DirectionalSpectrum {
 /// Variances of the sea surface over a band of wavenumbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Moments {
-    /// ⟨ζ²⟩ [m²].
+    /// ⟨ζ²⟩ \[m²\].
     pub elevation: f64,
-    /// ⟨(∂ζ/∂x)²⟩ [1].
+    /// ⟨(∂ζ/∂x)²⟩ \[1\].
     pub slope_xx: f64,
-    /// ⟨∂ζ/∂x ∂ζ/∂y⟩ [1].
+    /// ⟨∂ζ/∂x ∂ζ/∂y⟩ \[1\].
     pub slope_xy: f64,
-    /// ⟨(∂ζ/∂y)²⟩ [1].
+    /// ⟨(∂ζ/∂y)²⟩ \[1\].
     pub slope_yy: f64,
     /// `⟨v_r²⟩` [m²/s²], the velocity toward the radar squared.
     pub radial_velocity: f64,
@@ -88,7 +88,7 @@ impl DirectionalSpectrum {
         self.wind
     }
 
-    /// Water depth [m].
+    /// Water depth \[m\].
     #[must_use]
     pub fn depth(&self) -> f64 {
         self.depth
@@ -106,7 +106,7 @@ impl DirectionalSpectrum {
         from_deep_equivalent(self.spectrum.peak_wavenumber(), self.depth)
     }
 
-    /// Omnidirectional spectrum S(k) [m³]; 0 at k ≤ 0 and on a flat sea.
+    /// Omnidirectional spectrum S(k) \[m³\]; 0 at k ≤ 0 and on a flat sea.
     #[must_use]
     pub fn omnidirectional(&self, wavenumber: f64) -> f64 {
         if self.flat || wavenumber <= 0.0 {
@@ -122,7 +122,7 @@ impl DirectionalSpectrum {
         }
     }
 
-    /// Density Ψ(kx, ky) [m⁴] of waves travelling along +k.
+    /// Density Ψ(kx, ky) \[m⁴\] of waves travelling along +k.
     #[must_use]
     pub fn psi(&self, [kx, ky]: [f64; 2]) -> f64 {
         let k = kx.hypot(ky);
@@ -147,7 +147,7 @@ impl DirectionalSpectrum {
     /// of 8 nodes, 0.3 wide in ln k, with a limit at the peak.
     ///
     /// - `low`, `high` wavenumbers [rad/m], from 0 to infinite (cut at 10⁵); no waves if `high` ≤ `low`
-    /// - `incidence` θ [rad]
+    /// - `incidence` θ \[rad\]
     #[must_use]
     pub fn moments(&self, low: f64, high: f64, incidence: f64) -> Moments {
         let mut moments = Moments::default();

@@ -109,7 +109,7 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// As [`merge_lora`](crate::weights::merge_lora).
+    /// As [`merge_lora`].
     pub fn with_lora(mut self, path: &Path, scale: f64) -> Result<Self> {
         self.unet = merge_lora(self.unet, Layout::Diffusers, "unet", path, scale)?;
         if weights::has_prefix(path, "text_encoder")? {

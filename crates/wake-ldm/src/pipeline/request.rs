@@ -13,7 +13,7 @@ use crate::scheduler::SchedulerConfig;
     reason = "a request has two of these, not thousands"
 )]
 pub enum Prompts {
-    /// One text per image (times [`Request::count`]).
+    /// One text per image (times `Request::count`).
     Texts(Vec<String>),
     /// Embeddings, `[prompts, tokens, width]`.
     Embeddings(Tensor<3>),

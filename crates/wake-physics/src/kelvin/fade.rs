@@ -13,8 +13,8 @@ use crate::track::Track;
 /// only astern; near the hull there is a local disturbance as well, which is left out. The passage is a
 /// choice: it hides the wrong waves ahead without a step.
 ///
-/// - `forward` ξ [m]
-/// - `length` L [m], above 0
+/// - `forward` ξ \[m\]
+/// - `length` L \[m\], above 0
 #[must_use]
 pub fn fade(forward: f64, length: f64) -> f64 {
     let s = (0.5 - forward / length).clamp(0.0, 1.0);

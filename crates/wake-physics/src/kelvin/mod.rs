@@ -28,10 +28,10 @@ use crate::waves::PlaneWaves;
 use num_complex::Complex64;
 use steady::{SteadyWave, SteadyWaves};
 
-/// Kelvin's angle arcsin(1/3) [rad]: the wake's arms leave the track at it.
+/// Kelvin's angle arcsin(1/3) \[rad\]: the wake's arms leave the track at it.
 pub const KELVIN_ANGLE: f64 = 0.339_836_909_454_121_9;
 
-/// The direction θ [rad] of the waves on the arms, atan(1/√2): transverse waves below, divergent above.
+/// The direction θ \[rad\] of the waves on the arms, atan(1/√2): transverse waves below, divergent above.
 pub const CUSP_ANGLE: f64 = 0.615_479_708_670_387_3;
 
 /// A thin ship under way: everything its free waves depend on.
@@ -52,14 +52,14 @@ pub struct KelvinWake {
     pub speed: f64,
     /// Place and direction at the time of the picture.
     pub track: Track,
-    /// Water depth h [m], above 0, may be infinite.
+    /// Water depth h \[m\], above 0, may be infinite.
     pub depth: f64,
-    /// Weights the spectrum with e^{−kd}, d this depth [m], at least 0.
+    /// Weights the spectrum with e^{−kd}, d this depth \[m\], at least 0.
     pub filter_depth: f64,
 }
 
 impl KelvinWake {
-    /// Wavelength of the transverse waves on the track in deep water, 2πU²/g [m].
+    /// Wavelength of the transverse waves on the track in deep water, 2πU²/g \[m\].
     #[must_use]
     pub fn transverse_wavelength(&self) -> f64 {
         std::f64::consts::TAU * self.speed * self.speed / GRAVITY
@@ -77,8 +77,8 @@ impl KelvinWake {
     /// A(θ) = −(2/π) k sec θ · F̄/(1 − νh sec²θ/cosh²(kh)),    F with cosh(k(h − z))/cosh(kh)
     /// ```
     ///
-    /// - `direction` θ [rad] between the track and the way the wave runs, |θ| < π/2
-    /// - returns A [m]; 0 where no wave keeps station with the ship
+    /// - `direction` θ \[rad\] between the track and the way the wave runs, |θ| < π/2
+    /// - returns A \[m\]; 0 where no wave keeps station with the ship
     #[must_use]
     pub fn amplitude(&self, direction: f64) -> Complex64 {
         let u = direction.tan().asinh();

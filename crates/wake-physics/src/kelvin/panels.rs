@@ -14,7 +14,7 @@ const PANEL_SHARE: f64 = 0.01;
 /// A range of wave directions that is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Zone {
-    /// Smallest and largest direction θ to the track [rad], to port positive.
+    /// Smallest and largest direction θ to the track \[rad\], to port positive.
     pub directions: [f64; 2],
     /// Nodes in it.
     pub nodes: usize,
@@ -146,7 +146,7 @@ impl WakePlan {
 struct Builder<'a> {
     reach: &'a Reach,
     rule: GaussLegendre,
-    /// Phase a panel may span [rad].
+    /// Phase a panel may span \[rad\].
     phase: f64,
     sharpness: f64,
     plan: WakePlan,
@@ -257,7 +257,7 @@ pub(super) fn nodes_of(reach: &Reach, piece: Piece, error: f64) -> Vec<(f64, f64
     builder.plan.quadrature
 }
 
-/// The part of a convex polygon that lies astern of `bow` [m]: corners (ξ, η) with ξ ≤ `bow`.
+/// The part of a convex polygon that lies astern of `bow` \[m\]: corners (ξ, η) with ξ ≤ `bow`.
 fn astern(corners: &[[f64; 2]], bow: f64) -> Vec<[f64; 2]> {
     let mut out = Vec::with_capacity(corners.len() + 1);
     for (i, a) in corners.iter().enumerate() {

@@ -20,7 +20,7 @@ impl KelvinWake {
     ///
     /// with a = −w F̄ and w = (2/π) k/(1 − νh sec²θ/cosh²(kh)).
     ///
-    /// - returns `R_w` [N]; 0 for a ship at rest
+    /// - returns `R_w` \[N\]; 0 for a ship at rest
     ///
     /// # References
     ///
@@ -53,7 +53,7 @@ impl KelvinWake {
         2.0 * SEA_WATER_DENSITY * GRAVITY * integral
     }
 
-    /// Coefficient of wave resistance `R_w`/(½ ρ U² S) [1], S the wetted surface; 0 at rest.
+    /// Coefficient of wave resistance `R_w`/(½ ρ U² S) \[1\], S the wetted surface; 0 at rest.
     #[must_use]
     pub fn wave_resistance_coefficient(&self) -> f64 {
         if self.speed == 0.0 {

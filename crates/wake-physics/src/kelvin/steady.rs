@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 pub(crate) struct SteadyWaves {
     /// ν = g/U² [1/m].
     nu: f64,
-    /// Depth h [m], may be infinite.
+    /// Depth h \[m\], may be infinite.
     depth: f64,
 }
 

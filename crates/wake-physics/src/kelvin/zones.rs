@@ -15,11 +15,11 @@ const SAMPLES: usize = 400;
 #[derive(Debug, Clone)]
 pub(crate) struct Reach {
     waves: SteadyWaves,
-    /// Corners (ξ, η) of a convex region [m].
+    /// Corners (ξ, η) of a convex region \[m\].
     corners: Vec<[f64; 2]>,
-    /// Half the length of the hull [m]: bow and stern are sources of their own.
+    /// Half the length of the hull \[m\]: bow and stern are sources of their own.
     half_length: f64,
-    /// Depth over which the hull and the filter weaken short waves [m].
+    /// Depth over which the hull and the filter weaken short waves \[m\].
     decay: f64,
 }
 

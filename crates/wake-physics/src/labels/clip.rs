@@ -2,7 +2,7 @@
 
 use crate::raster::Raster;
 
-/// The rectangle of the pixel centres [m].
+/// The rectangle of the pixel centres \[m\].
 pub(super) struct Rectangle {
     low: [f64; 2],
     high: [f64; 2],

@@ -115,7 +115,7 @@ impl Situation {
         rms(waves, |_| Complex64::ONE) / (self.image.transfer.incidence.tan() * self.spacing)
     }
 
-    /// Width of a point of azimuth resolution ρ on the pixels [m].
+    /// Width of a point of azimuth resolution ρ on the pixels \[m\].
     fn width(&self, resolution: f64) -> f64 {
         self.spacing.hypot(resolution / (SQRT_2 * PI))
     }

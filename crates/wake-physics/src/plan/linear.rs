@@ -13,7 +13,7 @@ pub(crate) struct WaveSample {
     pub(crate) k: [f64; 2],
     /// Angular frequency [rad/s].
     pub(crate) omega: f64,
-    /// Mean square elevation [m²].
+    /// Mean square elevation \[m²\].
     pub(crate) variance: f64,
 }
 
@@ -26,7 +26,7 @@ pub(crate) struct LinearImage {
     pub(crate) tilt: [f64; 2],
     /// Share of the Bragg return in σ⁰, 0 to 1.
     pub(crate) bragg_share: f64,
-    /// R/V [s].
+    /// R/V \[s\].
     pub(crate) range_to_velocity: f64,
 }
 

@@ -31,7 +31,7 @@ pub struct Plan {
     /// What a user should know about this scene.
     pub notes: Vec<String>,
     pub(crate) wake: WakePlan,
-    /// Mean σ⁰ expected [1].
+    /// Mean σ⁰ expected \[1\].
     pub(crate) mean_sigma0: f64,
 }
 
@@ -48,7 +48,7 @@ pub struct Sizes {
     pub sea_lattice: [usize; 2],
     /// Plane waves of the Kelvin wake: transverse and divergent.
     pub wake_nodes: [usize; 2],
-    /// Ranges of the direction of wake waves to the track [deg].
+    /// Ranges of the direction of wake waves to the track \[deg\].
     pub wake_directions: Vec<[f64; 2]>,
     /// Nodes of the backscatter table along the two slopes; 0 where σ⁰ is evaluated exactly.
     pub table: [usize; 2],

@@ -45,7 +45,7 @@ pub(crate) fn sea(spectrum: &DirectionalSpectrum, band: f64) -> Vec<WaveSample> 
 /// (length of track/area)·π Σ|aₙ|²/Δky'ₙ. Energy of the wedge outside the image is counted too: an upper bound.
 ///
 /// - `heading`: unit vector (x, y) of the ship's course
-/// - `track_length` [m] of the wake that can lie in the image, `area` [m²] of the image
+/// - `track_length` \[m\] of the wake that can lie in the image, `area` \[m²\] of the image
 pub(crate) fn wake(
     nodes: &PlaneWaves,
     heading: [f64; 2],

@@ -9,7 +9,7 @@ use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::{Scene, Term};
 use crate::setup::{Setup, turbulent_wake};
 
-/// Step of the differences that give the slope of ln σ⁰ [1].
+/// Step of the differences that give the slope of ln σ⁰ \[1\].
 const SLOPE_STEP: f64 = 0.05;
 
 /// Tolerance of the coarse wake that is only weighed.
@@ -37,7 +37,7 @@ pub(crate) struct Situation {
     pub(crate) mean: [f64; 2],
     /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
     pub(crate) backscatter: [f64; 2],
-    /// Pixel size [m].
+    /// Pixel size \[m\].
     pub(crate) spacing: f64,
     /// Number of looks.
     pub(crate) looks: f64,

@@ -28,9 +28,9 @@ use std::ops::Range;
 /// The radar's part of velocity bunching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Imaging {
-    /// Range over platform speed R/V [s], at least 0.
+    /// Range over platform speed R/V \[s\], at least 0.
     pub range_to_velocity: f64,
-    /// Incidence angle θ [rad], between 0 and π/2.
+    /// Incidence angle θ \[rad\], between 0 and π/2.
     pub incidence: f64,
     /// Azimuth resolution ρ' and how it depends on acceleration.
     pub resolution: AzimuthResolution,
@@ -43,13 +43,13 @@ pub struct Imaging {
 pub struct Sources<'a> {
     /// The pixels of the fields.
     pub raster: Raster,
-    /// Backscatter σ⁰ [1].
+    /// Backscatter σ⁰ \[1\].
     pub sigma0: &'a Field,
     /// Velocity toward the radar `u_r` [m/s]: displaces in azimuth.
     pub radial_velocity: Option<&'a Field>,
     /// Acceleration toward the radar `a_r` [m/s²]: defocuses.
     pub radial_acceleration: Option<&'a Field>,
-    /// Elevation ζ [m]: displaces in range.
+    /// Elevation ζ \[m\]: displaces in range.
     pub elevation: Option<&'a Field>,
 }
 
@@ -60,7 +60,7 @@ pub struct Extremes {
     pub radial_velocity: f64,
     /// Of the acceleration toward the radar `a_r` [m/s²].
     pub radial_acceleration: f64,
-    /// Of the elevation ζ [m].
+    /// Of the elevation ζ \[m\].
     pub elevation: f64,
 }
 

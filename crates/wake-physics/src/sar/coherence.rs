@@ -16,8 +16,8 @@ use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
 /// T = λ (R/V) / (2 ρ_a)
 /// ```
 ///
-/// - `wavelength` λ [m], of the radar; `range_to_velocity` R/V [s]; `resolution` `ρ_a` [m], above 0
-/// - returns T [s]; 0 at R/V = 0
+/// - `wavelength` λ \[m\], of the radar; `range_to_velocity` R/V \[s\]; `resolution` `ρ_a` \[m\], above 0
+/// - returns T \[s\]; 0 at R/V = 0
 #[must_use]
 pub fn integration_time(wavelength: f64, range_to_velocity: f64, resolution: f64) -> f64 {
     wavelength * range_to_velocity / (2.0 * resolution)
@@ -30,10 +30,10 @@ pub fn integration_time(wavelength: f64, range_to_velocity: f64, resolution: f64
 /// τ_c  = 1/(√2 k_e σ_u) = λ/(2√2 π σ_u)
 /// ```
 ///
-/// - `wavelength` λ = 2π/`k_e` [m], of the radar
+/// - `wavelength` λ = 2π/`k_e` \[m\], of the radar
 /// - `velocity_deviation` `σ_u` [m/s], standard deviation of the line-of-sight velocity of the waves shorter
 ///   than the pixels resolve, at least 0
-/// - returns `τ_c` [s]; infinite at `σ_u` = 0
+/// - returns `τ_c` \[s\]; infinite at `σ_u` = 0
 ///
 /// With this definition the lost resolution is what velocity bunching by the unresolved waves would smear:
 /// `λR/(2Vτ_c)` has the standard deviation (R/V)`σ_u`.
@@ -53,8 +53,8 @@ pub fn coherence_time(wavelength: f64, velocity_deviation: f64) -> f64 {
 /// λ_c = 2π (R/V) σ_u
 /// ```
 ///
-/// - `range_to_velocity` R/V [s]; `velocity_deviation` `σ_u` [m/s] of the line-of-sight velocity
-/// - returns `λ_c` [m]: the power of waves with `k_y` = 2π/`λ_c` is damped by 1/e, see [`cutoff_transfer`]
+/// - `range_to_velocity` R/V \[s\]; `velocity_deviation` `σ_u` [m/s] of the line-of-sight velocity
+/// - returns `λ_c` \[m\]: the power of waves with `k_y` = 2π/`λ_c` is damped by 1/e, see [`cutoff_transfer`]
 ///
 /// # References
 ///
@@ -70,7 +70,7 @@ pub fn azimuth_cutoff(range_to_velocity: f64, velocity_deviation: f64) -> f64 {
 /// exp(−k_y² (R/V)² σ_u²)
 /// ```
 ///
-/// - `wavenumber` `k_y` [rad/m]; `range_to_velocity` R/V [s]; `velocity_deviation` `σ_u` [m/s]
+/// - `wavenumber` `k_y` [rad/m]; `range_to_velocity` R/V \[s\]; `velocity_deviation` `σ_u` [m/s]
 /// - returns a factor in power, 0 to 1; its root is that of the amplitude
 #[must_use]
 pub fn cutoff_transfer(wavenumber: f64, range_to_velocity: f64, velocity_deviation: f64) -> f64 {
@@ -92,16 +92,16 @@ pub fn cutoff_transfer(wavenumber: f64, range_to_velocity: f64, velocity_deviati
 /// Alpers and Rufenach (1979) for one look; Alpers and Brüning (1986), IEEE Trans. Geosci. Remote Sens. 24, for N.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AzimuthResolution {
-    /// Resolution of a sea at rest, N `ρ_a` [m].
+    /// Resolution of a sea at rest, N `ρ_a` \[m\].
     pub nominal: f64,
-    /// Part lost to unresolved waves, `λR/(2Vτ_c)` [m].
+    /// Part lost to unresolved waves, `λR/(2Vτ_c)` \[m\].
     pub coherence: f64,
-    /// Part lost to acceleration, per acceleration: π/2 · T (R/V) [s²].
+    /// Part lost to acceleration, per acceleration: π/2 · T (R/V) \[s²\].
     pub defocus: f64,
 }
 
 impl AzimuthResolution {
-    /// The resolution of a sea at rest: N looks of single-look resolution `ρ_a` [m].
+    /// The resolution of a sea at rest: N looks of single-look resolution `ρ_a` \[m\].
     #[must_use]
     pub fn at_rest(resolution: f64, looks: u32) -> Self {
         Self {
@@ -113,8 +113,8 @@ impl AzimuthResolution {
 
     /// The same radar over a sea that moves.
     ///
-    /// - `wavelength` λ [m], of the radar; `range_to_velocity` R/V [s]
-    /// - `resolution` `ρ_a` [m], single look, above 0; `looks` N
+    /// - `wavelength` λ \[m\], of the radar; `range_to_velocity` R/V \[s\]
+    /// - `resolution` `ρ_a` \[m\], single look, above 0; `looks` N
     /// - `velocity_deviation` `σ_u` [m/s] of unresolved waves, see [`coherence_time`]
     #[must_use]
     pub fn of_moving_sea(
@@ -131,7 +131,7 @@ impl AzimuthResolution {
         }
     }
 
-    /// The resolution ρ' [m] where the acceleration toward the radar is `a_r` [m/s²].
+    /// The resolution ρ' \[m\] where the acceleration toward the radar is `a_r` [m/s²].
     #[must_use]
     pub fn at(&self, radial_acceleration: f64) -> f64 {
         let defocus = self.defocus * radial_acceleration;

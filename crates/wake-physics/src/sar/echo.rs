@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 /// RCS = 52 √f D^{3/2}
 /// ```
 ///
-/// - `frequency` f [Hz] (1 MHz is the unit of the formula); `displacement` D [kg] (1000 t is its unit)
-/// - returns the cross section [m²], about the median over aspects
+/// - `frequency` f \[Hz\] (1 MHz is the unit of the formula); `displacement` D \[kg\] (1000 t is its unit)
+/// - returns the cross section \[m²\], about the median over aspects
 ///
 /// # Validity
 ///
@@ -33,24 +33,24 @@ pub fn ship_cross_section(frequency: f64, displacement: f64) -> f64 {
 /// pixel apart (chosen). The ship is rigid: its points are displaced together and are as sharp as the radar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Echo {
-    /// Midship (x, y) [m], where the ship truly is.
+    /// Midship (x, y) \[m\], where the ship truly is.
     pub position: [f64; 2],
     /// Where it moves to [deg clockwise from azimuth].
     pub heading: f64,
-    /// Length L [m].
+    /// Length L \[m\].
     pub length: f64,
-    /// Beam B [m].
+    /// Beam B \[m\].
     pub beam: f64,
-    /// Radar cross section [m²].
+    /// Radar cross section \[m²\].
     pub cross_section: f64,
-    /// Azimuth displacement (R/V)·`u_r` [m], see [`crate::sar::geometry::azimuth_displacement`].
+    /// Azimuth displacement (R/V)·`u_r` \[m\], see [`crate::sar::geometry::azimuth_displacement`].
     pub displacement: f64,
 }
 
 impl Echo {
     /// Adds the echo to an image before speckle.
     ///
-    /// - `resolution` [m]: of the radar in azimuth, for points at rest; in range it is the pixel
+    /// - `resolution` \[m\]: of the radar in azimuth, for points at rest; in range it is the pixel
     ///
     /// The sum added is cross section / pixel area, less what falls outside the image.
     ///
@@ -74,7 +74,7 @@ impl Echo {
         }
     }
 
-    /// The bright points (x, y) [m] at the ship's true place.
+    /// The bright points (x, y) \[m\] at the ship's true place.
     fn points(&self, spacing: f64) -> Vec<[f64; 2]> {
         let [ahead_x, ahead_y] = direction(self.heading);
         let along = (2.0 * self.length / spacing).ceil().max(1.0) as usize;

@@ -7,7 +7,7 @@
 /// ```
 ///
 /// - `velocity_x` `v_x` [m/s], away from the radar; `velocity_z` `v_z` [m/s], upward
-/// - `incidence` θ [rad]
+/// - `incidence` θ \[rad\]
 /// - returns `u_r` [m/s]; the same sum of two accelerations is the acceleration toward the radar [m/s²]
 #[must_use]
 pub fn radial_velocity(velocity_x: f64, velocity_z: f64, incidence: f64) -> f64 {
@@ -20,7 +20,7 @@ pub fn radial_velocity(velocity_x: f64, velocity_z: f64, incidence: f64) -> f64 
 /// u_r = −U sin(heading) sin θ
 /// ```
 ///
-/// - `speed` U [m/s]; `heading` where it moves to [deg clockwise from azimuth]; `incidence` θ [rad]
+/// - `speed` U [m/s]; `heading` where it moves to [deg clockwise from azimuth]; `incidence` θ \[rad\]
 /// - returns `u_r` [m/s], negative for a ship that moves away from the radar
 #[must_use]
 pub fn ship_radial_velocity(speed: f64, heading: f64, incidence: f64) -> f64 {
@@ -33,8 +33,8 @@ pub fn ship_radial_velocity(speed: f64, heading: f64, incidence: f64) -> f64 {
 /// Δy = (R/V) u_r
 /// ```
 ///
-/// - `range_to_velocity` R/V [s]; `radial_velocity` `u_r` [m/s], toward the radar positive
-/// - returns Δy [m]: along the flight for a point that approaches
+/// - `range_to_velocity` R/V \[s\]; `radial_velocity` `u_r` [m/s], toward the radar positive
+/// - returns Δy \[m\]: along the flight for a point that approaches
 ///
 /// # References
 ///
@@ -51,8 +51,8 @@ pub fn azimuth_displacement(range_to_velocity: f64, radial_velocity: f64) -> f64
 /// Δx = −ζ cot θ
 /// ```
 ///
-/// - `elevation` ζ [m]; `incidence` θ [rad]
-/// - returns Δx [m]: toward the radar for a crest
+/// - `elevation` ζ \[m\]; `incidence` θ \[rad\]
+/// - returns Δx \[m\]: toward the radar for a crest
 #[must_use]
 pub fn layover(elevation: f64, incidence: f64) -> f64 {
     -elevation / incidence.tan()

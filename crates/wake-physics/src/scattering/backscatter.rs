@@ -4,7 +4,7 @@ use crate::raster::Field;
 use crate::scattering::{FacetFields, SlopeCovariance, Specular, TwoScale};
 use rayon::prelude::*;
 
-/// Spacing of slopes for figures that need two digits only [1].
+/// Spacing of slopes for figures that need two digits only \[1\].
 const COARSE_SLOPES: f64 = 0.06;
 
 /// Backscatter of facets: Bragg return averaged over unresolved tilt, and specular return.
@@ -18,10 +18,10 @@ pub struct Backscatter {
     pub specular: Specular,
 }
 
-/// What σ⁰ would lose without a term: root mean square over the sea, relative to the mean σ⁰ [1].
+/// What σ⁰ would lose without a term: root mean square over the sea, relative to the mean σ⁰ \[1\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensitivity {
-    /// Mean Bragg and specular σ⁰ [1].
+    /// Mean Bragg and specular σ⁰ \[1\].
     pub mean: [f64; 2],
     /// Without the average over unresolved tilt; 0 if σ⁰ is 0.
     pub tilt_average: f64,
@@ -184,7 +184,7 @@ mod tests {
             }
         }
 
-        /// Bragg without tilt, with tilt, specular and sum [dB].
+        /// Bragg without tilt, with tilt, specular and sum \[dB\].
         fn decibels(&self) -> [f64; 4] {
             let model = self.scene_mean();
             let [bragg, specular] = model.parts([0.0; 2]);

@@ -6,9 +6,9 @@ use std::f64::consts::PI;
 /// First-order scattering coefficients of a slightly rough dielectric plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients {
-    /// `g_VV`, vertical polarization both ways [1].
+    /// `g_VV`, vertical polarization both ways \[1\].
     pub vv: Complex64,
-    /// `g_HH`, horizontal polarization both ways [1].
+    /// `g_HH`, horizontal polarization both ways \[1\].
     pub hh: Complex64,
 }
 
@@ -19,7 +19,7 @@ pub struct Coefficients {
 /// g_VV = (ε − 1)[ε(1 + sin²θ) − sin²θ]/(ε cos θ + √(ε − sin²θ))²
 /// ```
 ///
-/// - `permittivity` ε [1], `cos_incidence` cos θ, 0 to 1
+/// - `permittivity` ε \[1\], `cos_incidence` cos θ, 0 to 1
 ///
 /// # References
 ///
@@ -46,7 +46,7 @@ fn square_root(z: Complex64) -> Complex64 {
 
 /// Wavenumber of the Bragg wave, `k_B` = 2 `k_e` sin θ [rad/m].
 ///
-/// - `radar_wavenumber` `k_e` = 2π/λ [rad/m], `incidence` θ [rad]
+/// - `radar_wavenumber` `k_e` = 2π/λ [rad/m], `incidence` θ \[rad\]
 #[must_use]
 pub fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
     2.0 * radar_wavenumber * incidence.sin()
@@ -59,8 +59,8 @@ pub fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
 /// ```
 ///
 /// - `radar_wavenumber` `k_e` [rad/m], `cos_incidence` cos θ
-/// - `gain` |g|² [1], `density` `Ψ_e` [m⁴] at the Bragg wavenumber
-/// - returns σ⁰ [1], per unit area of that plane
+/// - `gain` |g|² \[1\], `density` `Ψ_e` \[m⁴\] at the Bragg wavenumber
+/// - returns σ⁰ \[1\], per unit area of that plane
 ///
 /// # References
 ///

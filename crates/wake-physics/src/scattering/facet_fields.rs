@@ -6,11 +6,11 @@ use crate::scattering::hydrodynamic::bragg_factor;
 /// Fields of one size that determine σ⁰.
 #[derive(Debug, Clone, Copy)]
 pub struct FacetFields<'a> {
-    /// Slope ∂ζ/∂x, along the look direction [1].
+    /// Slope ∂ζ/∂x, along the look direction \[1\].
     pub slope_x: &'a Field,
-    /// Slope ∂ζ/∂y [1].
+    /// Slope ∂ζ/∂y \[1\].
     pub slope_y: &'a Field,
-    /// Hydrodynamic modulation m of the Bragg waves [1], where it counts.
+    /// Hydrodynamic modulation m of the Bragg waves \[1\], where it counts.
     pub modulation: Option<&'a Field>,
     /// Share of the Bragg waves that the turbulent wake leaves, 0 to 1, where it counts.
     pub damping: Option<&'a Field>,

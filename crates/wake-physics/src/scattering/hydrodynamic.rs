@@ -34,7 +34,7 @@ pub fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
     growth.clamp(RELAXATION_RANGE[0], RELAXATION_RANGE[1])
 }
 
-/// Factor on the Bragg return, max(0, 1 + m) [1].
+/// Factor on the Bragg return, max(0, 1 + m) \[1\].
 ///
 /// The theory is linear in m, so 1 + m may fall below 0 where the current changes fast. There are no fewer
 /// short waves than none: the factor is 0 then.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// Covariance of the slopes ∂ζ/∂x, ∂ζ/∂y of a band of waves [1].
+/// Covariance of the slopes ∂ζ/∂x, ∂ζ/∂y of a band of waves \[1\].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SlopeCovariance {
     /// Variance of ∂ζ/∂x.
@@ -32,7 +32,7 @@ impl SlopeCovariance {
 
     /// Variances along and across the wind, turned into x and y.
     ///
-    /// - `variance` along and across [1]; `wind` unit vector of where the wind blows to
+    /// - `variance` along and across \[1\]; `wind` unit vector of where the wind blows to
     #[must_use]
     pub fn along_wind(variance: [f64; 2], wind: [f64; 2]) -> Self {
         let [up, cross] = variance;
@@ -74,7 +74,7 @@ impl SlopeCovariance {
         }
     }
 
-    /// Determinant xx·yy − xy² [1].
+    /// Determinant xx·yy − xy² \[1\].
     #[must_use]
     pub fn determinant(&self) -> f64 {
         self.xx * self.yy - self.xy * self.xy
@@ -112,7 +112,7 @@ impl SlopeCovariance {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SlopeDensity {
-    /// Density of no slope [1].
+    /// Density of no slope \[1\].
     pub(crate) peak: f64,
     /// Coefficients of x², xy and y² in the exponent.
     form: [f64; 3],
@@ -128,7 +128,7 @@ impl SlopeDensity {
         form: [0.0; 3],
     };
 
-    /// The density of a slope [1].
+    /// The density of a slope \[1\].
     #[inline]
     pub(crate) fn at(&self, [x, y]: [f64; 2]) -> f64 {
         let exponent = self.form[0] * x * x + self.form[1] * x * y + self.form[2] * y * y;

@@ -42,7 +42,7 @@ impl Specular {
         density: SlopeDensity::NONE,
     };
 
-    /// The return of water of a permittivity, seen at an incidence θ [rad], with unresolved slopes and the
+    /// The return of water of a permittivity, seen at an incidence θ \[rad\], with unresolved slopes and the
     /// slope variance [`mirror_lobe`](Self::mirror_lobe) of the pixel's own lobe.
     #[must_use]
     pub fn new(
@@ -62,12 +62,12 @@ impl Specular {
         }
     }
 
-    /// Slope variance that stands for the lobe of a square mirror, (π/2)/(`k_e` L)² [1].
+    /// Slope variance that stands for the lobe of a square mirror, (π/2)/(`k_e` L)² \[1\].
     ///
     /// The lobe sinc²(`k_e` L s) has the peak 1 and the area π/(`k_e` L); the Gaussian of the same peak and area has
     /// this variance.
     ///
-    /// - `radar_wavenumber` `k_e` [rad/m], `size` L [m]
+    /// - `radar_wavenumber` `k_e` [rad/m], `size` L \[m\]
     #[must_use]
     pub fn mirror_lobe(radar_wavenumber: f64, size: f64) -> f64 {
         FRAC_PI_2 / (radar_wavenumber * size).powi(2)

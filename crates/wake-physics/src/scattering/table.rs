@@ -7,13 +7,13 @@ use crate::scattering::slopes::PrincipalAxes;
 use crate::scattering::{Backscatter, FacetFields};
 use rayon::prelude::*;
 
-/// First spacing of facets tried [1]: a quarter of the width of the roll-off near nadir.
+/// First spacing of facets tried \[1\]: a quarter of the width of the roll-off near nadir.
 const FIRST_SPACING: f64 = 0.02;
 
 /// Finest lattice on which averages are taken, in parts of the spacing of facets.
 const MOST_REFINEMENT: usize = 16;
 
-/// Steepest slope along an axis that the table covers [1]; steeper facets are rare and evaluated exactly.
+/// Steepest slope along an axis that the table covers \[1\]; steeper facets are rare and evaluated exactly.
 const STEEPEST: f64 = 1.5;
 
 /// Most facets evaluated for one table: about 0.1 s.
@@ -46,7 +46,7 @@ pub struct BackscatterTable {
 impl BackscatterTable {
     /// A table for the slopes that occur in two fields.
     ///
-    /// - `error` largest absolute error of σ⁰ [1]: a tolerance times the mean σ⁰
+    /// - `error` largest absolute error of σ⁰ \[1\]: a tolerance times the mean σ⁰
     #[must_use]
     pub fn covering(
         backscatter: Backscatter,
@@ -84,7 +84,7 @@ impl BackscatterTable {
         self.bragg.nodes()
     }
 
-    /// Stated absolute error of the interpolated σ⁰ [1].
+    /// Stated absolute error of the interpolated σ⁰ \[1\].
     #[must_use]
     pub fn error(&self) -> f64 {
         self.error
@@ -229,7 +229,7 @@ fn interpolation_error(lattice: &Lattice) -> f64 {
     difference / 8.0
 }
 
-/// The range of a table ends on multiples of this slope [1]: fields that hardly differ get the same table.
+/// The range of a table ends on multiples of this slope \[1\]: fields that hardly differ get the same table.
 const RANGE_STEP: f64 = 1.0 / 16.0;
 
 /// Range of the slopes along two axes, rounded outward, at least 0 to 0 and at most [`STEEPEST`] either way.

@@ -6,15 +6,15 @@ use crate::scattering::slopes::{SlopeCovariance, gaussian_nodes};
 use crate::spectrum::Elfouhaily;
 use num_complex::Complex64;
 
-/// Split wavenumber over radar wavenumber, `k_d`/`k_e` [1]. Longer waves tilt facets, shorter ones scatter.
+/// Split wavenumber over radar wavenumber, `k_d`/`k_e` \[1\]. Longer waves tilt facets, shorter ones scatter.
 /// Between the 3 and the 5 radar wavelengths in use (`k_e`/3 to `k_e`/5).
 const SPLIT: f64 = 0.25;
 
-/// Where the Bragg return rolls off, over `k_d` [1]: chosen, so that the mean σ⁰ at 24° is within 0.1 dB of that
+/// Where the Bragg return rolls off, over `k_d` \[1\]: chosen, so that the mean σ⁰ at 24° is within 0.1 dB of that
 /// with a sharp limit at `k_d`.
 const ROLL_OFF: f64 = 0.86;
 
-/// Spacing of slopes of the exact average [1]: a tenth of the width of the roll-off near nadir, the sharpest
+/// Spacing of slopes of the exact average \[1\]: a tenth of the width of the roll-off near nadir, the sharpest
 /// feature of the Bragg return. Half of it changes the average by less than 2e-7.
 const FINE_SLOPES: f64 = 0.008;
 
@@ -40,7 +40,7 @@ pub struct TwoScale {
 impl TwoScale {
     /// The model for a radar and a sea.
     ///
-    /// - `incidence` θ [rad], 0 to π/2; `radar_wavenumber` `k_e` = 2π/λ [rad/m]
+    /// - `incidence` θ \[rad\], 0 to π/2; `radar_wavenumber` `k_e` = 2π/λ [rad/m]
     /// - `permittivity` ε of the water; `spectrum` of the short waves
     /// - `wind` unit vector (x, y) of where the wind blows to
     #[must_use]
@@ -93,7 +93,7 @@ impl TwoScale {
     /// radar that their Bragg wave is one of the long waves; those return the specular way. Facets turned away
     /// (`θ_i` of 90° or more) return nothing.
     ///
-    /// - `slope` (`s_x`, `s_y`) along and across the look direction [1]
+    /// - `slope` (`s_x`, `s_y`) along and across the look direction \[1\]
     ///
     /// # References
     ///
@@ -148,7 +148,7 @@ impl TwoScale {
     /// By direct quadrature on slopes 0.008 apart: slow, the oracle of the table. Its own relative error is below
     /// 2e-7.
     ///
-    /// - `slope` s resolved slope [1]; `unresolved` covariance of u
+    /// - `slope` s resolved slope \[1\]; `unresolved` covariance of u
     #[must_use]
     pub fn tilt_averaged(&self, slope: [f64; 2], unresolved: &SlopeCovariance) -> f64 {
         self.average(slope, unresolved, FINE_SLOPES)

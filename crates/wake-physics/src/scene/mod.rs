@@ -60,7 +60,7 @@ pub struct Grid {
     pub rows: usize,
     /// Pixels along ground range, 1 to 16384.
     pub columns: usize,
-    /// Pixel size [m], 0.1 to 100.
+    /// Pixel size \[m\], 0.1 to 100.
     pub spacing: f64,
 }
 
@@ -82,20 +82,20 @@ pub struct Sea {
     pub wind_speed: f64,
     /// Where the wind blows to [deg clockwise from azimuth]; 90 is away from the radar.
     pub wind_toward: f64,
-    /// Distance over which the wind has blown [m], 100 to 1e7.
+    /// Distance over which the wind has blown \[m\], 100 to 1e7.
     pub fetch: f64,
     /// Spectrum of the resolved waves.
     pub spectrum: SpectrumModel,
     /// How the resolved waves spread around the wind.
     pub spreading: SpreadingModel,
-    /// Water depth [m], 1 to infinite (`inf`, or the word "infinite" where a format has no infinity).
+    /// Water depth \[m\], 1 to infinite (`inf`, or the word "infinite" where a format has no infinity).
     #[serde(with = "depth")]
     pub depth: f64,
-    /// Time [s], 0 to 1e5; moves sea, ship and wake together.
+    /// Time \[s\], 0 to 1e5; moves sea, ship and wake together.
     pub time: f64,
     /// Water temperature [°C], −2 to 40.
     pub temperature: f64,
-    /// Salinity [psu], 0 to 45.
+    /// Salinity \[psu\], 0 to 45.
     pub salinity: f64,
 }
 
@@ -143,17 +143,17 @@ pub enum SpreadingModel {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ship {
-    /// Length at the waterline L [m], 1 to 500.
+    /// Length at the waterline L \[m\], 1 to 500.
     pub length: f64,
-    /// Beam B [m], 0.2 to 100, below the length.
+    /// Beam B \[m\], 0.2 to 100, below the length.
     pub beam: f64,
-    /// Draft T [m], 0.1 to 40, below the length.
+    /// Draft T \[m\], 0.1 to 40, below the length.
     pub draft: f64,
     /// Speed U [m/s], 0 to 40.
     pub speed: f64,
     /// Where it moves to [deg clockwise from azimuth].
     pub heading: f64,
-    /// Midship (x, y) at time 0 [m].
+    /// Midship (x, y) at time 0 \[m\].
     pub position: [f64; 2],
     /// Form of the hull.
     pub hull: HullForm,
@@ -162,7 +162,7 @@ pub struct Ship {
     pub block_coefficient: Option<f64>,
     /// Whether the radar echo of the ship itself is drawn.
     pub echo: bool,
-    /// Weights the wake's spectrum with `exp(−k·filter_depth)` [m], 0 to 20.
+    /// Weights the wake's spectrum with `exp(−k·filter_depth)` \[m\], 0 to 20.
     pub filter_depth: f64,
 }
 
@@ -197,15 +197,15 @@ pub enum HullForm {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Radar {
-    /// Frequency [Hz], 1e9 to 2e10.
+    /// Frequency \[Hz\], 1e9 to 2e10.
     pub frequency: f64,
     /// Polarization, sent and received.
     pub polarization: Polarization,
-    /// Incidence angle [deg], 5 to 75.
+    /// Incidence angle \[deg\], 5 to 75.
     pub incidence: f64,
-    /// Range over platform speed R/V [s], 0 to 200.
+    /// Range over platform speed R/V \[s\], 0 to 200.
     pub range_to_velocity: f64,
-    /// Single-look azimuth resolution [m], 0.5 to 100.
+    /// Single-look azimuth resolution \[m\], 0.5 to 100.
     pub resolution: f64,
     /// Number of independent looks, 1 to 1000.
     pub looks: u32,
@@ -244,7 +244,7 @@ pub enum Polarization {
 pub struct Model {
     /// The terms.
     pub terms: Terms,
-    /// Largest error asked for [1], 1e-6 to 0.1: for every field relative to its root mean square, for the
+    /// Largest error asked for \[1\], 1e-6 to 0.1: for every field relative to its root mean square, for the
     /// image before speckle as root mean square relative to its mean.
     pub tolerance: f64,
 }

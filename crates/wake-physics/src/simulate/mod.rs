@@ -33,11 +33,11 @@ pub enum Method {
 pub struct Simulation {
     /// Places of the pixels.
     pub raster: Raster,
-    /// Elevation ζ [m].
+    /// Elevation ζ \[m\].
     pub elevation: Field,
-    /// Slope ∂ζ/∂x [1].
+    /// Slope ∂ζ/∂x \[1\].
     pub slope_x: Field,
-    /// Slope ∂ζ/∂y [1].
+    /// Slope ∂ζ/∂y \[1\].
     pub slope_y: Field,
     /// Velocity of the water along x [m/s].
     pub velocity_x: Field,

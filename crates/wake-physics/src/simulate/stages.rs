@@ -230,7 +230,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Azimuth displacement of the ship's echo [m].
+    /// Azimuth displacement of the ship's echo \[m\].
     fn displacement(&self) -> f64 {
         let Some(ship) = &self.scene.ship else {
             return 0.0;

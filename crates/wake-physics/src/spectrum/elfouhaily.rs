@@ -15,13 +15,13 @@ pub const SLOWEST_WAVENUMBER: f64 = 370.0;
 /// Phase speed of the slowest wave `c_m` [m/s], as the paper rounds it.
 pub const SLOWEST_SPEED: f64 = 0.23;
 
-/// Inverse wave age of a fully developed sea `Ω_c` [1].
+/// Inverse wave age of a fully developed sea `Ω_c` \[1\].
 pub const FULLY_DEVELOPED: f64 = 0.84;
 
-/// Dimensionless fetch at which a sea is developed, X₀ [1].
+/// Dimensionless fetch at which a sea is developed, X₀ \[1\].
 const DEVELOPED_FETCH: f64 = 2.2e4;
 
-/// Largest inverse wave age for which the peak enhancement was fitted [1].
+/// Largest inverse wave age for which the peak enhancement was fitted \[1\].
 const YOUNGEST_SEA: f64 = 5.0;
 
 /// How strongly the wind drags the water: C₁₀ = (u*/U₁₀)².
@@ -54,8 +54,8 @@ pub fn friction_velocity(wind_speed: f64, drag: DragLaw) -> f64 {
 /// Ω_c = 0.84 tanh[(X/X₀)^0.4]^(−0.75),   X = g F/U₁₀²,  X₀ = 2.2·10⁴
 /// ```
 ///
-/// - `wind_speed` U₁₀ [m/s], at least 0; `fetch` F [m], above 0
-/// - returns `Ω_c` [1], at least 0.84
+/// - `wind_speed` U₁₀ [m/s], at least 0; `fetch` F \[m\], above 0
+/// - returns `Ω_c` \[1\], at least 0.84
 ///
 /// # References
 ///
@@ -104,7 +104,7 @@ pub struct Elfouhaily {
 }
 
 impl Elfouhaily {
-    /// The sea that a wind U₁₀ [m/s] makes over a fetch [m].
+    /// The sea that a wind U₁₀ [m/s] makes over a fetch \[m\].
     #[must_use]
     pub fn new(wind_speed: f64, fetch: f64) -> Self {
         Self::of_age(
@@ -114,7 +114,7 @@ impl Elfouhaily {
         )
     }
 
-    /// The sea of a wind U₁₀ [m/s] and an inverse wave age Ω [1], at least 0.84, under a drag law.
+    /// The sea of a wind U₁₀ [m/s] and an inverse wave age Ω \[1\], at least 0.84, under a drag law.
     #[must_use]
     pub fn of_age(wind_speed: f64, inverse_wave_age: f64, drag: DragLaw) -> Self {
         Self::under_gravity(wind_speed, inverse_wave_age, drag, GRAVITY)
@@ -137,7 +137,7 @@ impl Elfouhaily {
         }
     }
 
-    /// Inverse wave age Ω [1].
+    /// Inverse wave age Ω \[1\].
     #[must_use]
     pub fn inverse_wave_age(&self) -> f64 {
         self.inverse_wave_age
@@ -167,7 +167,7 @@ impl Elfouhaily {
         (self.gravity / wavenumber * (1.0 + (wavenumber / SLOWEST_WAVENUMBER).powi(2))).sqrt()
     }
 
-    /// Curvature spectrum B(k) = k³ S(k) [1]; 0 at k ≤ 0 and without wind.
+    /// Curvature spectrum B(k) = k³ S(k) \[1\]; 0 at k ≤ 0 and without wind.
     #[must_use]
     pub fn curvature(&self, wavenumber: f64) -> f64 {
         let k = wavenumber;
@@ -191,7 +191,7 @@ impl Elfouhaily {
         0.5 * (long + short) / self.phase_speed(k) * shape
     }
 
-    /// Omnidirectional spectrum S(k) [m³]; 0 at k ≤ 0.
+    /// Omnidirectional spectrum S(k) \[m³\]; 0 at k ≤ 0.
     #[must_use]
     pub fn spectrum(&self, wavenumber: f64) -> f64 {
         let curvature = self.curvature(wavenumber);
@@ -202,7 +202,7 @@ impl Elfouhaily {
         }
     }
 
-    /// How much more waves run along the wind than across it, Δ(k) [1].
+    /// How much more waves run along the wind than across it, Δ(k) \[1\].
     ///
     /// ```text
     /// D(k, φ) = (1 + Δ cos 2φ)/(2π),   Δ = tanh[ln2/4 + 4 (c/c_p)^2.5 + 0.13 (u*/c_m)(c_m/c)^2.5]
@@ -216,7 +216,7 @@ impl Elfouhaily {
         (LN_2 / 4.0 + long + wind * to_two_and_half(SLOWEST_SPEED / c)).tanh()
     }
 
-    /// Spectral density Ψ(kx, ky) [m⁴], two-sided and even.
+    /// Spectral density Ψ(kx, ky) \[m⁴\], two-sided and even.
     ///
     /// - `k` [rad/m]; `wind` unit vector of where the wind blows to
     #[must_use]
@@ -232,7 +232,7 @@ impl Elfouhaily {
         curvature / (squared * squared) * spread
     }
 
-    /// Variance of the slopes along and across the wind of all waves from `low` to `high` [1].
+    /// Variance of the slopes along and across the wind of all waves from `low` to `high` \[1\].
     ///
     /// ```text
     /// mss_up, mss_cross = ∫ k² S ½(1 ± Δ/2) dk = ∫ B ½(1 ± Δ/2) d ln k
@@ -266,7 +266,7 @@ impl Elfouhaily {
     }
 }
 
-/// Level `α_m` of the short waves [1], at least 0.
+/// Level `α_m` of the short waves \[1\], at least 0.
 fn short_level(friction_velocity: f64) -> f64 {
     let log = (friction_velocity / SLOWEST_SPEED).ln();
     let slope = if log <= 0.0 { 1.0 } else { 3.0 };

@@ -4,10 +4,10 @@ use super::pierson_moskowitz::{LEVEL, PiersonMoskowitz};
 use crate::constants::GRAVITY;
 use std::f64::consts::TAU;
 
-/// Dimensionless fetch from which the sea is led over to full development [1]; chosen, see [`Jonswap`].
+/// Dimensionless fetch from which the sea is led over to full development \[1\]; chosen, see [`Jonswap`].
 const MATURING_FETCH: f64 = 1.1e4;
 
-/// Mean peak enhancement γ of the growing sea [1].
+/// Mean peak enhancement γ of the growing sea \[1\].
 const ENHANCEMENT: f64 = 3.3;
 
 /// The spectrum of a sea that grows with the fetch.
@@ -42,7 +42,7 @@ pub struct Jonswap {
 }
 
 impl Jonswap {
-    /// The sea that a wind U₁₀ [m/s] makes over a fetch F [m], at most the developed sea.
+    /// The sea that a wind U₁₀ [m/s] makes over a fetch F \[m\], at most the developed sea.
     #[must_use]
     pub fn new(wind_speed: f64, fetch: f64) -> Self {
         let developed = PiersonMoskowitz::new(wind_speed).peak_frequency();
@@ -63,7 +63,7 @@ impl Jonswap {
         )
     }
 
-    /// The spectrum of given level α [1], peak frequency `ω_p` [rad/s] and peak enhancement γ [1].
+    /// The spectrum of given level α \[1\], peak frequency `ω_p` [rad/s] and peak enhancement γ \[1\].
     #[must_use]
     pub fn with(level: f64, peak_frequency: f64, enhancement: f64) -> Self {
         Self {
@@ -79,7 +79,7 @@ impl Jonswap {
         self.level * GRAVITY.powi(2) * omega.powi(-5) * self.shape(omega / self.peak_frequency)
     }
 
-    /// Curvature spectrum B(k) = k³ S(k) [1]; 0 at k ≤ 0 and without wind.
+    /// Curvature spectrum B(k) = k³ S(k) \[1\]; 0 at k ≤ 0 and without wind.
     #[must_use]
     pub fn curvature(&self, wavenumber: f64) -> f64 {
         if wavenumber <= 0.0 || !self.peak_frequency.is_finite() {

@@ -41,7 +41,7 @@ pub enum Spectrum {
 }
 
 impl Spectrum {
-    /// The sea that a wind U₁₀ [m/s] makes over a fetch [m].
+    /// The sea that a wind U₁₀ [m/s] makes over a fetch \[m\].
     #[must_use]
     pub fn new(model: SpectrumModel, wind_speed: f64, fetch: f64) -> Self {
         match model {
@@ -53,7 +53,7 @@ impl Spectrum {
         }
     }
 
-    /// Curvature spectrum B(k) = k³ S(k) [1] at k [rad/m].
+    /// Curvature spectrum B(k) = k³ S(k) \[1\] at k [rad/m].
     #[must_use]
     pub fn curvature(&self, wavenumber: f64) -> f64 {
         match self {
@@ -74,13 +74,13 @@ impl Spectrum {
     }
 }
 
-/// Wavenumber spectrum S(k) = S(ω) dω/dk [m³] from a frequency spectrum S(ω) [m² s] at the ω of k.
+/// Wavenumber spectrum S(k) = S(ω) dω/dk \[m³\] from a frequency spectrum S(ω) [m² s] at the ω of k.
 #[must_use]
 pub fn to_wavenumber(frequency_spectrum: f64, wavenumber: f64, depth: f64) -> f64 {
     frequency_spectrum * group_speed(wavenumber, depth)
 }
 
-/// Frequency spectrum S(ω) = S(k)/(dω/dk) [m² s] from a wavenumber spectrum S(k) [m³] at the k of ω.
+/// Frequency spectrum S(ω) = S(k)/(dω/dk) [m² s] from a wavenumber spectrum S(k) \[m³\] at the k of ω.
 #[must_use]
 pub fn to_frequency(wavenumber_spectrum: f64, wavenumber: f64, depth: f64) -> f64 {
     wavenumber_spectrum / group_speed(wavenumber, depth)
@@ -94,7 +94,7 @@ pub fn deep_equivalent(wavenumber: f64, depth: f64) -> f64 {
     wavenumber * depth_factor(wavenumber, depth)
 }
 
-/// The wavenumber k [rad/m] over depth h [m] whose deep-water equivalent k tanh(kh) is given.
+/// The wavenumber k [rad/m] over depth h \[m\] whose deep-water equivalent k tanh(kh) is given.
 ///
 /// Newton's method on a function that is convex up to kh of about 1.2 and straight beyond; from a start above
 /// the root it falls monotonically.
@@ -116,13 +116,13 @@ pub fn from_deep_equivalent(deep: f64, depth: f64) -> f64 {
     k
 }
 
-/// Depth factor Φ of Kitaigorodskii on a frequency spectrum: `S_h(ω) = Φ S_∞(ω)` [1].
+/// Depth factor Φ of Kitaigorodskii on a frequency spectrum: `S_h(ω) = Φ S_∞(ω)` \[1\].
 ///
 /// ```text
 /// Φ = [k⁻³ ∂k/∂ω]_h / [k⁻³ ∂k/∂ω]_∞ = (k_∞/k)³ · (g/2ω)/c_g,   gravity waves
 /// ```
 ///
-/// - `wavenumber` k [rad/m] over `depth` h [m]
+/// - `wavenumber` k [rad/m] over `depth` h \[m\]
 /// - returns Φ from 0 to 1: 1 in deep water, ½ ω²h/g in very shallow water
 ///
 /// # References

@@ -2,13 +2,13 @@
 
 use crate::constants::GRAVITY;
 
-/// Level α of the tail [1].
+/// Level α of the tail \[1\].
 pub(super) const LEVEL: f64 = 0.0081;
 
-/// Strength β of the low-frequency cut [1].
+/// Strength β of the low-frequency cut \[1\].
 const CUT: f64 = 0.74;
 
-/// U₁₉.₅/U₁₀ [1]: the logarithmic profile over the sea at moderate wind. A 1/7 power law would give 1.10.
+/// U₁₉.₅/U₁₀ \[1\]: the logarithmic profile over the sea at moderate wind. A 1/7 power law would give 1.10.
 const MAST_WIND: f64 = 1.026;
 
 /// The spectrum of a fully developed sea.
@@ -48,7 +48,7 @@ impl PiersonMoskowitz {
         LEVEL * GRAVITY.powi(2) * omega.powi(-5) * (-cut).exp()
     }
 
-    /// Curvature spectrum B(k) = k³ S(k) [1]; 0 at k ≤ 0 and without wind.
+    /// Curvature spectrum B(k) = k³ S(k) \[1\]; 0 at k ≤ 0 and without wind.
     #[must_use]
     pub fn curvature(&self, wavenumber: f64) -> f64 {
         if wavenumber <= 0.0 || self.wind <= 0.0 {

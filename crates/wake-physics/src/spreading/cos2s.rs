@@ -55,7 +55,7 @@ impl Cos2s {
         }
     }
 
-    /// The exponent s [1] at deep-water wavenumber k [rad/m].
+    /// The exponent s \[1\] at deep-water wavenumber k [rad/m].
     #[must_use]
     pub fn exponent(&self, wavenumber: f64) -> f64 {
         let ln_x = 0.5 * (wavenumber / self.peak_wavenumber).ln();
@@ -84,7 +84,7 @@ impl Cos2s {
     }
 }
 
-/// Inverse wave age `U/c_p = U √(k_p/g)` [1].
+/// Inverse wave age `U/c_p = U √(k_p/g)` \[1\].
 fn inverse_wave_age(wind_speed: f64, peak_wavenumber: f64) -> f64 {
     wind_speed * (peak_wavenumber / GRAVITY).sqrt()
 }

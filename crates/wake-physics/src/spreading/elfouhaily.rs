@@ -29,7 +29,7 @@ impl EvenSpreading {
         Self { sea }
     }
 
-    /// Δ(k) [1] at k [rad/m].
+    /// Δ(k) \[1\] at k [rad/m].
     #[must_use]
     pub fn anisotropy(&self, wavenumber: f64) -> f64 {
         self.sea.anisotropy(wavenumber)

@@ -21,7 +21,7 @@ pub enum Spreading {
 impl Spreading {
     /// The spreading around a wind U₁₀ [m/s] of a sea with deep-water peak `k_p` [rad/m].
     ///
-    /// The even spreading is that of Elfouhaily's own sea of this wind and fetch [m].
+    /// The even spreading is that of Elfouhaily's own sea of this wind and fetch \[m\].
     #[must_use]
     pub fn new(model: SpreadingModel, wind_speed: f64, fetch: f64, peak_wavenumber: f64) -> Self {
         match model {
@@ -44,7 +44,7 @@ impl Spreading {
         }
     }
 
-    /// Second harmonic ∫D cos 2δ dδ [1]: 1 for waves all along the wind, 0 for none preferred, −1 all across.
+    /// Second harmonic ∫D cos 2δ dδ \[1\]: 1 for waves all along the wind, 0 for none preferred, −1 all across.
     #[must_use]
     pub fn second_harmonic(&self, wavenumber: f64) -> f64 {
         match self {

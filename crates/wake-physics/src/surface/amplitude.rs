@@ -17,7 +17,7 @@ const SAMPLED_PEAK: f64 = 8.0;
 /// Radius in steps within which densities are averaged over cells where the peak is not sampled.
 const AVERAGED_RADIUS: f64 = 16.0;
 
-/// Amplitudes √(2Ψ dkx dky) of the waves of a lattice [m]: twice the square is their mean variance.
+/// Amplitudes √(2Ψ dkx dky) of the waves of a lattice \[m\]: twice the square is their mean variance.
 pub(super) struct Amplitudes<'a> {
     spectrum: &'a DirectionalSpectrum,
     cell: [f64; 2],
@@ -26,7 +26,7 @@ pub(super) struct Amplitudes<'a> {
     wind: [f32; 2],
     /// Bits of k² at node 0, shifted.
     first: u32,
-    /// Nodes: amplitude without its direction [m], and shape: s/2 or Δ [1].
+    /// Nodes: amplitude without its direction \[m\], and shape: s/2 or Δ \[1\].
     nodes: Vec<[f32; 2]>,
 }
 

@@ -73,7 +73,7 @@ impl<'a> Draw<'a> {
     }
 
     /// Even and odd parts ½(c(k) ± c*(−k)) of the amplitudes of all lines, phases at pixel `[0, 0]`, and their
-    /// mean variance [m²].
+    /// mean variance \[m²\].
     pub(super) fn run(&self) -> ([Vec<Complex32>; 2], f64) {
         let rows = self.lattice.rows;
         let mut even = vec![Complex32::ZERO; self.lattice.lines() * rows];

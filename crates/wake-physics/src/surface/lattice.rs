@@ -35,7 +35,7 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice for a raster and a peak wavelength [m].
+    /// The lattice for a raster and a peak wavelength \[m\].
     ///
     /// Each period holds the raster and a guard of 4 peak wavelengths (at most a quarter of the raster), so that
     /// opposite edges are uncorrelated, and 8 peak wavelengths (at most 1024 pixels).

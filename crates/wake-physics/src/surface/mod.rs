@@ -51,7 +51,7 @@ impl Surface {
     ///
     /// - `spectrum` what the waves are drawn from
     /// - `seed` which of all seas
-    /// - `time` t [s], from 0 to 10⁵: each wave has moved along its k by ωt
+    /// - `time` t \[s\], from 0 to 10⁵: each wave has moved along its k by ωt
     /// - `raster` where the sea will be seen, margins included
     #[must_use]
     pub fn new(spectrum: &DirectionalSpectrum, seed: u64, time: f64, raster: &Raster) -> Self {
@@ -92,13 +92,13 @@ impl Surface {
         self.carried <= 0.0
     }
 
-    /// Variance ⟨ζ²⟩ that the waves have on average over seeds [m²].
+    /// Variance ⟨ζ²⟩ that the waves have on average over seeds \[m²\].
     #[must_use]
     pub fn variance(&self) -> f64 {
         self.carried
     }
 
-    /// Share of the resolved variance, |k| from 0 to π/spacing, that no wave of the lattice carries [1]: waves
+    /// Share of the resolved variance, |k| from 0 to π/spacing, that no wave of the lattice carries \[1\]: waves
     /// longer than the period. 0 to about 10⁻³, the accuracy of sum and integral, where the peak is resolved.
     #[must_use]
     pub fn left_out(&self) -> f64 {
