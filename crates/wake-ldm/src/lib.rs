@@ -15,6 +15,9 @@ pub mod scheduler;
 pub mod weights;
 
 pub mod pipeline;
+
+#[cfg(feature = "train")]
+pub mod dataset;
 #[cfg(feature = "flex")]
 mod self_check;
 

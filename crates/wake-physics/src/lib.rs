@@ -67,5 +67,5 @@ pub use error::{Error, Result};
 pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
-pub use simulate::{Method, Seconds, Simulation, simulate, simulate_with};
+pub use simulate::{Method, Seconds, Simulation, labels_of, simulate, simulate_with};
 pub use track::Track;

@@ -1,6 +1,6 @@
 //! From a scene to a SAR image: the only file that knows the order of the stages.
 //!
-//! `stages` calls the method of each stage, `clock` times them, `report` writes what came out.
+//! `stages` calls the method of each stage, `label` says what is where, `clock` times, `report` writes what came out.
 
 use crate::error::Result;
 use crate::labels::Labels;
@@ -10,10 +10,12 @@ use crate::scene::Scene;
 use crate::setup::Setup;
 use clock::Clock;
 pub use clock::Seconds;
+pub use label::labels_of;
 use serde::Serialize;
 use stages::Run;
 
 mod clock;
+mod label;
 mod report;
 mod stages;
 
@@ -102,7 +104,7 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
     seconds.imaging = clock.lap();
     let speckled = run.speckle(&plan, &intensity);
     seconds.speckle = clock.lap();
-    let labels = run.labels();
+    let labels = labels_of(scene);
     let [
         elevation,
         slope_x,

@@ -1,15 +1,14 @@
 //! One function a stage: what it takes from the plan, and which method it calls.
 
 use super::Method;
+use super::label::echo_displacement;
 use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
-use crate::labels::{Labels, Track as LabelTrack};
 use crate::nufft;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::sar::direct::DirectImage;
 use crate::sar::echo::ship_cross_section;
-use crate::sar::geometry::{azimuth_displacement, ship_radial_velocity};
 use crate::sar::speckle::speckle;
 use crate::sar::{AzimuthResolution, Echo, Imaging, Sources};
 use crate::scattering::{BackscatterTable, FacetFields};
@@ -226,30 +225,8 @@ impl<'a> Run<'a> {
             length: ship.length,
             beam: ship.beam,
             cross_section: ship_cross_section(self.scene.radar.frequency, displacement),
-            displacement: self.displacement(),
+            displacement: echo_displacement(self.scene),
         })
-    }
-
-    /// Azimuth displacement of the ship's echo \[m\].
-    fn displacement(&self) -> f64 {
-        let Some(ship) = &self.scene.ship else {
-            return 0.0;
-        };
-        let velocity = ship_radial_velocity(ship.speed, ship.heading, self.setup.incidence);
-        azimuth_displacement(self.setup.range_to_velocity, velocity)
-    }
-
-    pub(super) fn labels(&self) -> Labels {
-        let ship = self.scene.ship.as_ref().zip(self.setup.wake.as_ref());
-        let track = ship.map(|(ship, wake)| LabelTrack {
-            position: wake.track.position,
-            heading: ship.heading,
-            speed: ship.speed,
-            length: ship.length,
-            beam: ship.beam,
-            azimuth_displacement: self.displacement(),
-        });
-        Labels::new(track.as_ref(), &self.setup.image)
     }
 
     pub(super) fn speckle(&self, plan: &Plan, intensity: &Field) -> Field {
