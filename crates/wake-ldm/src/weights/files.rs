@@ -31,7 +31,25 @@ pub(super) struct Stored<'a> {
 /// The files of one model, mapped into memory.
 #[derive(Debug)]
 pub(super) struct MappedFiles {
-    files: Vec<(PathBuf, Mmap)>,
+    files: Vec<(PathBuf, Bytes)>,
+}
+
+/// The bytes of a file on disk, or of one that is part of the program.
+#[derive(Debug)]
+enum Bytes {
+    Mapped(Mmap),
+    Embedded(&'static [u8]),
+}
+
+impl std::ops::Deref for Bytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Embedded(bytes) => bytes,
+        }
+    }
 }
 
 impl MappedFiles {
@@ -44,10 +62,17 @@ impl MappedFiles {
         };
         let files = paths
             .into_iter()
-            .map(|path| Ok((path.clone(), map(&path)?)));
+            .map(|path| Ok((path.clone(), Bytes::Mapped(map(&path)?))));
         Ok(Self {
             files: files.collect::<Result<_>>()?,
         })
+    }
+
+    /// A file that is part of the program; `name` only serves messages.
+    pub(super) fn embedded(name: &str, bytes: &'static [u8]) -> Self {
+        Self {
+            files: vec![(PathBuf::from(name), Bytes::Embedded(bytes))],
+        }
     }
 
     /// Refuses files whose header has an entry that would change the numbers.

@@ -113,7 +113,31 @@ pub fn load_as<M: Module>(
     precision: Precision,
 ) -> Result<M> {
     precision.check(&model.devices())?;
-    let files = MappedFiles::open(path)?;
+    load_files(model, layout, path, precision, &MappedFiles::open(path)?)
+}
+
+/// Reads weights that are part of the program, as f32; `name` only serves messages.
+///
+/// # Errors
+///
+/// As [`load_as`], for what is no weight file or that of another model.
+pub fn load_bytes<M: Module>(
+    model: M,
+    layout: Layout,
+    name: &str,
+    bytes: &'static [u8],
+) -> Result<M> {
+    let files = MappedFiles::embedded(name, bytes);
+    load_files(model, layout, Path::new(name), Precision::F32, &files)
+}
+
+fn load_files<M: Module>(
+    model: M,
+    layout: Layout,
+    path: &Path,
+    precision: Precision,
+    files: &MappedFiles,
+) -> Result<M> {
     let stored = files.tensors()?;
     let expected = shapes(&model, layout);
     let mismatch = compare(&expected, &stored);

@@ -1,11 +1,15 @@
 //! A sentence (or a scene) becomes a radar image with the diffusion model.
 //!
 //! ```text
+//! cargo run --release --example generate
+//! cargo run --release --example generate -- --prompt "a ship at 8 m/s toward 135 degrees, wind 5 m/s" --count 8
 //! cargo run --release --example generate -- --weights stable-diffusion-v1-4 --steps 20
-//! cargo run --release --example generate -- --weights DIR --scene scene.toml --count 4 --seed 7
 //! ```
 //!
-//! Writes `image.png` (`image-0.png`, `image-1.png`, … with `--count`) and `report.json`.
+//! Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and
+//! `report.json`; the model that lies in `wake-ldm` also writes `labels.json`.
+
+mod small;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -29,12 +33,12 @@ struct Arguments {
     /// Scene file (TOML) to put into words.
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Folder of the model, in diffusers layout.
+    /// Folder of a model: one that `train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Steps of the scheduler.
-    #[arg(long, default_value_t = 50)]
-    steps: usize,
+    /// Steps from noise to image [default: 8, or 50 in diffusers layout]
+    #[arg(long)]
+    steps: Option<usize>,
     /// ddpm, ddim, pndm, euler, euler-ancestral, dpm++, heun, lms, unipc, lcm or flow-match-euler;
     /// without it, the model's own.
     #[arg(long, value_name = "NAME")]
@@ -73,10 +77,14 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let weights = arguments.weights.as_ref().ok_or(
-        "--weights is missing: give the folder of a model in diffusers layout, such as Stable \
-         Diffusion v1.4 (this build has no model of its own yet)",
-    )?;
+    match &arguments.weights {
+        Some(weights) if !small::is_small(weights) => diffusers(arguments, weights),
+        _ => small::run(arguments),
+    }
+}
+
+/// A model in the layout of diffusers.
+fn diffusers(arguments: &Arguments, weights: &Path) -> Result<(), Box<dyn Error>> {
     let prompt = prompt(arguments)?;
     let device = device(&arguments.device)?;
     let begin = Instant::now();
@@ -90,10 +98,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let files = write_images(images, &arguments.out)?;
     let report = json!({
         "prompt": prompt, "negative": arguments.negative, "seed": arguments.seed,
-        "steps": arguments.steps, "guidance": arguments.guidance, "count": arguments.count,
+        "steps": arguments.steps.unwrap_or(50), "guidance": arguments.guidance, "count": arguments.count,
         "scheduler": request_scheduler(arguments, &pipeline)?.to_json(),
         "device": arguments.device, "weights": weights, "files": files, "seconds": seconds,
     });
+    finish(arguments, &report, &files)
+}
+
+/// Writes the report and says what was made.
+fn finish(arguments: &Arguments, report: &Value, files: &[String]) -> Result<(), Box<dyn Error>> {
     std::fs::write(arguments.out.join("report.json"), format!("{report:#}\n"))?;
     if arguments.json {
         println!("{report:#}");
@@ -131,7 +144,7 @@ fn request(arguments: &Arguments, prompt: &str, pipeline: &Pipeline) -> wake_ldm
     Ok(Request::new(prompt)
         .with_negative(arguments.negative.as_str())
         .with_guidance(arguments.guidance)
-        .with_steps(arguments.steps)
+        .with_steps(arguments.steps.unwrap_or(50))
         .with_scheduler(request_scheduler(arguments, pipeline)?)
         .with_count(arguments.count)
         .with_seed(arguments.seed))
