@@ -207,3 +207,7 @@ fn turbulent([along, across]: [f64; 2]) -> f64 {
     }
     (-0.5 * (across / 40.0).powi(2)).exp()
 }
+
+#[cfg(test)]
+#[path = "maps_tests.rs"]
+mod tests;

@@ -1,7 +1,7 @@
 //! The small model as one call: a sentence or a scene becomes a radar image with labels.
 
 mod image;
-// mod pretrained;
+mod pretrained;
 
 use std::time::Instant;
 
@@ -284,3 +284,6 @@ impl Drawn {
         WakeImage::new(grey, scene, self.seconds)
     }
 }
+
+#[cfg(all(test, feature = "flex"))]
+mod tests;

@@ -20,8 +20,12 @@ pub struct WakeModelConfig {
     pub spacing: f64,
     /// Channels of the latent image, at an eighth of the size.
     pub latent_channels: usize,
-    /// Widths of the U-Net's three levels.
-    pub widths: [usize; 3],
+    /// Squares of latent pixels that the U-Net sees as one pixel: their side.
+    pub fold: usize,
+    /// Width of each level of the U-Net; each but the last halves the image.
+    pub widths: Vec<usize>,
+    /// Whether a level attends to words and to itself.
+    pub attention: Vec<bool>,
     /// Channels of a token.
     pub text_width: usize,
     /// Layers of the text transformer.
@@ -35,16 +39,18 @@ pub struct WakeModelConfig {
 }
 
 impl WakeModelConfig {
-    /// The shape that ships: 256 × 256 pixels of 4 m, 16 latent channels.
+    /// The shape that ships: 256 × 256 pixels of 4 m, 16 latent channels, few enough sums for two cores to learn.
     pub fn standard(vocabulary: &Vocabulary) -> Self {
         Self {
             image_size: 256,
             spacing: 4.0,
             latent_channels: 16,
-            widths: [48, 96, 128],
-            text_width: 128,
+            fold: 2,
+            widths: vec![64, 96],
+            attention: vec![false, true],
+            text_width: 64,
             text_layers: 2,
-            map_channels: 64,
+            map_channels: 32,
             norm_groups: 16,
             vocabulary: vocabulary.known().to_vec(),
         }
@@ -72,13 +78,14 @@ impl WakeModelConfig {
     /// [`Error::OutOfRange`] or [`Error::InvalidOption`] with the option at fault.
     pub fn validate(&self) -> Result<()> {
         check_range("image_size", self.image_size as f64, 32.0, 4096.0)?;
-        if !self.image_size.is_multiple_of(32) {
+        if !self.image_size.is_multiple_of(32) || !self.latent_size().is_multiple_of(self.fold.max(1)) {
             return Err(Error::InvalidOption {
                 option: "image_size".to_owned(),
                 value: self.image_size.to_string(),
-                expected: "a multiple of 32".to_owned(),
+                expected: "a multiple of 32 and of 8 fold".to_owned(),
             });
         }
+        check_range("fold", self.fold as f64, 1.0, 4.0)?;
         check_range("spacing", self.spacing, 0.1, 100.0)?;
         check_range("latent_channels", self.latent_channels as f64, 1.0, 64.0)?;
         check_range("map_channels", self.map_channels as f64, 1.0, 4096.0)?;
@@ -112,11 +119,15 @@ impl WakeModelConfig {
     /// The U-Net, which also sees the maps.
     pub(super) fn unet(&self) -> UNetConfig {
         let condition = FEATURES + self.text_width;
-        UNetConfig::small(self.latent_channels, self.text_width, Some(condition))
-            .with_in_channels(self.latent_channels + self.map_channels)
-            .with_block_out_channels(self.widths.to_vec())
+        let folded = self.latent_channels * self.fold * self.fold;
+        let upward = self.attention.iter().rev().copied().collect();
+        UNetConfig::small(folded, self.text_width, Some(condition))
+            .with_in_channels(folded + self.map_channels)
+            .with_block_out_channels(self.widths.clone())
+            .with_down_attention(self.attention.clone())
+            .with_up_attention(upward)
             .with_heads(self.widths.iter().map(|&width| (width / 32).max(1)).collect())
             .with_norm_groups(self.norm_groups)
-            .with_sample_size(self.latent_size())
+            .with_sample_size(self.latent_size() / self.fold)
     }
 }

@@ -8,6 +8,7 @@ use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::input::{Known, ModelInput, Words};
+use crate::autoencoder::patch::{depth_to_space, space_to_depth};
 use crate::conditioning::{FEATURES, PATCH, PLACES, WAVES};
 use crate::nn::{cast_to, conv1x1, conv3x3};
 use crate::text::ClipText;
@@ -33,6 +34,7 @@ pub struct WakeModel {
     grey_in: Linear,
     grey_out: Linear,
     unet: UNet,
+    fold: usize,
 }
 
 /// What a model has made of the conditions: the same for every step.
@@ -42,7 +44,7 @@ pub struct Encoded {
     pub context: Tensor<3>,
     /// Numbers and summary of the words, `[batch, FEATURES + text_width]`.
     pub condition: Tensor<2>,
-    /// `[batch, map_channels, rows, columns]`.
+    /// `[batch, map_channels, rows, columns]` of what the U-Net sees.
     pub maps: Tensor<4>,
 }
 
@@ -62,10 +64,11 @@ impl WakeModelConfig {
             text: self.text().init(device),
             reader: linear(self.text_width, FEATURES),
             map_in: conv1x1(WAVES * PATCH * PATCH + PLACES, self.map_channels, device),
-            map_out: conv3x3(self.map_channels, self.map_channels, device),
+            map_out: conv3x3(self.map_channels * self.fold * self.fold, self.map_channels, device),
             grey_in: linear(condition, 128),
             grey_out: linear(128, 1),
             unet: self.unet().init(device),
+            fold: self.fold,
         }
     }
 }
@@ -98,7 +101,8 @@ impl WakeModel {
     pub fn encode(&self, known: Known, context: Tensor<3>, summary: Tensor<2>) -> Encoded {
         let dtype = self.map_in.weight.val().dtype();
         let maps = cast_to(Tensor::cat(vec![known.waves, known.places], 1), dtype);
-        let maps = self.map_out.forward(silu(self.map_in.forward(maps)));
+        let maps = space_to_depth(silu(self.map_in.forward(maps)), self.fold);
+        let maps = self.map_out.forward(maps);
         Encoded {
             context,
             condition: Tensor::cat(vec![cast_to(known.numbers, dtype), summary], 1),
@@ -120,11 +124,13 @@ impl WakeModel {
     pub fn velocity(&self, input: ModelInput, encoded: &Encoded) -> Tensor<4> {
         let dtype = input.latents.dtype();
         let maps = cast_to(encoded.maps.clone(), dtype);
-        self.unet.forward(UNetInput {
-            sample: Tensor::cat(vec![input.latents, maps], 1),
+        let folded = space_to_depth(input.latents, self.fold);
+        let velocity = self.unet.forward(UNetInput {
+            sample: Tensor::cat(vec![folded, maps], 1),
             timesteps: input.sigma * STEPS,
             context: encoded.context.clone(),
             condition: Some(encoded.condition.clone()),
-        })
+        });
+        depth_to_space(velocity, self.fold)
     }
 }

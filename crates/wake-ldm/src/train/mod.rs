@@ -11,6 +11,7 @@ mod adam;
 mod average;
 mod checkpoint;
 mod diffusion;
+mod fine_tune;
 mod latents;
 mod loss;
 mod metrics;
@@ -22,6 +23,7 @@ pub use adam::{Adam, AdamOptions};
 pub use average::Average;
 pub use checkpoint::{Checkpoint, Tensors};
 pub use diffusion::{Diffusion, DiffusionOptions, Losses};
+pub use fine_tune::{FineTune, FineTuneOptions, Frozen};
 pub use latents::{Example, LatentSet};
 pub use loss::{FlowDraw, min_snr_weights};
 pub use metrics::Metrics;
@@ -31,3 +33,5 @@ pub use trainer::{StepReport, Trainer, TrainerOptions};
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;
+#[cfg(all(test, feature = "flex"))]
+mod fine_tune_tests;

@@ -16,7 +16,7 @@ fn config() -> WakeModelConfig {
     WakeModelConfig {
         image_size: SIZE,
         latent_channels: 4,
-        widths: [16, 16, 32],
+        widths: vec![16, 32],
         text_width: 32,
         text_layers: 1,
         map_channels: 8,

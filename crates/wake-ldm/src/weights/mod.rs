@@ -4,6 +4,7 @@ mod atomic;
 mod files;
 mod header;
 mod lora;
+mod low_rank;
 mod names;
 mod precision;
 mod save;
@@ -25,6 +26,7 @@ use files::{MappedFiles, Stored};
 use names::Path as ModulePath;
 
 pub use lora::merge_lora;
+pub use low_rank::LowRank;
 pub use names::Layout;
 pub use precision::Precision;
 pub use save::{save_as, save_folder};
