@@ -39,6 +39,7 @@ pub mod constants;
 mod raster;
 pub mod quadrature;
 mod memory;
+mod vectorize;
 pub mod output;
 pub mod fft;
 mod random;
