@@ -106,23 +106,6 @@ impl TurbulentWake {
             });
         field
     }
-
-    /// Distance astern of the stern \[m\] at which the damping on the centreline has fallen to `threshold`;
-    /// 0 where it never reaches it.
-    ///
-    /// - `threshold` \[1\], above 0
-    #[must_use]
-    pub fn extent(&self, threshold: f64) -> f64 {
-        let decades = (STERN_DAMPING / threshold).ln().max(0.0);
-        self.speed * RECOVERY_TIME * decades
-    }
-
-    /// The centreline as a segment on the sea \[m\], from the stern to the end of its [`Self::extent`].
-    #[must_use]
-    pub fn centreline(&self, threshold: f64) -> [[f64; 2]; 2] {
-        let stern = -0.5 * self.length;
-        [stern, stern - self.extent(threshold)].map(|forward| self.track.on_sea([forward, 0.0]))
-    }
 }
 
 /// The numbers j below `count` with |start + j·step| ≤ reach.
@@ -185,7 +168,6 @@ mod tests {
         };
         let raster = Raster::image(20, 30, 10.0);
         assert_eq!(still.damping_field(&raster), Field::constant(&raster, 0.0));
-        assert_eq!(still.extent(0.1), 0.0);
     }
 
     #[test]
@@ -204,11 +186,19 @@ mod tests {
     }
 
     #[test]
-    fn centreline_ends_at_the_threshold() {
-        let wake = wake();
-        let [stern, end] = wake.centreline(0.2).map(|p| wake.track.seen_from_ship(p));
-        assert!((stern[0] + 97.5).abs() < 1e-9 && end[1].abs() < 1e-8);
-        assert!((wake.damping(end) - 0.2).abs() < 1e-9);
-        assert_eq!(wake.extent(0.9), 0.0);
+    fn columns_within_reach_are_those_counted_one_by_one() {
+        for (start, step, reach) in [
+            (-10.0, 0.7, 4.0),
+            (3.0, -0.3, 2.0),
+            (50.0, 1.0, 5.0),
+            (-2.0, -1.0, 1.0),
+            (1.0, 0.0, 2.0),
+            (3.0, 0.0, 2.0),
+        ] {
+            let inside = |&j: &usize| (start + j as f64 * step).abs() <= reach;
+            let counted: Vec<usize> = (0..40).filter(inside).collect();
+            let range: Vec<usize> = within(start, step, reach, 40).collect();
+            assert_eq!(range, counted, "{start} {step} {reach}");
+        }
     }
 }
