@@ -95,7 +95,6 @@ impl Scene {
     }
 }
 
-/// Parses a TOML value; what is no TOML value is a string; nothing is `None`.
 /// The message of an error of TOML on one line, with the number of the line it is about.
 fn with_line(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().trim().replace('\n', ", ");
@@ -108,6 +107,7 @@ fn with_line(text: &str, error: &toml::de::Error) -> String {
     format!("line {}, '{line}': {message}", number + 1)
 }
 
+/// Parses a TOML value; what is no TOML value is a string; nothing is `None`.
 fn toml_value(text: &str) -> Option<toml::Value> {
     if text.is_empty() {
         return None;
