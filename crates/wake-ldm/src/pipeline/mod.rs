@@ -9,6 +9,7 @@ mod guidance;
 mod load;
 mod request;
 mod sampling;
+mod save;
 
 use std::collections::HashMap;
 use std::path::Path;
