@@ -106,10 +106,10 @@ fn small(device: &Device) -> Pipeline {
     Pipeline::new(parts, device)
 }
 
-/// Our own small models with random weights: in f32 the same image, in f16 one that is near, the vocabulary
-/// from the crate, the size of the images as asked for.
+/// Our own small models with random weights, the vocabulary from the crate. In f32 the image is the same but
+/// for the order of sums (matrices come back as transposed views), 1e-6 through some thirty layers; in f16,
+/// weights are rounded by 5e-4.
 #[test]
-#[allow(clippy::float_cmp, reason = "nothing is computed in between")]
 fn small_models_come_back_in_every_precision() {
     let (_, device) = devices().remove(0);
     let pipeline = small(&device);
@@ -120,7 +120,7 @@ fn small_models_come_back_in_every_precision() {
     let expected = generate(&pipeline);
     assert_eq!(expected.dims(), [1, 1, 32, 32]);
     let expected = numbers(&expected);
-    for (precision, allowed) in [(Precision::F32, 0.0), (Precision::F16, 0.02)] {
+    for (precision, allowed) in [(Precision::F32, 1e-5), (Precision::F16, 0.02)] {
         let folder = tempfile::tempdir().unwrap();
         pipeline.save(folder.path(), precision).unwrap();
         let again = Pipeline::load(folder.path(), &device).unwrap();

@@ -143,10 +143,21 @@ impl Tap<'_> {
         let [batch, channels, rows, columns] = x.dims();
         let norm = GroupNorm::new(self.groups(), channels, 1e-6, self.device);
         let norm = self.load(norm, ".group_norm");
-        let parts = ["to_q", "to_k", "to_v", "to_out.0"].map(|name| {
-            let path = format!("{}.{name}", self.path);
+        // Today's names, and those of files written before 2023.
+        let names = [
+            ("to_q", "query"),
+            ("to_k", "key"),
+            ("to_v", "value"),
+            ("to_out.0", "proj_attn"),
+        ];
+        let parts = names.map(|(name, old)| {
+            let [today, old] = [name, old].map(|name| format!("{}.{name}", self.path));
+            let path = if self.weights.has(&format!("{today}.weight")) {
+                today
+            } else {
+                old
+            };
             let [weight, bias] = ["weight", "bias"].map(|end| format!("{path}.{end}"));
-            assert!(self.weights.has(&weight), "{weight}");
             (
                 self.weights.tensor::<2>(&weight, self.device).transpose(),
                 self.weights.tensor::<1>(&bias, self.device),
