@@ -66,7 +66,7 @@ impl Factors<'_> {
 ///
 /// As [`load`](super::load); a layer that the model does not have, or whose factors do not fit it, is a
 /// [`Error::WeightsMismatch`], and so is a file without any layer of this prefix.
-/// [`Error::Unsupported`] for a file trained with an option that changes the sum, such as DoRA.
+/// [`Error::Unsupported`] for a file trained with an option that changes the sum, such as `use_dora`.
 ///
 /// # References
 ///
