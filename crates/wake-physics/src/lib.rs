@@ -36,10 +36,10 @@
 // In the order of the data flow; docs/architecture.md is the same list.
 mod error;
 pub mod constants;
+mod vectorize;
 mod raster;
 pub mod quadrature;
 mod memory;
-mod vectorize;
 pub mod output;
 pub mod fft;
 mod random;
