@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let labels: Vec<_> = images.iter().map(|image| &image.labels).collect();
     std::fs::write(arguments.out.join("labels.json"), format!("{:#}\n", json!(labels)))?;
     let report = json!({
-        "prompt": prompt(arguments)?, "seed": arguments.seed, "steps": sampler.steps(),
+        "prompt": prompt(arguments)?.0, "seed": arguments.seed, "steps": sampler.steps(),
         "count": images.len(), "device": arguments.device, "weights": arguments.weights, "files": files,
         "seconds": {
             "load": load, "text": seconds.text, "denoise": seconds.denoise, "decode": seconds.decode,
@@ -63,7 +63,7 @@ fn refuse_options(arguments: &Arguments) -> Result<(), String> {
 /// All images as one batch.
 fn sample(sampler: &WakeSampler, arguments: &Arguments) -> Result<Vec<WakeImage>, Box<dyn Error>> {
     let Some(path) = &arguments.scene else {
-        let prompt = prompt(arguments)?;
+        let (prompt, _) = prompt(arguments)?;
         return Ok(sampler.sample_many(&vec![prompt.as_str(); arguments.count], arguments.seed)?);
     };
     let scene = Scene::read(path)?;
