@@ -17,6 +17,7 @@ fn manifest() -> Manifest {
         "scene.ship.echo = true",
         "draw.ranges.open_sea = 0.4",
         "speckle = true",
+        "draw.ranges.ship_length = [20, 300]",
     ];
     let recipe = Recipe::default().with_assignments(&changes).unwrap();
     Manifest::new(recipe, 11, COUNT).unwrap()
@@ -147,6 +148,20 @@ fn a_killed_run_continues() {
     // Finished already.
     assert_eq!(made(folder.path(), &manifest()), 0);
     assert_eq!(tree(folder.path()), whole);
+}
+
+/// Numbers that a reader of JSON may get wrong in the last place do not make a set foreign to itself.
+#[test]
+fn a_set_with_awkward_numbers_continues() {
+    let changes = [
+        "scene.ship.position = [65.43210987654321, 1.2345678901234567e-23]",
+        "draw.ranges.place = \"fixed\"",
+    ];
+    let recipe = manifest().recipe.with_assignments(&changes).unwrap();
+    let manifest = Manifest::new(recipe, 3, 4).unwrap();
+    let folder = TempDir::new().unwrap();
+    assert_eq!(made(folder.path(), &manifest), 4);
+    assert_eq!(made(folder.path(), &manifest), 0);
 }
 
 #[test]

@@ -61,7 +61,7 @@ proptest! {
         if let Some(ship) = &scene.ship {
             prop_assert!(within(ship.speed, ranges.ship_speed, 0.1));
             prop_assert!(turned_within(ship.heading, ranges.ship_heading));
-            prop_assert!(within(ship.length, ranges.ship_length, 0.0));
+            prop_assert!(within(ship.length, ranges.ship_length, 0.1));
             prop_assert!((ship.beam / ship.length - 26.0 / 195.0).abs() < 1e-12);
             // 256 pixels of 4 m around pixel 128.
             for coordinate in [ship.position[0], -ship.position[1]] {
