@@ -192,8 +192,16 @@ mod tests {
         });
         // Five standard deviations of a binomial count.
         let allowed = 5.0 * (0.09 * n as f64).sqrt();
-        assert!(tenths.iter().all(|&c| (f64::from(c) - 0.1 * n as f64).abs() < allowed));
-        for other in [source.uniform(4, 0), source.uniform(3, 1 << 32), NoiseSource::new(8).uniform(3, 0)] {
+        assert!(
+            tenths
+                .iter()
+                .all(|&c| (f64::from(c) - 0.1 * n as f64).abs() < allowed)
+        );
+        for other in [
+            source.uniform(4, 0),
+            source.uniform(3, 1 << 32),
+            NoiseSource::new(8).uniform(3, 0),
+        ] {
             assert!((other - numbers[0]).abs() > 1e-9);
         }
     }

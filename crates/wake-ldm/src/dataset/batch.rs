@@ -140,3 +140,103 @@ impl Iterator for Batches {
         Some(pairs.map(|pairs| ToBatch.batch(pairs, &self.device)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::{Manifest, Recipe, write};
+    use burn::data::dataloader::DataLoaderBuilder;
+    use burn::data::dataset::transform::PartialDataset;
+
+    fn source() -> Simulated {
+        let changes = [
+            "scene.grid.rows = 16",
+            "scene.grid.columns = 24",
+            "scene.grid.spacing = 20",
+        ];
+        Simulated::new(Recipe::default().with_assignments(&changes).unwrap(), 5).unwrap()
+    }
+
+    fn loading(threads: usize, start_index: u64) -> Loading {
+        Loading {
+            batch_size: 3,
+            threads,
+            start_index,
+        }
+    }
+
+    /// Indices and pixels of the first batches.
+    fn first(source: impl Endless, loading: Loading, batches: usize) -> Vec<(Vec<u64>, Vec<f32>)> {
+        let of = |batch: Batch| {
+            assert_eq!(batch.images.dims(), [3, 1, 16, 24]);
+            let indices = batch.pairs.iter().map(|pair| pair.index).collect();
+            (indices, batch.images.into_data().try_to_vec().unwrap())
+        };
+        let loader = Batches::new(source, loading, &Device::default()).unwrap();
+        loader
+            .take(batches)
+            .map(|batch| of(batch.unwrap()))
+            .collect()
+    }
+
+    #[test]
+    fn batches_do_not_depend_on_the_threads_and_start_anywhere() {
+        let one = first(source(), loading(1, 0), 4);
+        assert_eq!(one[3].0, [9, 10, 11]);
+        for threads in [2, 3] {
+            assert_eq!(first(source(), loading(threads, 0), 4), one);
+        }
+        assert_eq!(first(source(), loading(2, 6), 2), one[2..]);
+    }
+
+    #[test]
+    fn images_are_the_grey_of_the_pairs_from_minus_one_to_one() {
+        let batch = &first(source(), loading(2, 0), 1)[0].1;
+        let greys = (0..3).flat_map(|i| source().pair(i).unwrap().image.pixels);
+        let expected: Vec<f32> = greys.map(|grey| 2.0 * grey - 1.0).collect();
+        assert_eq!(*batch, expected);
+        assert!(batch.iter().all(|v| (-1.0..=1.0).contains(v)));
+        let distinct = batch.iter().any(|v| (v - batch[0]).abs() > 0.01);
+        assert!(distinct, "a picture, not one grey");
+    }
+
+    /// The same pairs through the data loader of burn, in its own order.
+    #[test]
+    fn burn_loads_them_too() {
+        let device = Device::default();
+        let loader = DataLoaderBuilder::new(ToBatch)
+            .batch_size(3)
+            .num_workers(2)
+            .set_device(device)
+            .build(PartialDataset::new(source(), 0, 6));
+        let mut batches: Vec<(Vec<u64>, Vec<f32>)> = loader
+            .iter()
+            .map(|batch| {
+                let batch = batch.unwrap();
+                let indices = batch.pairs.iter().map(|pair| pair.index).collect();
+                (indices, batch.images.into_data().try_to_vec().unwrap())
+            })
+            .collect();
+        batches.sort_by(|a, b| a.0.cmp(&b.0));
+        assert_eq!(batches, first(source(), loading(1, 0), 2));
+    }
+
+    #[test]
+    fn a_folder_is_walked_in_another_order_each_epoch() {
+        let path = tempfile::tempdir().unwrap();
+        let manifest = Manifest::new(source().recipe().clone(), 5, 6).unwrap();
+        write(path.path(), &manifest, 2, |_| ()).unwrap();
+        let folder = Folder::open(path.path()).unwrap();
+        assert_eq!(Dataset::len(&folder), 6);
+        assert_eq!(folder.get(2).unwrap().index, 2);
+        let walk = |start| first(Epochs::new(folder.clone(), 9), loading(2, start), 6);
+        let indices: Vec<u64> = walk(0).into_iter().flat_map(|batch| batch.0).collect();
+        for epoch in indices.chunks(6) {
+            let mut sorted = epoch.to_vec();
+            sorted.sort_unstable();
+            assert_eq!(sorted, [0, 1, 2, 3, 4, 5]);
+        }
+        assert_ne!(indices[..6], indices[6..12]);
+        assert_eq!(walk(6)[..4], walk(0)[2..]);
+    }
+}

@@ -24,3 +24,7 @@ pub(super) fn boxes(labels: &Labels, echo: bool) -> Vec<(u32, Box2)> {
 fn hundredths(value: f64) -> f64 {
     (100.0 * value).round() / 100.0
 }
+
+#[cfg(test)]
+#[path = "label_tests.rs"]
+mod tests;

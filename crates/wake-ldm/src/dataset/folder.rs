@@ -96,3 +96,7 @@ fn read_image(path: &Path, [rows, columns]: [usize; 2]) -> Result<Grey> {
     }
     Ok(Grey::of_levels(image.as_raw(), rows, columns))
 }
+
+#[cfg(test)]
+#[path = "folder_tests.rs"]
+mod tests;

@@ -2,7 +2,6 @@
 
 use super::layout::{Layout, Manifest, broken, cannot};
 use super::row::Row;
-use super::scenes::Simulated;
 use crate::error::Result;
 use std::fs::{File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
@@ -35,7 +34,7 @@ impl Log {
         let text = std::fs::read(&path).map_err(failed)?;
         let whole = text.iter().rposition(|&b| b == b'\n').map_or(0, |n| n + 1);
         let rows = parse(&path, &text[..whole], manifest)?;
-        check(&path, &rows, &manifest.source()?, echo(manifest))?;
+        check(&path, &text[..whole], &rows, manifest)?;
         let length = whole as u64;
         file.set_len(length).map_err(failed)?;
         file.seek(SeekFrom::Start(length)).map_err(failed)?;
@@ -96,15 +95,15 @@ pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Row
     lines.map(parse).collect()
 }
 
-/// Checks that rows are those that the source makes.
-fn check(path: &Path, rows: &Rows, source: &Simulated, echo: bool) -> Result<()> {
-    for (at, (index, row)) in rows.iter().enumerate() {
-        if *row != Row::of(&source.pair_without_image(*index)?, echo) {
-            return Err(broken(
-                path,
-                at + 1,
-                format!("not the line of pair {index} of this recipe and seed"),
-            ));
+/// Checks that the lines are those that this set makes, byte for byte.
+fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<()> {
+    let (source, echo) = (manifest.source()?, echo(manifest));
+    let lines = text.split_inclusive(|&b| b == b'\n');
+    for (at, (found, (index, _))) in lines.zip(rows).enumerate() {
+        let row = Row::of(&source.pair_without_image(*index)?, echo);
+        if found != line(&row)?.as_bytes() {
+            let message = format!("not the line of pair {index} of this recipe and seed");
+            return Err(broken(path, at + 1, message));
         }
     }
     Ok(())

@@ -104,3 +104,73 @@ impl<T> Drop for Ordered<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::time::Duration;
+
+    #[test]
+    fn results_come_in_order_whoever_is_slow() {
+        for threads in 1..=5 {
+            let squares = Ordered::new(3..60, threads, |n| {
+                std::thread::sleep(Duration::from_micros(n * 7919 % 500));
+                Ok(n * n)
+            });
+            let squares: Vec<u64> = squares.unwrap().map(Result::unwrap).collect();
+            assert_eq!(squares, (3..60).map(|n| n * n).collect::<Vec<_>>());
+        }
+        assert_eq!(Ordered::new(0..0, 3, Ok).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn each_thread_has_a_pool_of_its_own() {
+        let pools = Ordered::new(0..4, 2, |_| Ok(rayon::current_num_threads())).unwrap();
+        assert!(pools.map(Result::unwrap).all(|threads| threads == 1));
+    }
+
+    #[test]
+    fn an_error_is_passed_on_in_its_place() {
+        let work = |n| match n {
+            5 => Err(Error::Recipe {
+                message: "five".to_owned(),
+            }),
+            n => Ok(n),
+        };
+        let results: Vec<bool> = Ordered::new(0..8, 3, work)
+            .unwrap()
+            .map(|r| r.is_ok())
+            .collect();
+        assert_eq!(results, [true, true, true, true, true, false, true, true]);
+    }
+
+    #[test]
+    #[should_panic(expected = "three")]
+    fn a_panic_is_passed_on() {
+        let work = |n| if n == 3 { panic!("three") } else { Ok(n) };
+        for result in Ordered::new(0..8, 2, work).unwrap() {
+            assert!(result.unwrap() < 3);
+        }
+    }
+
+    /// Nobody works ahead further than the queues hold, nor after the results are dropped.
+    #[test]
+    fn queues_are_bounded() {
+        let count = Arc::new(AtomicU64::new(0));
+        let counted = Arc::clone(&count);
+        let mut endless = Ordered::new(0..u64::MAX, 2, move |n| {
+            counted.fetch_add(1, Ordering::Relaxed);
+            Ok(n)
+        })
+        .unwrap();
+        assert_eq!(
+            endless.by_ref().take(10).map(Result::unwrap).last(),
+            Some(9)
+        );
+        std::thread::sleep(Duration::from_millis(20));
+        drop(endless);
+        // Ten taken; of each thread a full queue and one result that found no room.
+        assert!(count.load(Ordering::Relaxed) <= 10 + 2 * (READY as u64 + 1));
+    }
+}

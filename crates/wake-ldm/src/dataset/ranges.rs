@@ -24,7 +24,7 @@ pub struct Ranges {
     pub ship_speed: Range,
     /// Where the ship moves to [deg clockwise from azimuth].
     pub ship_heading: Range,
-    /// Length of the ship \[m\]; beam and draft keep their proportion to it.
+    /// Length of the ship \[m\], in steps of 0.1; beam and draft keep their proportion to it.
     pub ship_length: Range,
     /// Wind speed at 10 m height [m/s].
     pub wind_speed: Range,
@@ -103,7 +103,7 @@ impl Ranges {
             .exp()
             .clamp(self.fetch[0], self.fetch[1]);
         scene.radar.incidence = between(self.incidence, Value::Incidence);
-        let length = between(self.ship_length, Value::ShipLength);
+        let length = tenths(between(self.ship_length, Value::ShipLength));
         let own = base.ship.clone().unwrap_or_default();
         let ship = scene.ship.insert(with_length(&own, length));
         ship.speed = between(self.ship_speed, Value::ShipSpeed);
@@ -140,9 +140,13 @@ impl Ranges {
     }
 }
 
+fn tenths(value: f64) -> f64 {
+    (10.0 * value).round() / 10.0
+}
+
 /// A coordinate \[m\] between the first pixel's centre and the last one's, in steps of 0.1 m.
 fn place(pixels: usize, spacing: f64, at: f64) -> f64 {
     let first = -((pixels / 2) as f64);
     let pixel = first + at * (pixels - 1) as f64;
-    (10.0 * spacing * pixel).round() / 10.0
+    tenths(spacing * pixel)
 }

@@ -82,3 +82,7 @@ fn paper_scene(index: u64, base: &Scene) -> Scene {
         .onto(base)
         .unwrap_or_else(|_| base.clone())
 }
+
+#[cfg(test)]
+#[path = "scenes_tests.rs"]
+mod tests;

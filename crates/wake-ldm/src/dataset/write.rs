@@ -113,9 +113,8 @@ fn sweep(folder: &Path) -> Result<()> {
 /// Indices without a line, or without their files.
 fn missing(folder: &Path, manifest: &Manifest, lines: usize) -> Vec<u64> {
     let start = manifest.indices().start;
-    let [image, labels] = [0, 1].map(|which| {
-        move |index: u64| std::fs::metadata(&Layout(folder).files_of(index)[which])
-    });
+    let [image, labels] = [0, 1]
+        .map(|which| move |index: u64| std::fs::metadata(&Layout(folder).files_of(index)[which]));
     let is_there =
         |index: u64| image(index).is_ok_and(|file| file.len() > 0) && labels(index).is_ok();
     manifest

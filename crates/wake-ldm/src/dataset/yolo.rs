@@ -12,10 +12,7 @@ pub(super) fn yolo(objects: &Objects, [rows, columns]: [usize; 2]) -> String {
         let (centre_x, centre_y) = ((x + 0.5 * w) / width, (y + 0.5 * h) / height);
         let (w, h) = (w / width, h / height);
         // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{class} {centre_x:.6} {centre_y:.6} {w:.6} {h:.6}"
-        );
+        let _ = writeln!(text, "{class} {centre_x:.6} {centre_y:.6} {w:.6} {h:.6}");
     }
     text
 }
