@@ -15,6 +15,8 @@ pub mod scheduler;
 pub mod weights;
 
 pub mod pipeline;
+
+pub mod metrics;
 #[cfg(feature = "flex")]
 mod self_check;
 

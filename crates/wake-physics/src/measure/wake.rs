@@ -4,7 +4,6 @@ use super::spectrum::{PowerSpectrum, window};
 use super::{Measured, arms, stationary};
 use crate::labels::KELVIN_HALF_ANGLE;
 use crate::raster::{Field, Raster};
-use crate::track::Track;
 use crate::sar::geometry::direction;
 use serde::Serialize;
 
@@ -133,14 +132,15 @@ fn sector(raster: &Raster, position: [f64; 2], towards: f64) -> Field {
 /// - returns one value a pixel, row after row
 #[must_use]
 pub fn kelvin_wedge(raster: &Raster, ship: &ShipPlace, heading: f64) -> Vec<bool> {
-    let track = Track::new(ship.position, heading, 0.0);
+    let [ax, ay] = direction(heading);
     let slope = KELVIN_HALF_ANGLE.tan();
     (0..raster.len())
         .map(|n| {
-            let place = [raster.x(n % raster.columns), raster.y(n / raster.columns)];
-            let [forward, port] = track.seen_from_ship(place);
+            let dx = raster.x(n % raster.columns) - ship.position[0];
+            let dy = raster.y(n / raster.columns) - ship.position[1];
+            let (forward, across) = (dx * ax + dy * ay, dx * ay - dy * ax);
             // The arms start at the bow.
-            forward < 0.0 && port.abs() < slope * (0.5 * ship.length - forward)
+            forward < 0.0 && across.abs() < slope * (0.5 * ship.length - forward)
         })
         .collect()
 }
