@@ -129,7 +129,10 @@ pub(crate) fn judge(
     bar.set_message("conditions");
     let conditions = conditions(&scenes[..plan.condition_scenes], judged, &sums, bar)?;
     bar.set_message("swaps");
-    let told: Vec<Told> = [Told::Both].into_iter().chain(judged.conditions.clone()).collect();
+    let told: Vec<Told> = [Told::Both]
+        .into_iter()
+        .chain(judged.conditions.clone())
+        .collect();
     let swaps = swaps(plan.pairs, model, &told, || bar.inc(1))?;
     bar.set_message("seconds");
     let seconds = timings(model)?;

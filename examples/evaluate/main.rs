@@ -67,7 +67,10 @@ fn run(arguments: &Arguments) -> Result<()> {
     output::make_folder(&arguments.out)?;
     let lpips = lpips(arguments)?;
     if !arguments.simulator_only {
-        return Err("there is no trained model in this version; judge the simulator with --simulator-only".into());
+        return Err(
+            "there is no trained model in this version; judge the simulator with --simulator-only"
+                .into(),
+        );
     }
     let judged = Judged {
         source: &OtherSea,
@@ -76,7 +79,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     };
     let plan = Plan::of(arguments.count as usize);
     let bar = ProgressBar::new(plan.steps(&judged) as u64);
-    bar.set_style(ProgressStyle::with_template("{msg:20} {bar:30} {pos}/{len}, {eta} left")?);
+    bar.set_style(ProgressStyle::with_template(
+        "{msg:20} {bar:30} {pos}/{len}, {eta} left",
+    )?);
     let report = judge(&plan, &judged, lpips.as_ref(), &bar)?;
     bar.finish_and_clear();
     let text = report::markdown(&report);
@@ -93,9 +98,15 @@ fn run(arguments: &Arguments) -> Result<()> {
 }
 
 fn lpips(arguments: &Arguments) -> Result<Option<Lpips>> {
-    let (Some(backbone), Some(linear)) = (&arguments.lpips_backbone, &arguments.lpips_linear) else {
+    let (Some(backbone), Some(linear)) = (&arguments.lpips_backbone, &arguments.lpips_linear)
+    else {
         return Ok(None);
     };
     let device = burn::tensor::Device::default();
-    Ok(Some(Lpips::load(LpipsNetwork::Alex, backbone, linear, &device)?))
+    Ok(Some(Lpips::load(
+        LpipsNetwork::Alex,
+        backbone,
+        linear,
+        &device,
+    )?))
 }

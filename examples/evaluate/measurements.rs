@@ -5,8 +5,8 @@ use crate::source::Result;
 use crate::statistics::Errors;
 use serde::Serialize;
 use wake_physics::measure::{
-    Measured, ShipPlace, angle_between, axis_between, incidence, measure_wake, open_sea,
-    wind_axis, wind_speed,
+    Measured, ShipPlace, angle_between, axis_between, incidence, measure_wake, open_sea, wind_axis,
+    wind_speed,
 };
 use wake_physics::{Field, Raster, Scene};
 
@@ -136,8 +136,10 @@ pub(crate) fn rows(
             let own = errors(simulated, quantity);
             let model = generated.map(|generated| {
                 let both = errors(generated, quantity).into_iter().zip(&own);
-                let counted: Vec<Option<f64>> =
-                    both.filter(|(_, own)| own.is_some()).map(|(e, _)| e).collect();
+                let counted: Vec<Option<f64>> = both
+                    .filter(|(_, own)| own.is_some())
+                    .map(|(e, _)| e)
+                    .collect();
                 Errors::of(&counted)
             });
             let [name, unit] = quantity.name();

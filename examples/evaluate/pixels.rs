@@ -72,11 +72,13 @@ impl Tally {
     /// Counts an image against its reference, both grey.
     pub(crate) fn add(&mut self, reference: &Field, image: &Field, lpips: Option<&Lpips>) {
         let planes = [reference, image].map(|f| Plane::new(&f.values, f.columns));
-        self.ssim.push(ssim(&planes[0], &planes[1], 1.0, SsimWindow::Gaussian));
+        self.ssim
+            .push(ssim(&planes[0], &planes[1], 1.0, SsimWindow::Gaussian));
         self.psnr.push(psnr(&planes[0], &planes[1], 1.0));
         if let Some(lpips) = lpips {
             let [a, b] = [reference, image].map(colour);
-            self.lpips.extend(lpips.distance(a, b).iter().map(|d| d.total));
+            self.lpips
+                .extend(lpips.distance(a, b).iter().map(|d| d.total));
         }
         self.mean.push(image.mean() - reference.mean());
         self.contrast.push(deviation(image) / deviation(reference));

@@ -6,7 +6,7 @@ use crate::statistics::Errors;
 
 /// The report in Markdown.
 pub(crate) fn markdown(report: &Report) -> String {
-    [
+    let parts = [
         format!(
             "# Evaluation\n\nJudged: {}. {} held-out scenes of 256 x 256 pixels of 4 m, before speckle.\n",
             report.judged, report.scenes
@@ -17,8 +17,9 @@ pub(crate) fn markdown(report: &Report) -> String {
         conditions(report),
         swaps(report),
         seconds(report),
-    ]
-    .join("\n")
+    ];
+    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join("\n")
 }
 
 /// A number, or a dash.
@@ -112,7 +113,9 @@ fn conditions(report: &Report) -> String {
     if report.conditions.len() < 2 {
         return String::new();
     }
-    let mut text = "## What the model is told\n\nMedian absolute error (share measurable).\n\n| value |".to_owned();
+    let mut text =
+        "## What the model is told\n\nMedian absolute error (share measurable).\n\n| value |"
+            .to_owned();
     for condition in &report.conditions {
         text += &format!(" {} |", condition.told);
     }
@@ -149,9 +152,10 @@ fn swaps(report: &Report) -> String {
 }
 
 fn seconds(report: &Report) -> String {
-    let mut text = "## Seconds per image\n\n| pixels | simulator | harmonic sum, 2 x 10⁴ waves | model |\n\
+    let mut text =
+        "## Seconds per image\n\n| pixels | simulator | harmonic sum, 2 x 10⁴ waves | model |\n\
         | --- | --- | --- | --- |\n"
-        .to_owned();
+            .to_owned();
     for r in &report.seconds {
         text += &format!(
             "| {0} x {0} | {1:.3} | {2:.1} | {3} |\n",

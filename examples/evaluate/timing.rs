@@ -99,7 +99,9 @@ fn harmonic_seconds(scene: &Scene) -> f64 {
         spectrum: SpectrumModel::Elfouhaily,
         spreading: SpreadingModel::Hasselmann,
     });
-    let sea = Surface::new(&spectrum, scene.seed, 0.0, &raster).strongest(WAVES).modes();
+    let sea = Surface::new(&spectrum, scene.seed, 0.0, &raster)
+        .strongest(WAVES)
+        .modes();
     let ship = ship(scene);
     let wake = KelvinWake {
         hull: Hull::wigley(ship.length, ship.beam, ship.draft),
@@ -116,7 +118,13 @@ fn harmonic_seconds(scene: &Scene) -> f64 {
     let mut seconds = 0.0;
     for waves in [&sea, &wake] {
         let start = Instant::now();
-        std::hint::black_box(harmonic_sum(waves, &transfer, &QUANTITIES, &raster, &pixels));
+        std::hint::black_box(harmonic_sum(
+            waves,
+            &transfer,
+            &QUANTITIES,
+            &raster,
+            &pixels,
+        ));
         // A wake of fewer nodes than 10⁴ is scaled to them.
         let waves = WAVES as f64 / waves.len().max(1) as f64;
         seconds += start.elapsed().as_secs_f64() * waves;

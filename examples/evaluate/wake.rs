@@ -48,7 +48,11 @@ pub(crate) fn wake_correlation(
         }
         progress();
     }
-    let ratios: Vec<f64> = generated.iter().zip(&simulator).map(|(m, s)| m / s).collect();
+    let ratios: Vec<f64> = generated
+        .iter()
+        .zip(&simulator)
+        .map(|(m, s)| m / s)
+        .collect();
     Ok(WakeCorrelation {
         simulator_median: quantile(&simulator, 0.5),
         model_median: quantile(&generated, 0.5),

@@ -13,13 +13,18 @@ use wake_physics::measure::{Binning, radial_spectrum};
 const ROUNDING: f64 = 1e-9;
 
 fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| if value == "inf" { f64::INFINITY } else { panic!("{value}") })
+    value.as_f64().unwrap_or_else(|| {
+        if value == "inf" {
+            f64::INFINITY
+        } else {
+            panic!("{value}")
+        }
+    })
 }
 
 fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
-    let close = found == expected || (found - expected).abs() <= tolerance * expected.abs().max(1.0);
+    let close =
+        found == expected || (found - expected).abs() <= tolerance * expected.abs().max(1.0);
     assert!(close, "{what}: {found}, expected {expected}");
 }
 
@@ -60,8 +65,14 @@ fn ssim_and_psnr_are_scikit_images() {
         if planes.len() == 1 {
             check("psnr_range1", psnr(&planes[0].0, &planes[0].1, 1.0));
         }
-        for (key, window) in [("gauss", SsimWindow::Gaussian), ("default", SsimWindow::Uniform)] {
-            check(&format!("ssim_{key}"), mean(&|a, b| ssim(a, b, 1.0, window)));
+        for (key, window) in [
+            ("gauss", SsimWindow::Gaussian),
+            ("default", SsimWindow::Uniform),
+        ] {
+            check(
+                &format!("ssim_{key}"),
+                mean(&|a, b| ssim(a, b, 1.0, window)),
+            );
             let map = format!("{name}/ssim_map_{key}");
             if file.has(&map) {
                 let found = ssim_map(&planes[0].0, &planes[0].1, 1.0, window);
@@ -106,7 +117,10 @@ fn radial_spectra_are_numpys() {
                 assert_eq!(values.len(), expected.len());
                 for (found, expected) in values.iter().zip(expected) {
                     let allowed = 2e-7 * expected.abs() + (1e-12 * sum).powi(power);
-                    assert!((found - expected).abs() <= allowed, "{name} {what}: {found} {expected}");
+                    assert!(
+                        (found - expected).abs() <= allowed,
+                        "{name} {what}: {found} {expected}"
+                    );
                 }
             }
         }
@@ -129,7 +143,11 @@ fn formula_weights(net: &Value, seed: u64, path: &std::path::Path) {
                 .map(|n| n.as_u64().unwrap() as usize)
                 .collect();
             let fan_in: usize = shape[1..].iter().product();
-            let scale = if shape.len() > 1 { (6.0 / fan_in as f64).sqrt() } else { 0.1 };
+            let scale = if shape.len() > 1 {
+                (6.0 / fan_in as f64).sqrt()
+            } else {
+                0.1
+            };
             let count: usize = shape.iter().product();
             let values: Vec<f32> = (0..count as u64)
                 .map(|i| {
@@ -144,11 +162,16 @@ fn formula_weights(net: &Value, seed: u64, path: &std::path::Path) {
             }
             let sum: f64 = values.iter().map(|&v| f64::from(v)).sum();
             assert_close(sum, number(&check["sum_f64"]), 1e-7, &name);
-            (name, shape, values.iter().flat_map(|v| v.to_le_bytes()).collect())
+            (
+                name,
+                shape,
+                values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            )
         })
         .collect();
     let views = tensors.iter().map(|(name, shape, bytes)| {
-        let view = safetensors::tensor::TensorView::new(safetensors::Dtype::F32, shape.clone(), bytes);
+        let view =
+            safetensors::tensor::TensorView::new(safetensors::Dtype::F32, shape.clone(), bytes);
         (name.clone(), view.unwrap())
     });
     std::fs::write(path, safetensors::serialize(views, None).unwrap()).unwrap();
@@ -182,7 +205,11 @@ fn lpips_is_the_packages() {
         for (case, expected) in net["cases"].as_object().unwrap() {
             let image = |side: &str| -> Tensor<4> {
                 // A case without images of its own compares an image with itself.
-                let pair = if images.has(&format!("{case}/a")) { case.as_str() } else { "wake" };
+                let pair = if images.has(&format!("{case}/a")) {
+                    case.as_str()
+                } else {
+                    "wake"
+                };
                 let side = if pair == case { side } else { "a" };
                 let name = format!("{pair}/{side}");
                 let mut shape = images.shape(&name);
@@ -210,7 +237,10 @@ fn wrong_lpips_weights_are_refused() {
     let linear = folder().join("metrics/lpips_lin.safetensors");
     let device = Device::default();
     let refused = Lpips::load(LpipsNetwork::Alex, &linear, &linear, &device).unwrap_err();
-    assert!(refused.to_string().contains("features.0.weight"), "{refused}");
+    assert!(
+        refused.to_string().contains("features.0.weight"),
+        "{refused}"
+    );
     let absent = std::path::Path::new("no such file");
     assert!(Lpips::load(LpipsNetwork::Squeeze, absent, &linear, &device).is_err());
 }

@@ -92,7 +92,10 @@ impl LpipsNetwork {
     fn backbone(self) -> Vec<(String, Vec<usize>)> {
         let mut shapes = Vec::new();
         let mut conv = |name: String, [input, output]: [usize; 2], kernel: usize| {
-            shapes.push((format!("{name}.weight"), vec![output, input, kernel, kernel]));
+            shapes.push((
+                format!("{name}.weight"),
+                vec![output, input, kernel, kernel],
+            ));
             shapes.push((format!("{name}.bias"), vec![output]));
         };
         for step in self.steps() {
@@ -117,7 +120,12 @@ impl LpipsNetwork {
             _ => None,
         });
         taps.enumerate()
-            .map(|(n, channels)| (format!("{prefix}lin{n}.model.1.weight"), vec![1, channels, 1, 1]))
+            .map(|(n, channels)| {
+                (
+                    format!("{prefix}lin{n}.model.1.weight"),
+                    vec![1, channels, 1, 1],
+                )
+            })
             .collect()
     }
 }
@@ -171,7 +179,9 @@ impl Lpips {
         let mut biases = BTreeMap::new();
         for (name, data) in read {
             match name.strip_suffix(".weight") {
-                Some(layer) => drop(weights.insert(layer.to_owned(), Tensor::from_data(data, device))),
+                Some(layer) => {
+                    drop(weights.insert(layer.to_owned(), Tensor::from_data(data, device)))
+                }
                 None => {
                     let layer = name.trim_end_matches(".bias").to_owned();
                     biases.insert(layer, Tensor::from_data(data, device));
@@ -208,7 +218,13 @@ impl Lpips {
     pub fn distance(&self, one: Tensor<4>, other: Tensor<4>) -> Vec<LpipsDistance> {
         assert_eq!(one.dims(), other.dims(), "images of different shape");
         let pairs = one.dims()[0];
-        let mut distances = vec![LpipsDistance { total: 0.0, layers: Vec::new() }; pairs];
+        let mut distances = vec![
+            LpipsDistance {
+                total: 0.0,
+                layers: Vec::new()
+            };
+            pairs
+        ];
         let features = self.features(one).into_iter().zip(self.features(other));
         for ((a, b), linear) in features.zip(&self.linear) {
             let difference = (unit(a) - unit(b)).square() * linear.clone();

@@ -122,7 +122,8 @@ mod tests {
         let a: Vec<f32> = (0..20).map(|i| ((i * 7) % 11) as f32).collect();
         let mut b: Vec<f32> = a.iter().map(|v| 3.0 - 2.0 * v).collect();
         let mut mask = vec![true; 20];
-        let rho = |b: &[f32], mask: &[bool]| correlation(&Plane::new(&a, 5), &Plane::new(b, 5), mask);
+        let rho =
+            |b: &[f32], mask: &[bool]| correlation(&Plane::new(&a, 5), &Plane::new(b, 5), mask);
         assert!((rho(&b, &mask).unwrap() + 1.0).abs() < 1e-12);
         b[3] = 1e6;
         assert!(rho(&b, &mask).unwrap() > -0.9);

@@ -213,7 +213,9 @@ mod tests {
     #[test]
     fn blur_has_the_gaussian_response() {
         let k = std::f64::consts::TAU / 16.0;
-        let wave: Vec<f32> = (0..64 * 64).map(|n| (k * (f64::from(n % 64) + 0.5)).cos() as f32).collect();
+        let wave: Vec<f32> = (0..64 * 64)
+            .map(|n| (k * (f64::from(n % 64) + 0.5)).cos() as f32)
+            .collect();
         let smooth = blurred(&Plane::new(&wave, 64), 2.0);
         let expected = (-0.5 * (k * 2.0).powi(2)).exp();
         for n in 0..64 * 64 {

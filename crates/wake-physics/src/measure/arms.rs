@@ -31,12 +31,7 @@ const THRESHOLD: f64 = 3.0;
 /// ```
 ///
 /// The sector of two Kelvin angles whose edges rise most above the sea beside them is the wake.
-pub(super) fn heading(
-    decibel: &Field,
-    raster: &Raster,
-    position: [f64; 2],
-    bow: f64,
-) -> Measured {
+pub(super) fn heading(decibel: &Field, raster: &Raster, position: [f64; 2], bow: f64) -> Measured {
     let energy = log_energy(decibel, raster.spacing);
     let mut apex = position;
     let mut found = None;

@@ -35,7 +35,11 @@ const AZIMUTH_BAND: [f64; 2] = [0.013, 0.64];
 /// - `ship`: midship (x, y) \[m\] and heading [deg] whose wake is left out; without a ship all counts
 /// - returns `None` for an image that is dark everywhere or holds a value that is no number
 #[must_use]
-pub fn open_sea(intensity: &Field, raster: &Raster, ship: Option<([f64; 2], f64)>) -> Option<OpenSea> {
+pub fn open_sea(
+    intensity: &Field,
+    raster: &Raster,
+    ship: Option<([f64; 2], f64)>,
+) -> Option<OpenSea> {
     let window = window(raster, |place| ship.map_or(1.0, |ship| away(place, ship)));
     let decibel = decibel(intensity)?;
     let weights = || window.values.iter().map(|&w| f64::from(w));

@@ -81,7 +81,9 @@ fn magnitudes(image: &Field) -> Vec<f64> {
     let synthesis = Synthesis::<f64>::new(rows, columns);
     synthesis.run(&mut lines, [rows, columns], (&mut re, &mut im), |_, _| ());
     let parts = re.iter().zip(&im);
-    parts.map(|(&a, &b)| f64::from(a).hypot(f64::from(b))).collect()
+    parts
+        .map(|(&a, &b)| f64::from(a).hypot(f64::from(b)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -104,8 +106,15 @@ mod tests {
         for (ring, power) in spectrum.power.iter().enumerate() {
             let total = power * spectrum.count[ring] as f64;
             // Two lines of (32·32/2)² each.
-            let expected = if ring == 6 { 2.0 * 512.0f64.powi(2) } else { 0.0 };
-            assert!((total - expected).abs() < 1e-3 * 512.0f64.powi(2), "{ring}: {total}");
+            let expected = if ring == 6 {
+                2.0 * 512.0f64.powi(2)
+            } else {
+                0.0
+            };
+            assert!(
+                (total - expected).abs() < 1e-3 * 512.0f64.powi(2),
+                "{ring}: {total}"
+            );
         }
     }
 }

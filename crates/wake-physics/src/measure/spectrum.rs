@@ -129,7 +129,8 @@ mod tests {
             let raster = Raster::image(rows, columns, 2.0);
             let everywhere = window(&raster, |_| 1.0);
             for k in [[0.4, 0.3], [0.4, -0.3], [0.0, 0.5], [0.7, 0.0]] {
-                let spectrum = PowerSpectrum::of(&plane_wave(&raster, k), &everywhere, 2.0).unwrap();
+                let spectrum =
+                    PowerSpectrum::of(&plane_wave(&raster, k), &everywhere, 2.0).unwrap();
                 let values = &spectrum.power.values;
                 let peak = (0..values.len())
                     .max_by(|&a, &b| values[a].total_cmp(&values[b]))

@@ -83,7 +83,11 @@ pub(super) fn velocity(
     // A maximum at the end of the lattice is the flank of something beyond it.
     let inner = speed > SPEEDS.0 && speed < last;
     let score = if inner { score } else { 0.0 };
-    let (speed, heading) = if kept { (fine_speed, fine) } else { (speed, tried) };
+    let (speed, heading) = if kept {
+        (fine_speed, fine)
+    } else {
+        (speed, tried)
+    };
     Velocity {
         speed: Measured::with_threshold(speed, score, THRESHOLD),
         heading: Measured::with_threshold(heading.rem_euclid(360.0), score, THRESHOLD),
@@ -118,7 +122,11 @@ fn cells(wake: &PowerSpectrum, sea: &Field, largest_wavenumber: f64) -> Vec<Cell
         .collect();
     let count = cells.len().max(1) as f64;
     let mean = cells.iter().map(|c| c.strength).sum::<f64>() / count;
-    let variance = cells.iter().map(|c| (c.strength - mean).powi(2)).sum::<f64>() / count;
+    let variance = cells
+        .iter()
+        .map(|c| (c.strength - mean).powi(2))
+        .sum::<f64>()
+        / count;
     let std = variance.sqrt().max(1e-12);
     for cell in &mut cells {
         cell.strength = (cell.strength - mean) / std;

@@ -65,14 +65,23 @@ fn analytic_wake(speed: f64, heading: f64) -> Field {
 /// turns the heading and leaves the speed.
 #[test]
 fn an_analytic_wake_gives_its_speed_and_heading() {
-    for (speed, heading) in [(8.0, 20.0), (8.0, 110.0), (8.0, 200.0), (8.0, 290.0), (11.0, 333.0)] {
+    for (speed, heading) in [
+        (8.0, 20.0),
+        (8.0, 110.0),
+        (8.0, 200.0),
+        (8.0, 290.0),
+        (11.0, 333.0),
+    ] {
         let found = measure_wake(&analytic_wake(speed, heading), &raster(), &SHIP);
         assert!(found.speed.measurable && found.heading.measurable);
         // A step of the spectrum, 2π/1024 m, is 3 % of ν at 11 m/s; speed goes with its root, and the ridge is
         // found to a third of a step.
         let error = angle_between(found.heading.value, heading);
         assert!(error.abs() < 1.0, "{heading}: {found:?}");
-        assert!((found.speed.value / speed - 1.0).abs() < 0.01, "{speed}: {found:?}");
+        assert!(
+            (found.speed.value / speed - 1.0).abs() < 0.01,
+            "{speed}: {found:?}"
+        );
     }
 }
 
@@ -83,7 +92,14 @@ fn images_without_information_are_not_measurable() {
     let mut broken = noise(0.1, 2);
     broken.values[77] = f32::NAN;
     let constant = Field::constant(&raster(), 0.03);
-    for image in [&black, &constant, &broken, &noise(0.05, 1), &noise(0.4, 2), &noise(0.2, 3)] {
+    for image in [
+        &black,
+        &constant,
+        &broken,
+        &noise(0.05, 1),
+        &noise(0.4, 2),
+        &noise(0.2, 3),
+    ] {
         let found = measure_wake(image, &raster(), &SHIP);
         assert!(!found.speed.measurable, "{found:?}");
         assert!(!found.heading.measurable, "{found:?}");
@@ -92,7 +108,12 @@ fn images_without_information_are_not_measurable() {
     assert!(open_sea(&broken, &raster(), None).is_none());
     // Another size than the raster's.
     let small = Raster::image(64, 64, 4.0);
-    assert_eq!(measure_wake(&constant, &small, &SHIP).heading.measurable_value(), None);
+    assert_eq!(
+        measure_wake(&constant, &small, &SHIP)
+            .heading
+            .measurable_value(),
+        None
+    );
 }
 
 fn scene(speed: f64, heading: f64, wind: f64, toward: f64, incidence: f64) -> Scene {
@@ -122,16 +143,28 @@ fn simulated_scenes_give_their_values_back() {
         let truth = scene(speed, heading, wind, toward, incidence);
         let image = simulate(&truth).unwrap().intensity;
         let found = measure_wake(&image, &raster(), &SHIP);
-        assert!(found.heading.measurable && found.speed.measurable, "{found:?}");
-        assert!(angle_between(found.heading.value, heading).abs() < 3.0, "{found:?}");
+        assert!(
+            found.heading.measurable && found.speed.measurable,
+            "{found:?}"
+        );
+        assert!(
+            angle_between(found.heading.value, heading).abs() < 3.0,
+            "{found:?}"
+        );
         assert!((found.speed.value - speed).abs() < 0.5, "{found:?}");
         let sea = open_sea(&image, &raster(), Some(([0.0; 2], found.heading.value))).unwrap();
         let expected = mean_sigma0(&truth).unwrap();
         assert!((10.0 * (sea.mean / expected).log10()).abs() < 0.2);
         let measured = wind_speed(&sea, &truth).unwrap();
-        assert!(measured.measurable && (measured.value - wind).abs() < 0.4, "{measured:?}");
+        assert!(
+            measured.measurable && (measured.value - wind).abs() < 0.4,
+            "{measured:?}"
+        );
         let measured = super::incidence(&sea, &truth).unwrap();
-        assert!(measured.measurable && (measured.value - incidence).abs() < 1.3, "{measured:?}");
+        assert!(
+            measured.measurable && (measured.value - incidence).abs() < 1.3,
+            "{measured:?}"
+        );
         // A sea whose skew is small does not say which diagonal it is.
         if let Some(axis) = wind_axis(&sea, &truth).unwrap().measurable_value() {
             assert!(axis_between(axis, toward).abs() < 10.0, "{axis}");
@@ -205,7 +238,11 @@ fn the_wedge_opens_astern_at_the_kelvin_angle() {
         // Heading 0: row i is 5·(i − 100) m astern of midship.
         let astern = 5.0 * (i as f64 - 100.0);
         let half = (astern + 97.5) * 19.4712f64.to_radians().tan();
-        let expected = if astern > 0.0 { 1.0 + 2.0 * (half / 5.0).floor() } else { 0.0 };
+        let expected = if astern > 0.0 {
+            1.0 + 2.0 * (half / 5.0).floor()
+        } else {
+            0.0
+        };
         let count = north[i * 201..(i + 1) * 201].iter().filter(|&&v| v).count() as f64;
         assert!((count - expected).abs() < 0.5, "{i}: {count} {expected}");
         for j in 0..201 {
