@@ -87,6 +87,15 @@ impl Golden {
         f32s(&self.get(name, safetensors::Dtype::F32).bytes)
     }
 
+    /// Numbers of an f64 tensor.
+    pub(crate) fn f64s(&self, name: &str) -> Vec<f64> {
+        let bytes = &self.get(name, safetensors::Dtype::F64).bytes;
+        bytes
+            .chunks_exact(8)
+            .map(|b| f64::from_le_bytes(b.try_into().unwrap()))
+            .collect()
+    }
+
     /// Numbers of an i64 tensor.
     pub(crate) fn i64s(&self, name: &str) -> Vec<i64> {
         let bytes = &self.get(name, safetensors::Dtype::I64).bytes;

@@ -10,6 +10,7 @@ mod golden;
 #[cfg(feature = "train")]
 mod gradients;
 mod hard_cases;
+mod metrics;
 mod models;
 mod pipeline;
 mod precision;

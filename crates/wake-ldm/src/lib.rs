@@ -24,6 +24,8 @@ pub mod sampler;
 pub mod dataset;
 #[cfg(feature = "train")]
 pub mod train;
+
+pub mod metrics;
 #[cfg(feature = "flex")]
 mod self_check;
 

@@ -63,6 +63,7 @@ pub mod grey;
 mod setup;
 mod plan;
 mod simulate;
+pub mod measure;
 
 pub use error::{Error, Result};
 pub use plan::{Plan, PlannedTerm, Sizes};

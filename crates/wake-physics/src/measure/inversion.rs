@@ -1,0 +1,168 @@
+//! Wind and incidence from the brightness of the open sea.
+//!
+//! One brightness cannot tell three unknowns apart. Each is therefore found with the other two given, as the prompt of
+//! a generated image or the scene of a simulated one states them: the question is whether the image is as bright as
+//! *this* wind at *this* incidence makes the sea.
+
+use super::{Measured, OpenSea};
+use crate::raster::Raster;
+use crate::scattering::SlopeCovariance;
+use crate::scene::Scene;
+use crate::setup::Setup;
+
+/// Winds tried [m/s]: first, step, number.
+const WINDS: Lattice = Lattice(2.0, 0.5, 21);
+/// Incidences tried \[deg\].
+const INCIDENCES: Lattice = Lattice(10.0, 1.0, 36);
+/// Angles between wind and look direction tried \[deg\].
+const ANGLES: Lattice = Lattice(0.0, 5.0, 19);
+/// Least change of brightness with the value, [dB per m/s], [dB per degree], and between wind along and across the look
+/// direction \[dB\]: below it, the value is not measurable.
+const THRESHOLDS: [f64; 3] = [0.5, 0.15, 1.5];
+/// How far outside the range of brightnesses the sea may be and still count as its end \[dB\].
+const TOLERANCE: f64 = 0.25;
+/// Least skew of the spectrum that tells one diagonal from the other \[1\].
+const LEAST_SKEW: f64 = 0.03;
+
+/// First value, step, number of values.
+struct Lattice(f64, f64, usize);
+
+impl Lattice {
+    fn values(&self) -> impl Iterator<Item = f64> {
+        (0..self.2).map(|n| self.0 + self.1 * n as f64)
+    }
+}
+
+/// Mean cross-section of the sea of a scene, without its ship.
+///
+/// ```text
+/// ⟨σ⁰⟩ = ∬ σ⁰(s) p(s) ds,    p the Gaussian density of all slopes from the longest wave to the radar's
+/// ```
+///
+/// - returns ⟨σ⁰⟩ \[1\], to about two digits
+///
+/// # Errors
+///
+/// A value of the scene out of its range.
+pub fn mean_sigma0(scene: &Scene) -> crate::Result<f64> {
+    scene.validate()?;
+    Ok(brightness(scene))
+}
+
+fn brightness(scene: &Scene) -> f64 {
+    let setup = Setup::new(scene);
+    let band = Raster::nyquist_wavenumber(&setup.image);
+    let moments = setup.sea.moments(0.0, band, setup.incidence);
+    let resolved = SlopeCovariance {
+        xx: moments.slope_xx,
+        xy: moments.slope_xy,
+        yy: moments.slope_yy,
+    };
+    let [bragg, specular] = setup.backscatter(true, true).mean_over(&resolved);
+    bragg + specular
+}
+
+/// Wind speed [m/s] that makes the sea of `scene` as bright as the image, its direction, fetch and incidence given.
+///
+/// - confidence: change of brightness [dB per m/s]; 0 if no wind of 2 to 12 m/s fits, or more than one
+///
+/// # Errors
+///
+/// A value of the scene out of its range.
+pub fn wind_speed(sea: &OpenSea, scene: &Scene) -> crate::Result<Measured> {
+    inverted(sea, scene, &WINDS, |scene, value| {
+        scene.sea.wind_speed = value;
+    })
+    .map(|(value, slope)| Measured::with_threshold(value, slope, THRESHOLDS[0]))
+}
+
+/// Incidence \[deg\] at which the sea of `scene` is as bright as the image, its wind given.
+///
+/// - confidence: change of brightness [dB per degree]; 0 if no incidence of 10 to 45° fits, or more than one
+///
+/// # Errors
+///
+/// A value of the scene out of its range.
+pub fn incidence(sea: &OpenSea, scene: &Scene) -> crate::Result<Measured> {
+    inverted(sea, scene, &INCIDENCES, |scene, value| {
+        scene.radar.incidence = value;
+    })
+    .map(|(value, slope)| Measured::with_threshold(value, slope, THRESHOLDS[1]))
+}
+
+/// Axis of the wind [deg clockwise from azimuth, 0 up to 180], wind speed, fetch and incidence given.
+///
+/// Short waves and slopes are the same for a wind and its opposite, and brightness depends on the angle to the look
+/// direction alone; which of the two diagonals it is comes from the skew of the spectrum. So the measurement has an
+/// ambiguity of 180°, by nature.
+///
+/// - confidence: difference of brightness between wind along and across the look direction \[dB\]; 0 if the sea is
+///   brighter or darker than either, or neither diagonal stands out where it must
+///
+/// # Errors
+///
+/// A value of the scene out of its range.
+pub fn wind_axis(sea: &OpenSea, scene: &Scene) -> crate::Result<Measured> {
+    scene.validate()?;
+    // Angle to the look direction: 0 is a wind toward 90°.
+    let curve = curve(scene, &ANGLES, |scene, value| {
+        scene.sea.wind_toward = 90.0 - value;
+    });
+    let decibel = 10.0 * sea.mean.log10();
+    let (along, across) = (curve[0].1, curve[curve.len() - 1].1);
+    let (low, high) = (along.min(across), along.max(across));
+    if !(low - TOLERANCE..=high + TOLERANCE).contains(&decibel) {
+        return Ok(Measured::NOTHING);
+    }
+    let found = crossings(&curve, decibel.clamp(low + 1e-9, high - 1e-9));
+    let &[(angle, _)] = found.as_slice() else {
+        return Ok(Measured::NOTHING);
+    };
+    let sided = (10.0..80.0).contains(&angle);
+    if sided && sea.skew.abs() < LEAST_SKEW {
+        return Ok(Measured::NOTHING);
+    }
+    let axis = (90.0 - angle * sea.skew.signum()).rem_euclid(180.0);
+    Ok(Measured::with_threshold(axis, high - low, THRESHOLDS[2]))
+}
+
+/// The only value at which the scene is as bright as the sea, and the slope of the brightness there.
+fn inverted(
+    sea: &OpenSea,
+    scene: &Scene,
+    lattice: &Lattice,
+    set: impl Fn(&mut Scene, f64),
+) -> crate::Result<(f64, f64)> {
+    scene.validate()?;
+    let found = crossings(&curve(scene, lattice, set), 10.0 * sea.mean.log10());
+    Ok(match found.as_slice() {
+        &[only] => only,
+        _ => (f64::NAN, 0.0),
+    })
+}
+
+/// Brightness \[dB\] over a lattice of values.
+fn curve(scene: &Scene, lattice: &Lattice, set: impl Fn(&mut Scene, f64)) -> Vec<(f64, f64)> {
+    let mut scene = scene.clone();
+    scene.ship = None;
+    lattice
+        .values()
+        .map(|value| {
+            set(&mut scene, value);
+            (value, 10.0 * brightness(&scene).log10())
+        })
+        .collect()
+}
+
+/// Values at which a curve crosses a level, by linear interpolation, each with the slope's size.
+fn crossings(curve: &[(f64, f64)], level: f64) -> Vec<(f64, f64)> {
+    curve
+        .windows(2)
+        .filter_map(|pair| {
+            let [(x0, y0), (x1, y1)] = [pair[0], pair[1]];
+            let crosses = (y0 <= level) != (y1 <= level);
+            let slope = (y1 - y0) / (x1 - x0);
+            (crosses && slope.is_finite()).then(|| (x0 + (level - y0) / slope, slope.abs()))
+        })
+        .collect()
+}

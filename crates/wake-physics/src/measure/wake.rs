@@ -1,0 +1,146 @@
+//! Heading and speed of a ship from the image of its wake.
+
+use super::spectrum::{PowerSpectrum, window};
+use super::{Measured, arms, stationary};
+use crate::labels::KELVIN_HALF_ANGLE;
+use crate::raster::{Field, Raster};
+use crate::sar::geometry::direction;
+use serde::Serialize;
+
+/// Where the ship is, known from elsewhere (its echo, or the labels of the scene).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShipPlace {
+    /// Midship (x, y) \[m\].
+    pub position: [f64; 2],
+    /// Length \[m\]: the arms start at the bow.
+    pub length: f64,
+}
+
+/// What the wake in an image tells of its ship.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WakeMeasurement {
+    /// Where the ship moves to [deg clockwise from azimuth].
+    pub heading: Measured,
+    /// Speed of the ship [m/s].
+    pub speed: Measured,
+}
+
+/// Half-angle of the sector astern whose waves count, and of the one ahead that they are compared with \[deg\].
+const SECTOR: f64 = 45.0;
+/// Width of the sector's soft edge \[deg\].
+const SOFT: f64 = 10.0;
+/// Distance from midship within which nothing counts, and over which it begins to \[m\].
+const NEAR: f64 = 60.0;
+/// Standard deviation of the smoothing of the sea's spectrum \[steps\].
+const SMOOTHING: f64 = 3.0;
+/// Darkest intensity relative to the mean, so that a black pixel is no infinity.
+const DARKEST: f64 = 1e-4;
+
+/// Measures heading and speed in an image of intensity before speckle.
+///
+/// The arms give the heading within some degrees, without ambiguity, since the wake opens astern. The waves that stand
+/// still beside the ship give speed and a finer heading, where the image carries them: crests that run along azimuth
+/// are smeared by the motion of the sea, so a ship within some 30° of the flight direction shows its heading by the
+/// arms alone and no speed.
+///
+/// # Shapes
+///
+/// - `intensity`: `[rows, columns]` of `raster`, linear
+///
+/// # Validity
+///
+/// Deep water, speeds of 4.6 to 13.9 m/s, one wake, its ship in the image. An image without variation, or with nothing
+/// that looks like a wake, is not measurable.
+#[must_use]
+pub fn measure_wake(intensity: &Field, raster: &Raster, ship: &ShipPlace) -> WakeMeasurement {
+    let nothing = WakeMeasurement {
+        heading: Measured::NOTHING,
+        speed: Measured::NOTHING,
+    };
+    let fits = (intensity.rows, intensity.columns) == (raster.rows, raster.columns);
+    let Some(decibel) = decibel(intensity).filter(|_| fits) else {
+        return nothing;
+    };
+    let coarse = arms::heading(&decibel, raster, ship.position, 0.5 * ship.length);
+    if coarse.value.is_nan() {
+        return nothing;
+    }
+    let spectrum = |towards: f64| {
+        let window = sector(raster, ship.position, towards);
+        PowerSpectrum::of(&decibel, &window, raster.spacing)
+    };
+    let (Some(wake), Some(sea)) = (spectrum(coarse.value + 180.0), spectrum(coarse.value)) else {
+        return nothing;
+    };
+    let sea = sea.smoothed(SMOOTHING);
+    let fine = stationary::velocity(&wake, &sea, raster.nyquist_wavenumber(), coarse.value);
+    WakeMeasurement {
+        heading: combined(coarse, fine.heading),
+        speed: Measured {
+            measurable: fine.speed.measurable && coarse.measurable,
+            ..fine.speed
+        },
+    }
+}
+
+/// The finer heading where it is measurable, else that of the arms.
+fn combined(arms: Measured, fine: Measured) -> Measured {
+    if fine.measurable && arms.measurable {
+        Measured {
+            confidence: arms.confidence,
+            ..fine
+        }
+    } else {
+        arms
+    }
+}
+
+/// Intensity in decibel, mean taken away; `None` without any light or with a value that is no number.
+pub(super) fn decibel(intensity: &Field) -> Option<Field> {
+    let mean = intensity.mean();
+    if !(mean.is_finite() && mean > 0.0) {
+        return None;
+    }
+    let darkest = (DARKEST * mean) as f32;
+    let mut field = intensity.clone();
+    for v in &mut field.values {
+        *v = 10.0 * v.max(darkest).log10();
+    }
+    let mean = field.mean() as f32;
+    for v in &mut field.values {
+        *v -= mean;
+    }
+    Some(field)
+}
+
+/// A sector from midship, in the direction `towards`.
+fn sector(raster: &Raster, position: [f64; 2], towards: f64) -> Field {
+    let [ax, ay] = direction(towards);
+    window(raster, |[x, y]| {
+        let (dx, dy) = (x - position[0], y - position[1]);
+        let distance = dx.hypot(dy);
+        let cos = (dx * ax + dy * ay) / distance.max(1e-9);
+        let off = cos.clamp(-1.0, 1.0).acos().to_degrees();
+        let edge = ((SECTOR - off) / SOFT).clamp(0.0, 1.0);
+        edge * ((distance - NEAR) / NEAR).clamp(0.0, 1.0)
+    })
+}
+
+/// Which pixels lie inside the Kelvin wedge, astern of midship: where the wake, unlike the sea, is not random.
+///
+/// - `heading` [deg clockwise from azimuth]
+/// - returns one value a pixel, row after row
+#[must_use]
+pub fn kelvin_wedge(raster: &Raster, ship: &ShipPlace, heading: f64) -> Vec<bool> {
+    let [ax, ay] = direction(heading);
+    let slope = KELVIN_HALF_ANGLE.tan();
+    (0..raster.len())
+        .map(|n| {
+            let dx = raster.x(n % raster.columns) - ship.position[0];
+            let dy = raster.y(n / raster.columns) - ship.position[1];
+            let (forward, across) = (dx * ax + dy * ay, dx * ay - dy * ax);
+            // The arms start at the bow.
+            forward < 0.0 && across.abs() < slope * (0.5 * ship.length - forward)
+        })
+        .collect()
+}

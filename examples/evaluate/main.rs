@@ -1,0 +1,112 @@
+//! How good are generated images? Every figure beside the simulator's own, on scenes that no training set holds.
+//!
+//! ```text
+//! cargo run --release --example evaluate -- --simulator-only
+//! ```
+//!
+//! Writes `report.json`, `report.md`, `spectrum.svg` and `wake_correlation.svg`. `docs/evaluation.md` says what each
+//! figure means.
+
+mod judge;
+mod measurements;
+mod pixels;
+mod plot;
+mod report;
+mod scenes;
+mod source;
+mod statistics;
+mod swaps;
+mod timing;
+mod wake;
+
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use judge::{Judged, Plan, judge};
+use source::{OtherSea, Result};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use wake_ldm::metrics::{Lpips, LpipsNetwork};
+use wake_physics::output;
+
+/// Judge generated images against the simulator.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// Judge the simulator itself, with another random sea, in the place of a model: what a perfect model would get
+    #[arg(long)]
+    simulator_only: bool,
+    /// Held-out scenes
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    count: u32,
+    /// AlexNet weights of torchvision as safetensors, for LPIPS; without them LPIPS is left out
+    #[arg(long, value_name = "FILE", requires = "lpips_linear")]
+    lpips_backbone: Option<PathBuf>,
+    /// Linear weights of the package lpips as safetensors
+    #[arg(long, value_name = "FILE", requires = "lpips_backbone")]
+    lpips_linear: Option<PathBuf>,
+    /// Folder of the results, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/evaluate")]
+    out: PathBuf,
+    /// Print the report as JSON on standard output, and nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    output::make_folder(&arguments.out)?;
+    let lpips = lpips(arguments)?;
+    if !arguments.simulator_only {
+        return Err(
+            "there is no trained model in this version; judge the simulator with --simulator-only"
+                .into(),
+        );
+    }
+    let judged = Judged {
+        source: &OtherSea,
+        name: "simulator with another random sea",
+        conditions: Vec::new(),
+    };
+    let plan = Plan::of(arguments.count as usize);
+    let bar = ProgressBar::new(plan.steps(&judged) as u64);
+    bar.set_style(ProgressStyle::with_template(
+        "{msg:20} {bar:30} {pos}/{len}, {eta} left",
+    )?);
+    let report = judge(&plan, &judged, lpips.as_ref(), &bar)?;
+    bar.finish_and_clear();
+    let text = report::markdown(&report);
+    output::write_json(&arguments.out.join("report.json"), &report)?;
+    output::write_atomically(&arguments.out.join("report.md"), text.as_bytes())?;
+    plot::spectrum(&arguments.out.join("spectrum.svg"), &report)?;
+    plot::wake(&arguments.out.join("wake_correlation.svg"), &report)?;
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else {
+        println!("{text}\nwritten to {}", arguments.out.display());
+    }
+    Ok(())
+}
+
+fn lpips(arguments: &Arguments) -> Result<Option<Lpips>> {
+    let (Some(backbone), Some(linear)) = (&arguments.lpips_backbone, &arguments.lpips_linear)
+    else {
+        return Ok(None);
+    };
+    let device = burn::tensor::Device::default();
+    Ok(Some(Lpips::load(
+        LpipsNetwork::Alex,
+        backbone,
+        linear,
+        &device,
+    )?))
+}
