@@ -105,7 +105,9 @@ impl Diffusion {
             return Err(Error::InvalidOption {
                 option: "batch".to_owned(),
                 value: options.batch.to_string(),
-                expected: format!("a multiple of the {parts} parts that devices and accumulation make"),
+                expected: format!(
+                    "a multiple of the {parts} parts that devices and accumulation make"
+                ),
             });
         }
         let device = devices[0].clone();
@@ -146,7 +148,10 @@ impl Diffusion {
                     value: format!("without {name} {shape:?}"),
                     expected: "all tensors of the model".to_owned(),
                 })?;
-                Ok(Tensor::from_data(TensorData::new(numbers, [shape.iter().product::<usize>()]), &device))
+                Ok(Tensor::from_data(
+                    TensorData::new(numbers, [shape.iter().product::<usize>()]),
+                    &device,
+                ))
             };
             names.iter().map(take).collect()
         };
@@ -220,10 +225,13 @@ impl Diffusion {
         let report = self.trainer.step(|model, device, part| {
             let positions = (0..each).map(|i| first + (part * each + i) as u64);
             let (loss, losses) = loss(model, this.part(set, positions, device));
-            sums.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[part] = losses;
+            sums.lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)[part] = losses;
             loss
         });
-        let sums = sums.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let sums = sums
+            .into_inner()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         let mean = |value: fn(&Losses) -> f64| sums.iter().map(value).sum::<f64>() / parts as f64;
         let losses = Losses {
             flow: mean(|l| l.flow),
@@ -246,28 +254,44 @@ impl BatchMaker<'_> {
     fn part(&self, set: &LatentSet, positions: impl Iterator<Item = u64>, device: &Device) -> Part {
         let random = NoiseSource::new(self.options.seed);
         let positions: Vec<u64> = positions.collect();
-        let draws: Vec<FlowDraw> = positions.iter().map(|&p| FlowDraw::new(random, p)).collect();
-        let indices: Vec<usize> = positions.iter().map(|&p| shuffled(random, p, set.len())).collect();
+        let draws: Vec<FlowDraw> = positions
+            .iter()
+            .map(|&p| FlowDraw::new(random, p))
+            .collect();
+        let indices: Vec<usize> = positions
+            .iter()
+            .map(|&p| shuffled(random, p, set.len()))
+            .collect();
         let examples: Vec<_> = indices.iter().map(|&i| set.example(i)).collect();
         let grid = MapGrid {
             size: self.config.image_size,
             spacing: self.config.spacing,
         };
         let all: Vec<Conditions> = examples.iter().map(|e| e.conditions).collect();
-        let shown = draws.iter().map(|d| if d.numbers { 1.0 } else { 0.0 }).collect();
+        let shown = draws
+            .iter()
+            .map(|d| if d.numbers { 1.0 } else { 0.0 })
+            .collect();
         let prompts: Vec<Vec<u32>> = (examples.iter().zip(&draws).zip(&positions))
             .map(|((example, draw), &position)| {
                 let wording = random.uniform(ORDER_STREAM, (1 << 40) + position);
                 let count = example.prompts.len();
                 let chosen = example.prompts.get((wording * count as f64) as usize);
-                chosen.filter(|_| draw.words).map_or_else(|| self.nothing.to_vec(), Clone::clone)
+                chosen
+                    .filter(|_| draw.words)
+                    .map_or_else(|| self.nothing.to_vec(), Clone::clone)
             })
             .collect();
-        let said: Vec<f32> = (all.iter().zip(&draws)).flat_map(|(c, draw)| said(c, draw.words)).collect();
+        let said: Vec<f32> = (all.iter().zip(&draws))
+            .flat_map(|(c, draw)| said(c, draw.words))
+            .collect();
         let row = |numbers: Vec<f32>, width: usize| -> Tensor<2> {
             Tensor::from_data(TensorData::new(numbers, [draws.len(), width]), device)
         };
-        let sources: Vec<NoiseSource> = positions.iter().map(|&p| noise_of(self.options.seed, p)).collect();
+        let sources: Vec<NoiseSource> = positions
+            .iter()
+            .map(|&p| noise_of(self.options.seed, p))
+            .collect();
         let known = Known::new(&all, grid, device);
         Part {
             latents: set.latents(&indices, device),
@@ -338,7 +362,9 @@ fn loss(model: &WakeModel, part: Part) -> (Tensor<1>, Losses) {
     let (context, summary) = model.read(&part.words);
     let words = (model.numbers(summary.clone()) - part.said).square().mean();
     let encoded = model.encode(part.known, context, summary);
-    let grey = ((model.mean_grey(&encoded) - part.grey) * 10.0).square().mean();
+    let grey = ((model.mean_grey(&encoded) - part.grey) * 10.0)
+        .square()
+        .mean();
     let level = part.sigma.clone().reshape([-1, 1, 1, 1]);
     let noisy = part.latents.clone() * (level.clone().neg() + 1.0) + part.noise.clone() * level;
     let input = ModelInput {
