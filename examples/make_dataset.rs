@@ -82,7 +82,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     if arguments.json {
         let report = json!({
             "folder": folder, "images": there, "made": made, "seconds": seconds,
-            "images_per_second": made as f64 / seconds, "dataset": manifest,
+            "images_per_second": made as f64 / seconds, "shard": manifest.shard, "dataset": manifest,
         });
         println!("{report:#}");
     } else {
