@@ -77,11 +77,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         "--weights is missing: give the folder of a model in diffusers layout, such as Stable \
          Diffusion v1.4 (this build has no model of its own yet)",
     )?;
-    let prompt = prompt(arguments)?;
+    let (prompt, grid) = prompt(arguments)?;
     let device = device(&arguments.device)?;
     let begin = Instant::now();
     let pipeline = Pipeline::load(weights, &device)?;
     let load = begin.elapsed().as_secs_f64();
+    check_grid(grid, pipeline.image_size())?;
     let request = request(arguments, &prompt, &pipeline)?;
     let (images, mut seconds) = generate(&pipeline, &request, arguments, &prompt)?;
     seconds["load"] = json!(load);
@@ -103,16 +104,29 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The prompt as given, or a scene in words.
-fn prompt(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+/// The prompt as given, or a scene in words; and the rows and columns of a scene that was asked for.
+fn prompt(arguments: &Arguments) -> Result<(String, Option<[usize; 2]>), Box<dyn Error>> {
     if let Some(prompt) = &arguments.prompt {
-        return Ok(prompt.clone());
+        return Ok((prompt.clone(), None));
     }
-    let scene = match &arguments.scene {
-        Some(path) => Scene::read(path)?,
-        None => Scene::default(),
+    let Some(path) = &arguments.scene else {
+        return Ok((wake_text::prompt(&Scene::default())?, None));
     };
-    Ok(wake_text::prompt(&scene)?)
+    let scene = Scene::read(path)?;
+    let grid = [scene.grid.rows, scene.grid.columns];
+    Ok((wake_text::prompt(&scene)?, Some(grid)))
+}
+
+/// Refuses a scene whose image has another size than the model's.
+fn check_grid(grid: Option<[usize; 2]>, [rows, columns]: [usize; 2]) -> Result<(), String> {
+    match grid {
+        Some(grid) if grid != [rows, columns] => Err(format!(
+            "the scene's grid is {} × {} pixels, but the model makes {rows} × {columns}; set grid.rows and \
+             grid.columns to that",
+            grid[0], grid[1]
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn request_scheduler(

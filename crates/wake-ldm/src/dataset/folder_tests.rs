@@ -164,15 +164,12 @@ fn a_set_with_awkward_numbers_continues() {
     assert_eq!(made(folder.path(), &manifest), 0);
     let shards = TempDir::new().unwrap();
     for number in 0..2 {
-        let shard = Some(Shard { number, of: 2 });
-        let path = shard_folder(shards.path(), shard.unwrap());
-        made(
-            &path,
-            &Manifest {
-                shard,
-                ..manifest.clone()
-            },
-        );
+        let shard = Shard { number, of: 2 };
+        let part = Manifest {
+            shard: Some(shard),
+            ..manifest.clone()
+        };
+        made(&shard_folder(shards.path(), shard), &part);
     }
     merge(shards.path()).unwrap();
     assert_eq!(tree(shards.path()), tree(folder.path()));
