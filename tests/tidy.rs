@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Longest source file [lines of code]: tests, comments and blank lines are not counted. The aim is 300; two
-/// schedulers with all their options exceed it by less than 20.
-const LONGEST_FILE: usize = 320;
+/// Longest source file [lines of code]: tests, comments and blank lines are not counted.
+const LONGEST_FILE: usize = 300;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -132,7 +131,7 @@ fn imports_point_up_the_lists_of_the_architecture_page() {
 fn crates_meet_in_few_files() {
     let mut wrong = Vec::new();
     let rules: [(&str, &str, &[&str]); 2] = [
-        ("wake-ldm", "wake_physics", &["dataset"]),
+        ("wake-ldm", "wake_physics", &["dataset", "error"]),
         ("wake-ldm", "wake_text", &["dataset", "pipeline", "error"]),
     ];
     for (name, foreign, allowed) in rules {

@@ -163,6 +163,15 @@ pub(crate) fn difference(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).fold(0.0, worst)
 }
 
+/// Fails where numbers differ by more than is allowed.
+pub(crate) fn expect(what: &str, ours: &[f32], expected: &[f32], allowed: f64) {
+    let difference = difference(ours, expected);
+    assert!(
+        difference <= allowed,
+        "{what}: differs by {difference:e}, allowed {allowed:e}"
+    );
+}
+
 /// The largest absolute value.
 pub(crate) fn largest(a: &[f32]) -> f64 {
     a.iter()

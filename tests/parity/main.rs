@@ -5,6 +5,7 @@
 #![cfg(feature = "ldm")]
 #![allow(clippy::unwrap_used, reason = "in tests, a panic is the report")]
 
+mod adaptations;
 mod golden;
 #[cfg(feature = "train")]
 mod gradients;
@@ -15,5 +16,9 @@ mod pipeline;
 mod precision;
 mod published;
 mod requests;
+mod saving;
 mod schedulers;
+mod taps;
+mod tiling;
 mod units;
+mod weight_files;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use serde_json::Value;
@@ -10,21 +10,12 @@ use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::text::ClipTextConfig;
 use wake_ldm::unet::{UNetConfig, UNetInput};
 use wake_ldm::weights::{self, Layout};
-use wake_ldm::{Error, Mismatch};
 
-use crate::golden::{Golden, devices, difference, folder, json, numbers, own_folder};
+use crate::golden::{Golden, devices, expect, folder, json, numbers};
 
 /// Ten times the noise floor of a model.
 fn allowed(model: &Value, floor: &str) -> f64 {
     10.0 * model[floor].as_f64().unwrap()
-}
-
-fn expect(what: &str, ours: &[f32], expected: &[f32], allowed: f64) {
-    let difference = difference(ours, expected);
-    assert!(
-        difference <= allowed,
-        "{what}: differs by {difference:e}, allowed {allowed:e}"
-    );
 }
 
 fn ids(golden: &Golden, device: &Device) -> Tensor<2, Int> {
@@ -217,229 +208,5 @@ fn stable_diffusion_has_its_known_tensors() {
             known["meta"]["parameters"][name].as_u64(),
             "{name}"
         );
-    }
-}
-
-/// Any model of the fixtures that stores its weights under today's names.
-fn some_unet() -> PathBuf {
-    let models = folder().join("models");
-    let manifest = json(&models.join("manifest.json"));
-    let found = manifest["models"].as_object().unwrap().iter();
-    let unets = found.filter(|(_, model)| model["class"] == "UNet2DConditionModel");
-    models.join(unets.map(|(name, _)| name).next().unwrap())
-}
-
-#[test]
-fn what_is_written_is_what_was_read() {
-    let folder = some_unet();
-    let (_, device) = devices().remove(0);
-    let (unet, _) = weights::load_unet(&folder, &device).unwrap();
-    let written = tempfile::tempdir().unwrap();
-    let path = written.path().join("diffusion_pytorch_model.safetensors");
-    weights::save(&unet, Layout::Diffusers, &path).unwrap();
-    let [ours, original] =
-        [&path, &folder.join("diffusion_pytorch_model.safetensors")].map(|p| Golden::read(p));
-    let mut names: Vec<&str> = original.names().collect();
-    names.sort_unstable();
-    for name in &names {
-        assert_eq!(ours.shape(name), original.shape(name), "{name}");
-        assert!(ours.f32s(name) == original.f32s(name), "{name}");
-    }
-    assert_eq!(ours.names().count(), names.len());
-}
-
-/// A file with one tensor gone, one too many and one of another shape: all named, nothing loaded.
-#[test]
-fn files_that_do_not_fit_are_refused_with_every_name() {
-    let folder = some_unet();
-    let (_, device) = devices().remove(0);
-    let config = UNetConfig::read(&folder.join("config.json")).unwrap();
-    let golden = Golden::read(&folder.join("diffusion_pytorch_model.safetensors"));
-    let mut tensors: Vec<(String, Vec<usize>, Vec<u8>)> = golden
-        .names()
-        .filter(|name| *name != "conv_in.bias")
-        .map(|name| {
-            let bytes = golden
-                .f32s(name)
-                .iter()
-                .flat_map(|x| x.to_le_bytes())
-                .collect();
-            (name.to_owned(), golden.shape(name), bytes)
-        })
-        .collect();
-    tensors.push(("stranger".to_owned(), vec![1], vec![0; 4]));
-    for (name, shape, _) in &mut tensors {
-        if name == "conv_out.weight" {
-            shape.reverse();
-        }
-    }
-    let views = tensors.iter().map(|(name, shape, bytes)| {
-        let view =
-            safetensors::tensor::TensorView::new(safetensors::Dtype::F32, shape.clone(), bytes);
-        (name, view.unwrap())
-    });
-    let path = tempfile::tempdir().unwrap().keep().join("odd.safetensors");
-    safetensors::serialize_to_file(views, None, &path).unwrap();
-    let error = weights::load(config.init(&device), Layout::Diffusers, &path).unwrap_err();
-    let Error::WeightsMismatch { mismatch, .. } = error else {
-        panic!("{error}")
-    };
-    let Mismatch {
-        missing,
-        unexpected,
-        misshapen,
-    } = *mismatch;
-    assert_eq!(
-        (missing, unexpected),
-        (vec!["conv_in.bias".to_owned()], vec!["stranger".to_owned()])
-    );
-    assert_eq!(misshapen.len(), 1);
-    assert_eq!(misshapen[0].name, "conv_out.weight");
-}
-
-/// Truncated, oversized, overlapping and senseless files end in an error, not in a panic.
-#[test]
-fn hostile_files_are_refused() {
-    let folder = some_unet();
-    let (_, device) = devices().remove(0);
-    let config = UNetConfig::read(&folder.join("config.json")).unwrap();
-    let whole = std::fs::read(folder.join("diffusion_pytorch_model.safetensors")).unwrap();
-    let with_header = |header: &str, data: usize| {
-        let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
-        bytes.extend(header.as_bytes());
-        bytes.resize(bytes.len() + data, 0);
-        bytes
-    };
-    let entry = |shape: &str, from: usize, to: usize| {
-        format!(r#"{{"dtype":"F32","shape":{shape},"data_offsets":[{from},{to}]}}"#)
-    };
-    let one = |shape: &str, from, to| format!(r#"{{"a":{}}}"#, entry(shape, from, to));
-    let overlapping = format!(
-        r#"{{"a":{},"b":{}}}"#,
-        entry("[2]", 0, 8),
-        entry("[2]", 4, 12)
-    );
-    let mut padded = whole.clone();
-    padded.extend([0; 64]);
-    let files = [
-        vec![],
-        whole[..7].to_vec(),
-        whole[..whole.len() / 2].to_vec(),
-        whole[..whole.len() - 1].to_vec(),
-        padded,
-        u64::MAX.to_le_bytes().repeat(4),
-        (1_u64 << 60).to_le_bytes().to_vec(),
-        with_header("{", 0),
-        with_header("[]", 0),
-        with_header(&one("[1]", 0, usize::MAX), 4),
-        with_header(&one("[9223372036854775807, 4]", 0, 4), 4),
-        with_header(&one("[2]", 8, 0), 8),
-        with_header(&one("[2]", 0, 4), 4),
-        with_header(&overlapping, 12),
-        with_header(&"[".repeat(200_000), 0),
-    ];
-    let temporary = tempfile::tempdir().unwrap();
-    for (i, bytes) in files.into_iter().enumerate() {
-        let path = temporary.path().join(format!("{i}.safetensors"));
-        std::fs::write(&path, bytes).unwrap();
-        let error = weights::load(config.init(&device), Layout::Diffusers, &path).unwrap_err();
-        assert!(
-            matches!(error, Error::InvalidSafetensors { .. }),
-            "{i}: {error}"
-        );
-    }
-    let missing = weights::load(config.init(&device), Layout::Diffusers, temporary.path());
-    assert!(matches!(missing, Err(Error::MissingFile { .. })));
-}
-
-/// The same weights in two files with an index; an index that leaves the folder is refused.
-#[test]
-fn shards_are_read_through_their_index() {
-    let folder = some_unet();
-    let (_, device) = devices().remove(0);
-    let config = UNetConfig::read(&folder.join("config.json")).unwrap();
-    let golden = Golden::read(&folder.join("diffusion_pytorch_model.safetensors"));
-    let temporary = tempfile::tempdir().unwrap();
-    let mut map = serde_json::Map::new();
-    for shard in 0..2 {
-        let file = format!("part-{shard}.safetensors");
-        let chosen: Vec<(&str, Vec<usize>, Vec<u8>)> = golden
-            .names()
-            .filter(|name| name.len() % 2 == shard)
-            .map(|name| {
-                let bytes = golden
-                    .f32s(name)
-                    .iter()
-                    .flat_map(|x| x.to_le_bytes())
-                    .collect();
-                (name, golden.shape(name), bytes)
-            })
-            .collect();
-        let views = chosen.iter().map(|(name, shape, bytes)| {
-            map.insert((*name).to_owned(), file.clone().into());
-            let view =
-                safetensors::tensor::TensorView::new(safetensors::Dtype::F32, shape.clone(), bytes);
-            (*name, view.unwrap())
-        });
-        safetensors::serialize_to_file(views, None, &temporary.path().join(&file)).unwrap();
-    }
-    let index = temporary
-        .path()
-        .join("diffusion_pytorch_model.safetensors.index.json");
-    let write =
-        |map: Value| std::fs::write(&index, serde_json::json!({"weight_map": map}).to_string());
-    write(Value::Object(map)).unwrap();
-    let load = || weights::load(config.init(&device), Layout::Diffusers, temporary.path());
-    let sharded = load().unwrap();
-    let whole = weights::load_unet(&folder, &device).unwrap().0;
-    let input = |x: f64| UNetInput {
-        sample: Tensor::full([1, config.in_channels, 8, 8], x, &device),
-        timesteps: Tensor::full([1], 7.0, &device),
-        context: Tensor::full([1, 3, config.cross_attention_dim], 0.5, &device),
-        condition: None,
-    };
-    assert!(numbers(&sharded.forward(input(0.3))) == numbers(&whole.forward(input(0.3))));
-    write(serde_json::json!({"a": "../../etc/passwd"})).unwrap();
-    assert!(matches!(load(), Err(Error::InvalidSafetensors { .. })));
-}
-
-/// A low-rank adaptation at full and at half strength, against diffusers with peft.
-#[test]
-fn low_rank_adaptations_are_merged() {
-    let folder = own_folder().join("lora");
-    let file = folder.join("pytorch_lora_weights.safetensors");
-    let golden = Golden::read(&folder.join("case.safetensors"));
-    let models = own_folder().with_file_name("pipeline_a");
-    for (backend, device) in devices() {
-        for (scale, name) in [(1.0, "out"), (0.5, "out_half"), (0.0, "out_plain")] {
-            let (unet, _) = weights::load_unet(&models.join("unet"), &device).unwrap();
-            let unet = weights::merge_lora(unet, Layout::Diffusers, "unet", &file, scale).unwrap();
-            let out = unet.forward(UNetInput {
-                sample: golden.tensor("sample", &device),
-                timesteps: Tensor::full([1], golden.i64s("timestep")[0] as f64, &device),
-                context: golden.tensor("encoder_hidden_states", &device),
-                condition: None,
-            });
-            // Ten times the noise floor of the fixtures' U-Nets; merging rounds once more.
-            expect(
-                &format!("{backend} {name}"),
-                &numbers(&out),
-                &golden.f32s(name),
-                2e-5,
-            );
-        }
-        let (unet, config) = weights::load_unet(&models.join("unet"), &device).unwrap();
-        let absent = weights::merge_lora(unet, Layout::Diffusers, "text_encoder", &file, 1.0);
-        assert!(matches!(absent, Err(Error::WeightsMismatch { .. })));
-        let other = UNetConfig {
-            cross_attention_dim: 5,
-            ..config
-        }
-        .init(&device);
-        let misfit = weights::merge_lora(other, Layout::Diffusers, "unet", &file, 1.0);
-        let Err(Error::WeightsMismatch { mismatch, .. }) = misfit else {
-            panic!("it fitted")
-        };
-        assert!(!mismatch.misshapen.is_empty());
     }
 }

@@ -9,7 +9,7 @@ use wake_ldm::pipeline::{Pipeline, Request, StartImage, to_bytes};
 use wake_ldm::scheduler::SchedulerConfig;
 use wake_text::Tokenizer;
 
-use crate::golden::{Golden, devices, difference, folder, json, largest, numbers, own_folder};
+use crate::golden::{Golden, devices, expect, folder, json, largest, numbers, own_folder};
 
 /// A folder of models, and one of runs made with them.
 struct Runs {
@@ -77,7 +77,7 @@ fn start(pipeline: &Pipeline, golden: &Golden) -> Tensor<4> {
     let [pixels, noise] = ["pixels", "posterior_noise"].map(|name| golden.tensor(name, device));
     let encoded = pipeline.encode(pixels, noise);
     // Ten times the noise floor of the models' encoders.
-    expect_within(
+    expect(
         "encoded start",
         &numbers(&encoded),
         &golden.f32s("start"),
@@ -116,19 +116,7 @@ fn request(run: &Value, config: SchedulerConfig, golden: &Golden, pipeline: &Pip
 /// |d| ≤ 2e-5 max|latents|, at least 2e-4.
 fn expect_latents(what: &str, ours: &Tensor<4>, expected: &[f32]) {
     let allowed = (2e-5 * largest(expected)).max(2e-4);
-    let difference = difference(&numbers(ours), expected);
-    assert!(
-        difference <= allowed,
-        "{what}: differs by {difference:e}, allowed {allowed:e}"
-    );
-}
-
-fn expect_within(what: &str, ours: &[f32], expected: &[f32], allowed: f64) {
-    let difference = difference(ours, expected);
-    assert!(
-        difference <= allowed,
-        "{what}: differs by {difference:e}, allowed {allowed:e}"
-    );
+    expect(what, &numbers(ours), expected, allowed);
 }
 
 /// Token ids and embeddings of the prompts, where the run has them.
@@ -160,7 +148,7 @@ fn check_text(
         if golden.has(embeddings) {
             // Ten times the noise floor of the models' text encoders.
             let ours = numbers(&pipeline.embed(&prompts));
-            expect_within(
+            expect(
                 &format!("{name}, {embeddings}"),
                 &ours,
                 &golden.f32s(embeddings),
@@ -175,7 +163,7 @@ fn check_images(name: &str, pipeline: &Pipeline, latents: Tensor<4>, golden: &Go
     let raw = autoencoder.decode(autoencoder.from_latents(latents.clone()));
     let image = pipeline.decode(latents);
     for (what, ours) in [("decoded_raw", &raw), ("image", &image)] {
-        expect_within(
+        expect(
             &format!("{name}, {what}"),
             &numbers(ours),
             &golden.f32s(what),

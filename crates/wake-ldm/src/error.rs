@@ -82,6 +82,26 @@ pub enum Error {
     #[error(transparent)]
     Text(#[from] wake_text::Error),
 
+    /// A scene is not valid, or could not be simulated or written.
+    #[error(transparent)]
+    Scene(#[from] wake_physics::Error),
+
+    /// The recipe of a data set is not understood.
+    #[error("cannot read the recipe: {message}")]
+    Recipe { message: String },
+
+    /// A folder is no data set, or not the one it should be; line 0 is the file or folder as a whole.
+    #[error("{}{}: {message}", path.display(), if *line > 0 { format!(", line {line}") } else { String::new() })]
+    Dataset {
+        path: PathBuf,
+        line: usize,
+        message: String,
+    },
+
+    /// The system gave no thread.
+    #[error("cannot start a thread: {source}; use fewer threads")]
+    Threads { source: std::io::Error },
+
     /// A device computes other numbers than the reference backend.
     #[error(
         "device {device} computes wrong numbers: {stage} differs by {difference:e} of its largest \

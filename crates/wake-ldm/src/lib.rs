@@ -14,12 +14,22 @@ pub mod unet;
 pub mod scheduler;
 pub mod weights;
 
+pub mod conditioning;
+pub mod small;
+
 pub mod pipeline;
+pub mod sampler;
 
 pub mod metrics;
+
+#[cfg(feature = "train")]
+pub mod dataset;
+#[cfg(feature = "train")]
+pub mod train;
 #[cfg(feature = "flex")]
 mod self_check;
 
+pub use sampler::WakeSampler;
 pub use error::{Error, Mismatch, Misshapen, Result};
 #[cfg(feature = "flex")]
 pub use self_check::self_check;

@@ -47,6 +47,20 @@ impl NoiseSource {
         });
         blocks.take(length).collect()
     }
+
+    /// Number `position` of a stream of independent numbers, uniform on the open interval (0, 1).
+    ///
+    /// ```text
+    /// words = Philox4x32-10(counter = [position mod 2³², position div 2³², stream, 1], key as above)
+    /// u     = (2²⁰ word₀ + ⌊word₁/2¹²⌋ + ½) / 2⁵²
+    /// ```
+    pub fn uniform(self, stream: u32, position: u64) -> f64 {
+        let key = [self.seed as u32, (self.seed >> 32) as u32];
+        let counter = [position as u32, (position >> 32) as u32, stream, 1];
+        let [high, low, ..] = philox(counter, key);
+        let bits = (u64::from(high) << 20) | u64::from(low >> 12);
+        (bits as f64 + 0.5) / (1u64 << 52) as f64
+    }
 }
 
 /// Noise for a batch of images, each from its own source.
@@ -159,6 +173,37 @@ mod tests {
             / n as f64;
         assert!(neighbours.abs() < allowed(1.0));
         assert!(numbers.iter().all(|x| x.is_finite()));
+    }
+
+    #[test]
+    fn uniform_numbers_fill_the_interval() {
+        let source = NoiseSource::new(7);
+        let n = 100_000;
+        let numbers: Vec<f64> = (0..n).map(|i| source.uniform(3, i)).collect();
+        assert!(numbers.iter().all(|u| (0.0..1.0).contains(u) && *u > 0.0));
+        // Five standard errors: of the mean, √(1/12 n); of the mean product of neighbours, √(7/144 n).
+        let mean = numbers.iter().sum::<f64>() / n as f64;
+        assert!((mean - 0.5).abs() < 5.0 / (12.0 * n as f64).sqrt());
+        let neighbours = numbers.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / (n - 1) as f64;
+        assert!((neighbours - 0.25).abs() < 5.0 * (7.0 / (144.0 * n as f64)).sqrt());
+        let tenths = numbers.iter().fold([0u32; 10], |mut count, u| {
+            count[(10.0 * u) as usize] += 1;
+            count
+        });
+        // Five standard deviations of a binomial count.
+        let allowed = 5.0 * (0.09 * n as f64).sqrt();
+        assert!(
+            tenths
+                .iter()
+                .all(|&c| (f64::from(c) - 0.1 * n as f64).abs() < allowed)
+        );
+        for other in [
+            source.uniform(4, 0),
+            source.uniform(3, 1 << 32),
+            NoiseSource::new(8).uniform(3, 0),
+        ] {
+            assert!((other - numbers[0]).abs() > 1e-9);
+        }
     }
 
     #[test]

@@ -164,7 +164,7 @@ impl ClipTextConfig {
                 .map(|_| ClipLayer::new(self, device))
                 .collect(),
             final_layer_norm: self.norm(device),
-            end_token: self.end_token,
+            config: self.clone(),
         }
     }
 
@@ -205,14 +205,19 @@ pub struct ClipText {
     position_embedding: Embedding,
     layers: Vec<ClipLayer>,
     final_layer_norm: LayerNorm,
-    end_token: i64,
+    #[module(skip)]
+    config: ClipTextConfig,
 }
 
 impl ClipText {
+    /// What the model was built from.
+    pub fn config(&self) -> &ClipTextConfig {
+        &self.config
+    }
+
     /// Numbers per token.
     pub fn width(&self) -> usize {
-        let [_, width] = self.token_embedding.weight.dims();
-        width
+        self.config.hidden_size
     }
 
     /// Encodes prompts.
@@ -258,7 +263,7 @@ impl ClipText {
 
     fn embed(&self, ids: Tensor<2, Int>) -> Tensor<3> {
         let [_, tokens] = ids.dims();
-        let [longest, _] = self.position_embedding.weight.dims();
+        let longest = self.config.max_tokens;
         assert!(
             tokens <= longest,
             "{tokens} tokens, this text encoder takes at most {longest}"
@@ -273,7 +278,7 @@ impl ClipText {
         let ids: Vec<i64> = ids.into_data().iter::<i64>().collect();
         let ends = ids
             .chunks(tokens)
-            .map(|prompt| end_of(prompt, self.end_token));
+            .map(|prompt| end_of(prompt, self.config.end_token));
         let [_, _, width] = states.dims();
         let rows = ends.zip(0..batch).map(|(end, i)| {
             states

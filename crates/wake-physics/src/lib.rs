@@ -36,6 +36,7 @@
 // In the order of the data flow; docs/architecture.md is the same list.
 mod error;
 pub mod constants;
+mod vectorize;
 mod raster;
 pub mod quadrature;
 mod memory;
@@ -68,5 +69,5 @@ pub use error::{Error, Result};
 pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
-pub use simulate::{Method, Seconds, Simulation, simulate, simulate_with};
+pub use simulate::{Method, Seconds, Simulation, labels_of, simulate, simulate_with};
 pub use track::Track;

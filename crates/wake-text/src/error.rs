@@ -22,6 +22,9 @@ pub enum Error {
     /// A file could not be read.
     #[error("cannot read {}: {message}", path.display())]
     File { path: PathBuf, message: String },
+    /// A file could not be written.
+    #[error("cannot write {}: {message}", path.display())]
+    Write { path: PathBuf, message: String },
     /// A vocabulary file is broken.
     #[error("{}, line {line}, column {column}: {message}", path.display())]
     Vocabulary {

@@ -98,6 +98,16 @@ impl Tokenizer {
         Vocabulary::from_tokenizer_json(path).map(Self::new)
     }
 
+    /// Writes the files that transformers' `CLIPTokenizer` and [`Tokenizer::from_folder`] read:
+    /// `vocab.json`, `merges.txt`, `special_tokens_map.json` and `tokenizer_config.json`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Write`](crate::Error::Write) if a file cannot be written.
+    pub fn save(&self, folder: &Path) -> Result<()> {
+        self.vocabulary.save(folder, TOKENS)
+    }
+
     fn new(vocabulary: Vocabulary) -> Self {
         Self { vocabulary }
     }

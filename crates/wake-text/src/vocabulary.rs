@@ -7,6 +7,7 @@
 use crate::error::{Error, Result};
 use crate::vocabulary_files::{parse_merges, parse_pad, parse_tokenizer, parse_vocab, read};
 use rayon::prelude::*;
+use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::io::Read;
 use std::path::Path;
@@ -88,6 +89,32 @@ impl Vocabulary {
         Ok(vocabulary)
     }
 
+    /// Writes vocabulary, merges, marks and the length of a prompt into a folder, made if absent.
+    pub(crate) fn save(&self, folder: &Path, tokens: usize) -> Result<()> {
+        let failed = |message: String| Error::Write {
+            path: folder.to_owned(),
+            message,
+        };
+        std::fs::create_dir_all(folder).map_err(|e| failed(e.to_string()))?;
+        self.bpe
+            .save(folder, None)
+            .map_err(|e| failed(e.to_string()))?;
+        let marks = marks_json(&self.bpe.id_to_token(self.pad).unwrap_or_default());
+        let mut config = marks.clone();
+        config["tokenizer_class"] = "CLIPTokenizer".into();
+        config["model_max_length"] = tokens.into();
+        config["add_prefix_space"] = false.into();
+        config["do_lower_case"] = true.into();
+        config["errors"] = "replace".into();
+        [
+            ("special_tokens_map.json", marks),
+            ("tokenizer_config.json", config),
+        ]
+        .into_iter()
+        .try_for_each(|(name, json)| std::fs::write(folder.join(name), format!("{json:#}\n")))
+        .map_err(|e| failed(e.to_string()))
+    }
+
     fn build(path: &Path, vocab: Vocab, merges: Merges) -> Result<Self> {
         let whole_words = word_ends(&vocab);
         let bpe = BPE::builder()
@@ -142,6 +169,13 @@ fn id(bpe: &BPE, path: &Path, token: &str) -> Result<u32> {
     bpe.token_to_id(token).ok_or_else(|| Error::File {
         path: path.to_owned(),
         message: format!("the vocabulary has no token '{token}'"),
+    })
+}
+
+/// The marks as transformers names them.
+fn marks_json(pad: &str) -> Value {
+    json!({
+        "bos_token": START_MARK, "eos_token": END_MARK, "unk_token": END_MARK, "pad_token": pad,
     })
 }
 
@@ -450,6 +484,27 @@ mod tests {
             );
             assert!(message.contains(words), "{message}");
         }
+    }
+
+    /// What is written is read again as the same ids, words and padding.
+    #[test]
+    fn a_saved_vocabulary_comes_back() {
+        let saved = TempDir::new().unwrap();
+        let inner = saved.path().join("tokenizer");
+        let mut vocabulary = embedded();
+        vocabulary.pad = 0;
+        vocabulary.save(&inner, 77).unwrap();
+        let again = Vocabulary::from_folder(saved.path()).unwrap();
+        let clip = embedded();
+        assert_eq!(again.bpe.get_vocab(), clip.bpe.get_vocab());
+        assert_eq!(again.whole_words, clip.whole_words);
+        assert_eq!(
+            (again.start, again.end, again.pad),
+            (clip.start, clip.end, 0)
+        );
+        let blocked = inner.join("vocab.json");
+        let refused = Tokenizer::clip().save(&blocked).unwrap_err();
+        assert!(matches!(refused, Error::Write { .. }), "{refused}");
     }
 
     #[test]

@@ -38,12 +38,8 @@ pub struct AutoencoderKl {
     quant_conv: Option<Conv2d>,
     post_quant_conv: Option<Conv2d>,
     decoder: Decoder,
-    patch_size: usize,
-    downsampling: usize,
-    latent_channels: usize,
-    image_channels: usize,
-    scaling_factor: f64,
-    shift_factor: f64,
+    #[module(skip)]
+    config: AutoencoderKlConfig,
 }
 
 impl AutoencoderKlConfig {
@@ -66,17 +62,17 @@ impl AutoencoderKlConfig {
                 .post_quant_conv
                 .then(|| conv1x1(latent, latent, device)),
             decoder: Decoder::new(self, device),
-            patch_size: self.patch_size,
-            downsampling: self.downsampling(),
-            latent_channels: latent,
-            image_channels: self.in_channels,
-            scaling_factor: self.scaling_factor,
-            shift_factor: self.shift_factor,
+            config: self.clone(),
         }
     }
 }
 
 impl AutoencoderKl {
+    /// What the model was built from.
+    pub fn config(&self) -> &AutoencoderKlConfig {
+        &self.config
+    }
+
     /// Encodes images in [−1, 1].
     ///
     /// # Shapes
@@ -93,12 +89,16 @@ impl AutoencoderKl {
     /// # Shapes
     ///
     /// As [`encode`](Self::encode).
+    ///
+    /// # Panics
+    ///
+    /// When the tile is no multiple of the downsampling, or the overlap outside 0…0.5.
     pub fn encode_tiled(&self, image: Tensor<4>, tiling: Tiling) -> GaussianPosterior {
-        let sizes = [tiling.tile, tiling.tile / self.downsampling];
-        if fits(&image, sizes[0]) {
+        let [pixels, latents] = tiling.cuts(self.downsampling());
+        if fits(&image, pixels.tile) {
             return self.encode(image);
         }
-        let moments = tiling::in_tiles(image, sizes, tiling.overlap, |tile| self.moments(tile));
+        let moments = tiling::in_tiles(image, pixels, latents, |tile| self.moments(tile));
         GaussianPosterior::from_moments(moments)
     }
 
@@ -110,7 +110,9 @@ impl AutoencoderKl {
     pub fn moments(&self, image: Tensor<4>) -> Tensor<4> {
         let dtype = image.dtype();
         let image = cast_to(image, self.decoder.dtype());
-        let encoded = self.encoder.forward(space_to_depth(image, self.patch_size));
+        let encoded = self
+            .encoder
+            .forward(space_to_depth(image, self.config.patch_size));
         let moments = match &self.quant_conv {
             Some(conv) => conv.forward(encoded),
             None => encoded,
@@ -132,7 +134,7 @@ impl AutoencoderKl {
             None => z,
         };
         cast_to(
-            depth_to_space(self.decoder.forward(z), self.patch_size),
+            depth_to_space(self.decoder.forward(z), self.config.patch_size),
             dtype,
         )
     }
@@ -158,42 +160,46 @@ impl AutoencoderKl {
     /// # Shapes
     ///
     /// As [`decode`](Self::decode).
+    ///
+    /// # Panics
+    ///
+    /// As [`encode_tiled`](Self::encode_tiled).
     pub fn decode_tiled(&self, z: Tensor<4>, tiling: Tiling) -> Tensor<4> {
-        let sizes = [tiling.tile / self.downsampling, tiling.tile];
-        if fits(&z, sizes[0]) {
+        let [pixels, latents] = tiling.cuts(self.downsampling());
+        if fits(&z, latents.tile) {
             return self.decode(z);
         }
-        tiling::in_tiles(z, sizes, tiling.overlap, |tile| self.decode(tile))
+        tiling::in_tiles(z, latents, pixels, |tile| self.decode(tile))
     }
 
     /// What the diffusion model sees of z: shifted and scaled to variance 1.
     pub fn to_latents(&self, z: Tensor<4>) -> Tensor<4> {
-        (z - self.shift_factor) * self.scaling_factor
+        (z - self.config.shift_factor) * self.config.scaling_factor
     }
 
     /// What the decoder sees of a latent image: the inverse of [`to_latents`](Self::to_latents).
     pub fn from_latents(&self, latents: Tensor<4>) -> Tensor<4> {
-        latents / self.scaling_factor + self.shift_factor
+        latents / self.config.scaling_factor + self.config.shift_factor
     }
 
     /// What latents are multiplied with before diffusion.
     pub fn scaling_factor(&self) -> f64 {
-        self.scaling_factor
+        self.config.scaling_factor
     }
 
     /// How many pixels one latent pixel stands for, along each axis.
     pub fn downsampling(&self) -> usize {
-        self.downsampling
+        self.config.downsampling()
     }
 
     /// Channels of the image.
     pub fn image_channels(&self) -> usize {
-        self.image_channels
+        self.config.in_channels
     }
 
     /// Channels of the latent image.
     pub fn latent_channels(&self) -> usize {
-        self.latent_channels
+        self.config.latent_channels
     }
 }
 

@@ -14,6 +14,36 @@ pub struct Tiling {
     pub overlap: f64,
 }
 
+/// One side of the cut: tiles of so many pixels, of which so many overlap the next tile.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cut {
+    pub(super) tile: usize,
+    pub(super) overlap: usize,
+}
+
+impl Tiling {
+    /// The cut of the image and of the latent image. The overlap is a whole number of latent pixels, so
+    /// that tiles lie on each other in both.
+    pub(super) fn cuts(self, downsampling: usize) -> [Cut; 2] {
+        let Self { tile, overlap } = self;
+        assert!(
+            tile > 0 && tile.is_multiple_of(downsampling),
+            "a tile of {tile} pixels; its side must be a multiple of {downsampling}"
+        );
+        assert!(
+            (0.0..=0.5).contains(&overlap),
+            "tiles overlap by {overlap} of their side; it must lie in 0…0.5"
+        );
+        let latent = tile / downsampling;
+        let overlap = share(latent, overlap);
+        let cut = |scale: usize| Cut {
+            tile: latent * scale,
+            overlap: overlap * scale,
+        };
+        [cut(downsampling), cut(1)]
+    }
+}
+
 impl Default for Tiling {
     /// Tiles of 512 × 512 pixels that overlap by a quarter.
     fn default() -> Self {
@@ -24,34 +54,33 @@ impl Default for Tiling {
     }
 }
 
-/// Runs `run` on tiles of `size_in` pixels, each of which becomes `size_out` pixels, and joins them.
+/// Runs `run` on tiles cut as `from`, each of which becomes a tile as `to`, and joins them.
 pub(super) fn in_tiles(
     x: Tensor<4>,
-    [size_in, size_out]: [usize; 2],
-    overlap: f64,
+    from: Cut,
+    to: Cut,
     run: impl Fn(Tensor<4>) -> Tensor<4>,
 ) -> Tensor<4> {
     let [_, _, rows, columns] = x.dims();
-    let stride = share(size_in, 1.0 - overlap).max(1);
-    let blend = share(size_out, overlap);
+    let stride = from.tile - from.overlap;
     let mut above: Vec<Tensor<4>> = Vec::new();
     let mut joined = Vec::new();
     for top in (0..rows).step_by(stride) {
         let mut row: Vec<Tensor<4>> = Vec::new();
         for left in (0..columns).step_by(stride) {
-            let (height, width) = (size_in.min(rows - top), size_in.min(columns - left));
+            let (height, width) = (from.tile.min(rows - top), from.tile.min(columns - left));
             let mut tile = run(x.clone().narrow(2, top, height).narrow(3, left, width));
             if let Some(neighbour) = above.get(row.len()) {
-                tile = fade(neighbour, tile, blend, 2);
+                tile = fade(neighbour, tile, to.overlap, 2);
             }
             if let Some(neighbour) = row.last() {
-                tile = fade(neighbour, tile, blend, 3);
+                tile = fade(neighbour, tile, to.overlap, 3);
             }
             row.push(tile);
         }
         joined.push(Tensor::cat(
             row.iter()
-                .map(|tile| crop(tile, size_out - blend))
+                .map(|tile| crop(tile, to.tile - to.overlap))
                 .collect(),
             3,
         ));
@@ -119,6 +148,11 @@ mod tests {
 
     use super::*;
 
+    const CUT: Cut = Cut {
+        tile: 8,
+        overlap: 2,
+    };
+
     fn image(rows: i64, columns: i64) -> Tensor<4> {
         Tensor::<1, Int>::arange(0..rows * columns, &Device::flex())
             .float()
@@ -131,7 +165,7 @@ mod tests {
     fn joined_tiles_of_an_image_are_the_image() {
         for (rows, columns) in [(8, 8), (16, 8), (13, 29), (7, 40), (1, 9)] {
             let x = image(rows, columns);
-            let joined = in_tiles(x.clone(), [8, 8], 0.25, |tile| tile);
+            let joined = in_tiles(x.clone(), CUT, CUT, |tile| tile);
             let tolerance = Tolerance::<f32>::absolute(1e-4);
             joined
                 .into_data()
@@ -139,11 +173,22 @@ mod tests {
         }
     }
 
+    /// Whatever the share, tiles and overlaps of image and latent image stand in the same proportion.
+    #[test]
+    fn cuts_are_whole_latent_pixels() {
+        for (tile, overlap) in [(512, 0.25), (520, 0.25), (8, 0.5), (72, 0.3), (8, 0.0)] {
+            let [image, latent] = Tiling { tile, overlap }.cuts(8);
+            assert_eq!((image.tile, latent.tile * 8), (tile, tile));
+            assert_eq!(image.overlap, latent.overlap * 8);
+            assert!(latent.tile > latent.overlap);
+        }
+    }
+
     /// Tiles that all show their own number fade linearly: 0 to 1 over the two overlapping pixels.
     #[test]
     fn neighbours_fade_linearly() {
         let calls = std::cell::Cell::new(0.0_f32);
-        let joined = in_tiles(image(8, 14), [8, 8], 0.25, |tile| {
+        let joined = in_tiles(image(8, 14), CUT, CUT, |tile| {
             let value = calls.replace(calls.get() + 1.0);
             tile * 0.0 + value
         });

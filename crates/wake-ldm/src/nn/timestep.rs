@@ -62,12 +62,6 @@ pub struct TimestepEmbedding {
 }
 
 impl TimestepEmbedding {
-    /// Length of what is embedded.
-    pub fn input_channels(&self) -> usize {
-        let [channels, _] = self.linear_1.weight.dims();
-        channels
-    }
-
     /// Layers with random weights.
     pub fn new(channels_in: usize, channels_out: usize, device: &Device) -> Self {
         Self {

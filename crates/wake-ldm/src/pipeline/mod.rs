@@ -9,6 +9,7 @@ mod guidance;
 mod load;
 mod request;
 mod sampling;
+mod save;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -130,6 +131,11 @@ impl Pipeline {
         &self.autoencoder
     }
 
+    /// Rows and columns of the images of requests that give no size.
+    pub fn image_size(&self) -> [usize; 2] {
+        [self.latent_size * self.autoencoder.downsampling(); 2]
+    }
+
     /// The device that the models lie on.
     pub fn device(&self) -> &Device {
         &self.device
@@ -238,7 +244,7 @@ impl Pipeline {
             (None, Some((StartImage::Latents(x), _)), _) | (None, None, Some(x)) => {
                 last_two(x).map(|size| size * down)
             }
-            (None, None, None) => [self.latent_size * down; 2],
+            (None, None, None) => self.image_size(),
         };
         for (name, size) in [("rows", rows), ("columns", columns)] {
             check_range(name, size as f64, down as f64, 16384.0)?;

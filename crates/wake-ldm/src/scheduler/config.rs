@@ -1,101 +1,56 @@
 //! Reading a scheduler from diffusers' `scheduler_config.json`.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
 use super::ddim::DdimConfig;
 use super::ddpm::DdpmConfig;
 use super::dpm_solver_pp::DpmSolverConfig;
-use super::euler::EulerConfig;
-use super::euler_ancestral::EulerAncestralConfig;
+use super::euler::Euler;
+use super::euler_ancestral::EulerAncestral;
 use super::flow_match_euler::FlowMatchEulerConfig;
-use super::heun::HeunConfig;
+use super::heun::Heun;
+use super::known_options::KNOWN;
 use super::lcm::LcmConfig;
-use super::lms::LmsConfig;
+use super::lms::Lms;
 use super::pndm::PndmConfig;
+use super::sigma_sampler::SigmaConfig;
 use super::unipc::UniPcConfig;
-use super::{NoiseSchedule, Scheduler};
+use super::{Method, NoiseSchedule, Scheduler};
 use crate::error::{Error, Result};
 use crate::options::Options;
 
-/// Class names of the schedulers, as diffusers writes them, each after its short name.
-const CLASSES: [(&str, &str); 11] = [
-    ("ddpm", "DDPMScheduler"),
-    ("ddim", "DDIMScheduler"),
-    ("pndm", "PNDMScheduler"),
-    ("euler", "EulerDiscreteScheduler"),
-    ("euler-ancestral", "EulerAncestralDiscreteScheduler"),
-    ("dpm++", "DPMSolverMultistepScheduler"),
-    ("heun", "HeunDiscreteScheduler"),
-    ("lms", "LMSDiscreteScheduler"),
-    ("unipc", "UniPCMultistepScheduler"),
-    ("lcm", "LCMScheduler"),
-    ("flow-match-euler", "FlowMatchEulerDiscreteScheduler"),
-];
+/// A method by its short name and its class name in diffusers, and how its options are read.
+struct Class {
+    short: &'static str,
+    name: &'static str,
+    take: fn(&mut Options) -> Result<Arc<dyn Method>>,
+}
 
-/// Options that some scheduler has. Where a file carries an option of another scheduler, which
-/// happens when diffusers changes the class, it is without effect there and here.
-const KNOWN: [&str; 58] = [
-    "algorithm_type",
-    "base_image_seq_len",
-    "base_shift",
-    "beta_end",
-    "beta_schedule",
-    "beta_start",
-    "clip_sample",
-    "clip_sample_range",
-    "disable_corrector",
-    "dynamic_thresholding_ratio",
-    "euler_at_final",
-    "final_sigmas_type",
-    "flow_shift",
-    "interpolation_type",
-    "invert_sigmas",
-    "lambda_min_clipped",
-    "lower_order_final",
-    "max_image_seq_len",
-    "max_shift",
-    "num_train_timesteps",
-    "original_inference_steps",
-    "predict_x0",
-    "prediction_type",
-    "rescale_betas_zero_snr",
-    "sample_max_value",
-    "set_alpha_to_one",
-    "shift",
-    "shift_terminal",
-    "sigma_max",
-    "sigma_min",
-    "skip_prk_steps",
-    "solver_order",
-    "solver_p",
-    "solver_type",
-    "steps_offset",
-    "stochastic_sampling",
-    "thresholding",
-    "time_shift_type",
-    "timestep_scaling",
-    "timestep_spacing",
-    "timestep_type",
-    "trained_betas",
-    "use_beta_sigmas",
-    "use_dynamic_shifting",
-    "use_exponential_sigmas",
-    "use_flow_sigmas",
-    "use_karras_sigmas",
-    "use_lu_lambdas",
-    "variance_type",
-    // Of schedulers that are not implemented, as files that were converted carry them.
-    "corrector_order",
-    "predictor_order",
-    "rho",
-    "s_churn",
-    "s_noise",
-    "s_tmax",
-    "s_tmin",
-    "sigma_data",
-    "sigma_schedule",
+impl Class {
+    const fn of<M: Method + 'static>(short: &'static str, name: &'static str) -> Self {
+        Self {
+            short,
+            name,
+            take: |options| Ok(Arc::new(M::take(options)?)),
+        }
+    }
+}
+
+static CLASSES: [Class; 11] = [
+    Class::of::<DdpmConfig>("ddpm", "DDPMScheduler"),
+    Class::of::<DdimConfig>("ddim", "DDIMScheduler"),
+    Class::of::<PndmConfig>("pndm", "PNDMScheduler"),
+    Class::of::<SigmaConfig<Euler>>("euler", "EulerDiscreteScheduler"),
+    Class::of::<SigmaConfig<EulerAncestral>>("euler-ancestral", "EulerAncestralDiscreteScheduler"),
+    Class::of::<DpmSolverConfig>("dpm++", "DPMSolverMultistepScheduler"),
+    Class::of::<SigmaConfig<Heun>>("heun", "HeunDiscreteScheduler"),
+    Class::of::<SigmaConfig<Lms>>("lms", "LMSDiscreteScheduler"),
+    Class::of::<UniPcConfig>("unipc", "UniPCMultistepScheduler"),
+    Class::of::<LcmConfig>("lcm", "LCMScheduler"),
+    Class::of::<FlowMatchEulerConfig>("flow-match-euler", "FlowMatchEulerDiscreteScheduler"),
 ];
 
 /// A scheduler and its options, in diffusers' words.
@@ -113,28 +68,14 @@ const KNOWN: [&str; 58] = [
 #[derive(Debug, Clone)]
 pub struct SchedulerConfig {
     options: Map<String, Value>,
-    kind: Kind,
-}
-
-#[derive(Debug, Clone)]
-enum Kind {
-    Ddpm(DdpmConfig),
-    Ddim(DdimConfig),
-    Pndm(PndmConfig),
-    Euler(EulerConfig),
-    EulerAncestral(EulerAncestralConfig),
-    DpmSolver(DpmSolverConfig),
-    Heun(HeunConfig),
-    Lms(LmsConfig),
-    UniPc(UniPcConfig),
-    Lcm(LcmConfig),
-    FlowMatchEuler(FlowMatchEulerConfig),
+    class: &'static str,
+    method: Arc<dyn Method>,
 }
 
 impl SchedulerConfig {
     /// The short names that [`with_class`](Self::with_class) takes.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        CLASSES.iter().map(|(name, _)| *name)
+        CLASSES.iter().map(|class| class.short)
     }
 
     /// A scheduler with Stable Diffusion v1.4's noise schedule, and its own defaults otherwise but
@@ -146,7 +87,7 @@ impl SchedulerConfig {
     /// diffusers that is implemented.
     pub fn stable_diffusion(name: &str) -> Result<Self> {
         let options = [
-            ("_class_name", Value::from(class_of(name)?)),
+            ("_class_name", Value::from(class_of(name)?.name)),
             ("beta_schedule", "scaled_linear".into()),
             ("beta_start", 0.00085.into()),
             ("beta_end", 0.012.into()),
@@ -169,12 +110,7 @@ impl SchedulerConfig {
     ///
     /// [`Error::Io`] and [`Error::Json`] for a bad file, otherwise as [`with`](Self::with).
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
-            action: "read",
-            path: path.to_owned(),
-            source,
-        })?;
-        Self::from_json(&text, path)
+        Self::from_json(&crate::weights::read_text(path)?, path)
     }
 
     /// Reads the text of a `scheduler_config.json`; `path` only serves messages.
@@ -208,24 +144,12 @@ impl SchedulerConfig {
     ///
     /// As [`with`](Self::with).
     pub fn with_class(self, name: &str) -> Result<Self> {
-        self.with("_class_name", class_of(name)?)
+        self.with("_class_name", class_of(name)?.name)
     }
 
     /// The class name in diffusers.
     pub fn class(&self) -> &'static str {
-        match self.kind {
-            Kind::Ddpm(_) => "DDPMScheduler",
-            Kind::Ddim(_) => "DDIMScheduler",
-            Kind::Pndm(_) => "PNDMScheduler",
-            Kind::Euler(_) => "EulerDiscreteScheduler",
-            Kind::EulerAncestral(_) => "EulerAncestralDiscreteScheduler",
-            Kind::DpmSolver(_) => "DPMSolverMultistepScheduler",
-            Kind::Heun(_) => "HeunDiscreteScheduler",
-            Kind::Lms(_) => "LMSDiscreteScheduler",
-            Kind::UniPc(_) => "UniPCMultistepScheduler",
-            Kind::Lcm(_) => "LCMScheduler",
-            Kind::FlowMatchEuler(_) => "FlowMatchEulerDiscreteScheduler",
-        }
+        self.class
     }
 
     /// The content of a `scheduler_config.json` that says the same.
@@ -235,19 +159,7 @@ impl SchedulerConfig {
 
     /// The noise of the training steps; `None` for straight paths, which have none.
     pub fn noise_schedule(&self) -> Option<&NoiseSchedule> {
-        match &self.kind {
-            Kind::Ddpm(config) => Some(&config.schedule),
-            Kind::Ddim(config) => Some(&config.schedule),
-            Kind::Pndm(config) => Some(&config.schedule),
-            Kind::Euler(config) => Some(&config.schedule),
-            Kind::EulerAncestral(config) => Some(&config.schedule),
-            Kind::DpmSolver(config) => Some(&config.schedule),
-            Kind::Heun(config) => Some(&config.schedule),
-            Kind::Lms(config) => Some(&config.schedule),
-            Kind::UniPc(config) => Some(&config.schedule),
-            Kind::Lcm(config) => Some(&config.schedule),
-            Kind::FlowMatchEuler(_) => None,
-        }
+        self.method.schedule()
     }
 
     /// A scheduler for one run of a number of steps.
@@ -258,19 +170,7 @@ impl SchedulerConfig {
     /// training steps that do not exist; [`Error::InvalidOption`] for noise prediction where no
     /// signal is left.
     pub fn scheduler(&self, steps: usize) -> Result<Box<dyn Scheduler>> {
-        Ok(match &self.kind {
-            Kind::Ddpm(config) => Box::new(config.init(steps)?),
-            Kind::Ddim(config) => Box::new(config.init(steps)?),
-            Kind::Pndm(config) => Box::new(config.init(steps)?),
-            Kind::Euler(config) => Box::new(config.init(steps)?),
-            Kind::EulerAncestral(config) => Box::new(config.init(steps)?),
-            Kind::DpmSolver(config) => Box::new(config.init(steps)?),
-            Kind::Heun(config) => Box::new(config.init(steps)?),
-            Kind::Lms(config) => Box::new(config.init(steps)?),
-            Kind::UniPc(config) => Box::new(config.init(steps)?),
-            Kind::Lcm(config) => Box::new(config.init(steps)?),
-            Kind::FlowMatchEuler(config) => Box::new(config.init(steps)?),
-        })
+        self.method.start(steps)
     }
 
     fn from_options(options: Map<String, Value>) -> Result<Self> {
@@ -280,48 +180,32 @@ impl SchedulerConfig {
             .unwrap_or("absent");
         let class = class_of(name)?;
         let text = Value::Object(options.clone()).to_string();
-        let mut left = Options::parse(class, &text, Path::new("scheduler_config.json"))?;
-        let kind = Kind::take(class, &mut left)?;
+        let mut left = Options::parse(class.name, &text, Path::new("scheduler_config.json"))?;
+        let method = (class.take)(&mut left)?;
         left.ignore(&KNOWN);
         left.finish()?;
-        Ok(Self { options, kind })
-    }
-}
-
-impl Kind {
-    fn take(class: &'static str, options: &mut Options) -> Result<Self> {
-        Ok(match class {
-            "DDPMScheduler" => Self::Ddpm(DdpmConfig::take(options)?),
-            "DDIMScheduler" => Self::Ddim(DdimConfig::take(options)?),
-            "PNDMScheduler" => Self::Pndm(PndmConfig::take(options)?),
-            "EulerDiscreteScheduler" => Self::Euler(EulerConfig::take(options)?),
-            "EulerAncestralDiscreteScheduler" => {
-                Self::EulerAncestral(EulerAncestralConfig::take(options)?)
-            }
-            "DPMSolverMultistepScheduler" => Self::DpmSolver(DpmSolverConfig::take(options)?),
-            "HeunDiscreteScheduler" => Self::Heun(HeunConfig::take(options)?),
-            "LMSDiscreteScheduler" => Self::Lms(LmsConfig::take(options)?),
-            "UniPCMultistepScheduler" => Self::UniPc(UniPcConfig::take(options)?),
-            "LCMScheduler" => Self::Lcm(LcmConfig::take(options)?),
-            _ => Self::FlowMatchEuler(FlowMatchEulerConfig::take(options)?),
+        Ok(Self {
+            options,
+            class: class.name,
+            method,
         })
     }
 }
 
-/// The class of a short name or of itself.
-fn class_of(name: &str) -> Result<&'static str> {
+/// The class of a short name or of its name in diffusers.
+fn class_of(name: &str) -> Result<&'static Class> {
     let found = CLASSES
         .iter()
-        .find(|(short, class)| *short == name || *class == name);
-    found
-        .map(|(_, class)| *class)
-        .ok_or_else(|| Error::Unsupported {
-            option: "scheduler _class_name".to_owned(),
-            value: name.to_owned(),
-            supported: CLASSES
-                .map(|(short, class)| format!("{short} ({class})"))
-                .join(", "),
-        })
+        .find(|class| [class.short, class.name].contains(&name));
+    found.ok_or_else(|| Error::Unsupported {
+        option: "scheduler _class_name".to_owned(),
+        value: name.to_owned(),
+        supported: CLASSES
+            .iter()
+            .map(|class| format!("{} ({})", class.short, class.name))
+            .collect::<Vec<_>>()
+            .join(", "),
+    })
 }
 
 /// Python writes infinities that JSON does not know: the largest numbers stand for them.

@@ -1,16 +1,20 @@
 //! Denoising diffusion implicit models: deterministic, or with as much noise as is asked for.
 
+use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::{Clipping, Prediction};
-use super::schedule::{DEFAULTS, ScheduleDefaults, check_timestep};
+use super::schedule::posterior_variance;
 use super::spacing::Steps;
-use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required};
+use super::whole_path::WholePath;
+use super::{
+    Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
+};
 use crate::error::{Result, check_range};
 use crate::options::Options;
 
 /// Options of [`Ddim`].
 #[derive(Debug, Clone)]
 pub(super) struct DdimConfig {
-    pub(super) schedule: NoiseSchedule,
+    schedule: NoiseSchedule,
     steps: Steps,
     prediction: Prediction,
     clipping: Clipping,
@@ -21,23 +25,18 @@ pub(super) struct DdimConfig {
     noise_from_clipped: bool,
 }
 
-impl DdimConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
+impl Method for DdimConfig {
+    fn take(options: &mut Options) -> Result<Self> {
         let defaults = ScheduleDefaults {
             rescaled: Some(TerminalSnr::Zero),
             ..DEFAULTS
         };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [
-            Prediction::Epsilon,
-            Prediction::Sample,
-            Prediction::Velocity,
-        ];
         let eta = options.f64("eta", 0.0)?;
         check_range("eta", eta, 0.0, 1.0)?;
         Ok(Self {
             steps: Steps::take(options, schedule.steps(), "leading")?,
-            prediction: Prediction::take(options, &known)?,
+            prediction: Prediction::take(options, &Prediction::CURVED)?,
             clipping: Clipping::take(options, true)?,
             end_at_one: options.bool("set_alpha_to_one", true)?,
             eta,
@@ -46,21 +45,17 @@ impl DdimConfig {
         })
     }
 
-    pub(super) fn init(&self, n: usize) -> Result<Ddim> {
+    fn schedule(&self) -> Option<&NoiseSchedule> {
+        Some(&self.schedule)
+    }
+
+    fn start(&self, n: usize) -> Result<Box<dyn Scheduler>> {
         let steps = self.steps.whole(n)?;
-        let train = self.schedule.steps();
-        let visited: Vec<usize> = steps
-            .iter()
-            .map(|&t| check_timestep(t, train))
-            .collect::<Result<_>>()?;
-        self.prediction
-            .check_signal(self.schedule.noise_level(visited[0]).signal)?;
-        Ok(Ddim {
+        Ok(Box::new(Ddim {
+            path: WholePath::new(&steps, &self.schedule, self.prediction)?,
+            stride: self.schedule.steps() / n,
             config: self.clone(),
-            timesteps: steps.iter().map(|&t| t as f64).collect(),
-            stride: train / n,
-            visited,
-        })
+        }))
     }
 }
 
@@ -75,49 +70,41 @@ impl DdimConfig {
 ///
 /// Song et al. (2021), "Denoising Diffusion Implicit Models", Eqs. 9, 12 and 16.
 #[derive(Debug)]
-pub(super) struct Ddim {
+struct Ddim {
     config: DdimConfig,
-    timesteps: Vec<f64>,
-    visited: Vec<usize>,
+    path: WholePath,
     stride: usize,
 }
 
 impl Ddim {
     /// ᾱ at a step and one stride further down.
     fn alphas(&self, index: usize) -> (f64, f64) {
-        let t = self.visited[index];
+        let DdimConfig {
+            schedule,
+            end_at_one,
+            ..
+        } = &self.config;
+        let t = self.path.step(index);
+        let next = t as i64 - self.stride as i64;
         (
-            self.config.schedule.alpha_cumprod(t),
-            self.config.alpha_after(t, self.stride),
+            schedule.alpha_cumprod(t),
+            schedule.alpha_or_end(next, *end_at_one),
         )
     }
 
     /// The standard deviation of the noise that a step adds, Eq. 16.
     fn deviation(&self, now: f64, next: f64) -> f64 {
-        self.config.eta
-            * ((1.0 - next) / (1.0 - now) * (1.0 - now / next))
-                .max(0.0)
-                .sqrt()
-    }
-}
-
-impl DdimConfig {
-    fn alpha_after(&self, t: usize, stride: usize) -> f64 {
-        match t.checked_sub(stride) {
-            Some(next) => self.schedule.alpha_cumprod(next),
-            None if self.end_at_one => 1.0,
-            None => self.schedule.alpha_cumprod(0),
-        }
+        self.config.eta * posterior_variance(now, next).max(0.0).sqrt()
     }
 }
 
 impl Scheduler for Ddim {
     fn timesteps(&self) -> &[f64] {
-        &self.timesteps
+        &self.path.timesteps
     }
 
     fn noise_level(&self, index: usize) -> NoiseLevel {
-        self.config.schedule.noise_level(self.visited[index])
+        self.path.level(index)
     }
 
     fn needs_noise(&self, _index: usize) -> bool {
@@ -155,28 +142,5 @@ impl Scheduler for Ddim {
             sample = sample + required(noise) * deviation;
         }
         StepOutput { sample, denoised }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scheduler::BetaCurve;
-
-    /// Published variances of the linear schedule.
-    #[test]
-    fn variances_are_the_published_ones() {
-        let curve = BetaCurve::Linear(1e-4, 0.02);
-        let schedule = NoiseSchedule::new(&curve, 1000, TerminalSnr::Kept).unwrap();
-        for (t, next, expected) in [
-            (420, 400, 0.14771),
-            (980, 960, 0.32460),
-            (487, 486, 0.00979),
-            (999, 998, 0.02),
-        ] {
-            let (now, next) = (schedule.alpha_cumprod(t), schedule.alpha_cumprod(next));
-            let variance = (1.0 - next) / (1.0 - now) * (1.0 - now / next);
-            assert!((variance - expected).abs() < 1e-5, "{t}: {variance}");
-        }
     }
 }

@@ -2,10 +2,14 @@
 
 use burn::tensor::Tensor;
 
+use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::{Clipping, Prediction};
-use super::schedule::{DEFAULTS, ScheduleDefaults, check_timestep};
+use super::schedule::posterior_variance;
 use super::spacing::Steps;
-use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required};
+use super::whole_path::WholePath;
+use super::{
+    Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
+};
 use crate::error::Result;
 use crate::options::Options;
 
@@ -21,26 +25,21 @@ enum Variance {
 /// Options of [`Ddpm`].
 #[derive(Debug, Clone)]
 pub(super) struct DdpmConfig {
-    pub(super) schedule: NoiseSchedule,
+    schedule: NoiseSchedule,
     steps: Steps,
     prediction: Prediction,
     clipping: Clipping,
     variance: Variance,
 }
 
-impl DdpmConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
+impl Method for DdpmConfig {
+    fn take(options: &mut Options) -> Result<Self> {
         let defaults = ScheduleDefaults {
             further: Some("sigmoid"),
             rescaled: Some(TerminalSnr::Zero),
             ..DEFAULTS
         };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [
-            Prediction::Epsilon,
-            Prediction::Sample,
-            Prediction::Velocity,
-        ];
         let name = options.string("variance_type", "fixed_small")?;
         let variance = match name.as_str() {
             "fixed_small" | "fixed_small_log" => Variance::Small,
@@ -52,27 +51,25 @@ impl DdpmConfig {
         };
         Ok(Self {
             steps: Steps::take(options, schedule.steps(), "leading")?,
-            prediction: Prediction::take(options, &known)?,
+            prediction: Prediction::take(options, &Prediction::CURVED)?,
             clipping: Clipping::take(options, true)?,
             variance,
             schedule,
         })
     }
 
-    pub(super) fn init(&self, n: usize) -> Result<Ddpm> {
+    fn schedule(&self) -> Option<&NoiseSchedule> {
+        Some(&self.schedule)
+    }
+
+    fn start(&self, n: usize) -> Result<Box<dyn Scheduler>> {
         let steps = self.steps.whole(n)?;
-        let train = self.schedule.steps();
-        let visited: Vec<usize> = steps
-            .iter()
-            .map(|&t| check_timestep(t, train))
-            .collect::<Result<_>>()?;
-        self.prediction
-            .check_signal(self.schedule.noise_level(visited[0]).signal)?;
-        Ok(Ddpm {
-            config: self.clone(),
-            timesteps: steps.iter().map(|&t| t as f64).collect(),
-            visited,
-        })
+        Ok(Box::new(Ddpm {
+            path: WholePath::new(&steps, &self.schedule, self.prediction)?,
+            prediction: self.prediction,
+            clipping: self.clipping,
+            variance: self.variance,
+        }))
     }
 }
 
@@ -87,29 +84,24 @@ impl DdpmConfig {
 ///
 /// Ho et al. (2020), "Denoising Diffusion Probabilistic Models", Eqs. 6, 7 and 15, algorithm 2.
 #[derive(Debug)]
-pub(super) struct Ddpm {
-    config: DdpmConfig,
-    timesteps: Vec<f64>,
-    visited: Vec<usize>,
+struct Ddpm {
+    path: WholePath,
+    prediction: Prediction,
+    clipping: Clipping,
+    variance: Variance,
 }
 
 impl Ddpm {
     /// ᾱ at a step and at the one after it (1 after the last).
-    fn alphas(&self, index: usize) -> (f64, f64) {
-        let schedule = &self.config.schedule;
-        let next = self
-            .visited
-            .get(index + 1)
-            .map_or(1.0, |&t| schedule.alpha_cumprod(t));
-        (schedule.alpha_cumprod(self.visited[index]), next)
+    fn alphas(&self, index: usize) -> [f64; 2] {
+        [index, index + 1].map(|index| self.path.alpha(index).unwrap_or(1.0))
     }
 
     /// The standard deviation of the noise that a step adds.
     fn deviation(&self, now: f64, next: f64) -> f64 {
-        let added = 1.0 - now / next;
-        let variance = match self.config.variance {
-            Variance::Small => ((1.0 - next) / (1.0 - now) * added).max(1e-20),
-            Variance::Large => added,
+        let variance = match self.variance {
+            Variance::Small => posterior_variance(now, next).max(1e-20),
+            Variance::Large => 1.0 - now / next,
         };
         variance.sqrt()
     }
@@ -117,15 +109,15 @@ impl Ddpm {
 
 impl Scheduler for Ddpm {
     fn timesteps(&self) -> &[f64] {
-        &self.timesteps
+        &self.path.timesteps
     }
 
     fn noise_level(&self, index: usize) -> NoiseLevel {
-        self.config.schedule.noise_level(self.visited[index])
+        self.path.level(index)
     }
 
     fn needs_noise(&self, index: usize) -> bool {
-        self.visited[index] > 0
+        self.path.step(index) > 0
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
@@ -135,15 +127,12 @@ impl Scheduler for Ddpm {
             sample,
             noise,
         } = input;
-        let (now, next) = self.alphas(index);
+        let [now, next] = self.alphas(index);
         let added = 1.0 - now / next;
         // 1. The clean image, Eq. 15, limited.
         let level = self.noise_level(index);
-        let denoised = self
-            .config
-            .prediction
-            .denoised(level, sample.clone(), prediction);
-        let denoised = self.config.clipping.apply(denoised);
+        let denoised = self.prediction.denoised(level, sample.clone(), prediction);
+        let denoised = self.clipping.apply(denoised);
         // 2. The mean of the step back, Eq. 7.
         let of_clean = next.sqrt() * added / (1.0 - now);
         let of_sample = (now / next).sqrt() * (1.0 - next) / (1.0 - now);

@@ -2,44 +2,33 @@
 
 use burn::tensor::Tensor;
 
-use super::multistep::{LogSnrPath, PathOptions};
-use super::prediction::{Clipping, Prediction};
-use super::schedule::{BetaCurve, DEFAULTS};
+use super::betas::{BetaCurve, DEFAULTS};
+use super::integrator::IntegratorOptions;
+use super::log_snr_path::{LogSnrPath, PathOptions};
 use super::sigmas::{SigmaOptions, Spread, take_final_zero};
 use super::spacing::{Spacing, Steps};
-use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
+use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
 use crate::error::Result;
 use crate::options::Options;
 
 /// Runs shorter than this end at lower order.
 const SHORT_RUN: usize = 15;
 
-/// Which equation is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Algorithm {
-    /// In terms of the clean image (the "++"), or else of the noise.
-    data: bool,
-    /// With noise added at every step.
-    stochastic: bool,
-}
-
 /// Options of [`DpmSolver`].
 #[derive(Debug, Clone)]
 pub(super) struct DpmSolverConfig {
-    pub(super) schedule: NoiseSchedule,
+    schedule: NoiseSchedule,
     path: PathOptions,
-    prediction: Prediction,
-    clipping: Clipping,
-    algorithm: Algorithm,
-    order: usize,
+    shared: IntegratorOptions,
+    /// With noise added at every step.
+    stochastic: bool,
     /// The slope of the second order from the midpoint rule, or else from Heun's.
     midpoint: bool,
-    lower_order_final: bool,
     euler_at_final: bool,
 }
 
-impl DpmSolverConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
+impl Method for DpmSolverConfig {
+    fn take(options: &mut Options) -> Result<Self> {
         let schedule = NoiseSchedule::take(options, &DEFAULTS)?;
         let known = [
             Spread::Karras,
@@ -47,10 +36,9 @@ impl DpmSolverConfig {
             Spread::Lu,
             Spread::Flow,
         ];
-        let sigmas = SigmaOptions::take(options, &known)?;
         let path = PathOptions {
             steps: take_steps(options, &schedule)?,
-            sigmas,
+            sigmas: SigmaOptions::take(options, &known)?,
             end_at_zero: take_final_zero(options)?,
             round_steps: *schedule.curve() != BetaCurve::SquaredCosine,
         };
@@ -58,29 +46,29 @@ impl DpmSolverConfig {
             "variance_type",
             &["fixed_small", "fixed_small_log", "fixed_large"],
         )?;
-        options.only("use_dynamic_shifting", &[false])?;
-        let algorithm = take_algorithm(options, path.end_at_zero)?;
-        let order = take_order(options, algorithm)?;
+        let [data, stochastic] = take_algorithm(options, path.end_at_zero)?;
+        // diffusers' third order with noise does not converge, so there is nothing to agree with.
+        let most = if stochastic { 2 } else { 3 };
         Ok(Self {
-            prediction: take_prediction(options, sigmas.spread, algorithm)?,
-            clipping: Clipping::take_dynamic(options)?,
+            shared: IntegratorOptions::take(options, path.sigmas.spread, data, most)?,
+            stochastic,
             midpoint: take_midpoint(options)?,
-            lower_order_final: options.bool("lower_order_final", true)?,
             euler_at_final: options.bool("euler_at_final", false)?,
             path,
-            algorithm,
-            order,
             schedule,
         })
     }
 
-    pub(super) fn init(&self, n: usize) -> Result<DpmSolver> {
-        let path = self.path.path(&self.schedule, n)?;
-        Ok(DpmSolver {
+    fn schedule(&self) -> Option<&NoiseSchedule> {
+        Some(&self.schedule)
+    }
+
+    fn start(&self, n: usize) -> Result<Box<dyn Scheduler>> {
+        Ok(Box::new(DpmSolver {
+            path: self.path.path(&self.schedule, n)?,
             config: self.clone(),
-            path,
             history: Vec::new(),
-        })
+        }))
     }
 }
 
@@ -100,45 +88,24 @@ fn take_steps(options: &mut Options, schedule: &NoiseSchedule) -> Result<Steps> 
     Ok(steps)
 }
 
-fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<Algorithm> {
+/// Whether the equation is solved in terms of the clean image (the "++"), and with noise at every step.
+fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<[bool; 2]> {
     let name = options.string("algorithm_type", "dpmsolver++")?;
     let algorithm = match name.as_str() {
-        "dpmsolver++" | "deis" => Algorithm {
-            data: true,
-            stochastic: false,
-        },
-        "sde-dpmsolver++" => Algorithm {
-            data: true,
-            stochastic: true,
-        },
-        "dpmsolver" => Algorithm {
-            data: false,
-            stochastic: false,
-        },
-        "sde-dpmsolver" => Algorithm {
-            data: false,
-            stochastic: true,
-        },
+        "dpmsolver++" | "deis" => [true, false],
+        "sde-dpmsolver++" => [true, true],
+        "dpmsolver" => [false, false],
+        "sde-dpmsolver" => [false, true],
         other => {
             let supported = "dpmsolver++, sde-dpmsolver++, dpmsolver, sde-dpmsolver";
             return Err(options.unsupported("algorithm_type", &other.into(), supported));
         }
     };
-    if end_at_zero && !algorithm.data {
+    if end_at_zero && !algorithm[0] {
         let supported = "sigma_min with this algorithm_type";
         return Err(options.unsupported("final_sigmas_type", &"zero".into(), supported));
     }
     Ok(algorithm)
-}
-
-fn take_order(options: &mut Options, algorithm: Algorithm) -> Result<usize> {
-    let order = options.usize("solver_order", 2)?;
-    // diffusers' third order with noise does not converge, so there is nothing to agree with.
-    let most = if algorithm.stochastic { 2 } else { 3 };
-    if (1..=most).contains(&order) {
-        return Ok(order);
-    }
-    Err(options.unsupported("solver_order", &order.into(), &format!("1 to {most}")))
 }
 
 fn take_midpoint(options: &mut Options) -> Result<bool> {
@@ -149,29 +116,6 @@ fn take_midpoint(options: &mut Options) -> Result<bool> {
         "midpoint" | "logrho" | "bh1" | "bh2" => Ok(true),
         other => Err(options.unsupported("solver_type", &other.into(), "midpoint, heun")),
     }
-}
-
-fn take_prediction(
-    options: &mut Options,
-    spread: Spread,
-    algorithm: Algorithm,
-) -> Result<Prediction> {
-    if spread != Spread::Flow {
-        let known = [
-            Prediction::Epsilon,
-            Prediction::Sample,
-            Prediction::Velocity,
-        ];
-        return Prediction::take(options, &known);
-    }
-    if algorithm.data {
-        return Prediction::take(options, &[Prediction::Flow]);
-    }
-    Err(options.unsupported(
-        "use_flow_sigmas",
-        &true.into(),
-        "dpmsolver++ and sde-dpmsolver++",
-    ))
 }
 
 /// An exponential integrator: the linear part of the equation is solved exactly in λ = ln(α/σ),
@@ -189,7 +133,7 @@ fn take_prediction(
 /// Lu et al. (2022), "DPM-Solver", Eqs. 3.7 and B.2 to B.4. Lu et al. (2022), "DPM-Solver++",
 /// algorithm 2, Eqs. 4.1 and 4.2, appendix (stochastic).
 #[derive(Debug)]
-pub(super) struct DpmSolver {
+struct DpmSolver {
     config: DpmSolverConfig,
     path: LogSnrPath,
     /// Clean images (or noises), newest first.
@@ -207,72 +151,36 @@ struct Factors {
 }
 
 impl DpmSolver {
-    /// The clean image and what the history holds of a prediction.
-    fn convert(
-        &self,
-        level: NoiseLevel,
-        sample: &Tensor<4>,
-        prediction: Tensor<4>,
-    ) -> [Tensor<4>; 2] {
-        let DpmSolverConfig {
-            prediction: kind,
-            clipping,
-            algorithm,
-            ..
-        } = self.config;
-        let denoised = kind.denoised(level, sample.clone(), prediction.clone());
-        let denoised = clipping.apply(denoised);
-        let kept = if algorithm.data {
-            denoised.clone()
-        } else if clipping == Clipping::Off {
-            kind.noise(level, sample.clone(), prediction)
-        } else {
-            Prediction::Sample.noise(level, sample.clone(), denoised.clone())
-        };
-        [denoised, kept]
-    }
-
     /// The order of a step: as much as history, end of the run and repeated levels allow.
     fn order(&self, index: usize) -> usize {
         let DpmSolverConfig {
-            lower_order_final,
             euler_at_final,
             ref path,
+            ref shared,
             ..
         } = self.config;
         let left = self.path.len() - index;
-        let short = lower_order_final && self.path.len() < SHORT_RUN;
+        let short = shared.lower_order_final && self.path.len() < SHORT_RUN;
         let wanted = match left {
             1 if euler_at_final || short || path.end_at_zero => 1,
-            2 if short => self.config.order.min(2),
-            _ => self.config.order,
+            2 if short => shared.order.min(2),
+            _ => shared.order,
         };
-        let standing = self.path.log_snr(index + 1) <= self.path.log_snr(index);
-        let older = if standing {
-            0
-        } else {
-            wanted.min(self.history.len()) - 1
-        };
-        1 + self.path.usable_before(index, older)
+        self.path.order(index, wanted, self.history.len())
     }
 
     /// The factors of Eqs. 4.1 and 4.2 (in terms of the clean image) or B.2 to B.4 (of the noise):
     /// the same functions of z = −h and z = h; of twice that with noise.
     fn factors(&self, index: usize, order: usize) -> Factors {
-        let h = self.path.log_snr(index + 1) - self.path.log_snr(index);
-        let (now, next) = (self.path.level(index), self.path.level(index + 1));
-        let Algorithm { data, stochastic } = self.config.algorithm;
-        let twice = if stochastic { 2.0 } else { 1.0 };
-        let (amplitude, z, sample) = match (data, stochastic) {
-            (true, false) => (next.signal, -h, next.noise / now.noise),
-            (true, true) => (next.signal, -2.0 * h, next.noise / now.noise * (-h).exp()),
-            (false, _) => (twice * next.noise, h, next.signal / now.signal),
-        };
-        // The variance that noise has gathered: 1 − e^{−2h}, or e^{2h} − 1.
-        let spread = match (data, stochastic) {
-            (_, false) => 0.0,
-            (true, true) => -2.0 * h,
-            (false, true) => 2.0 * h,
+        let data = self.config.shared.data;
+        let exact = self.path.exact_part(index, data);
+        let (amplitude, z, sample, spread) = match (self.config.stochastic, data) {
+            (false, _) => (exact.amplitude, exact.h, exact.sample, 0.0),
+            (true, true) => {
+                let z = 2.0 * exact.h;
+                (exact.amplitude, z, exact.sample * exact.h.exp(), z)
+            }
+            (true, false) => (2.0 * exact.amplitude, exact.h, exact.sample, 2.0 * exact.h),
         };
         let value = z.exp_m1();
         let midpoint = self.config.midpoint && order < 3;
@@ -281,19 +189,21 @@ impl DpmSolver {
         } else {
             over(value, z) - 1.0
         };
+        // The variance that noise has gathered: 1 − e^{−2h}, or e^{2h} − 1.
+        let gathered = spread.exp_m1().abs();
         Factors {
             sample,
             value: -amplitude * value,
             slope: -amplitude * slope,
             curvature: -amplitude * (over(over(value - z, z), z) - 0.5),
-            noise: next.noise * spread.exp_m1().abs().sqrt(),
+            noise: self.path.level(index + 1).noise * gathered.sqrt(),
         }
     }
 
     /// Divided differences D₁ and D₂ of the history, as many as the order needs.
     fn differences(&self, index: usize, order: usize) -> Vec<Tensor<4>> {
         let lambda = |back: usize| self.path.log_snr(index - back);
-        let h = self.path.log_snr(index + 1) - lambda(0);
+        let h = self.path.length(index);
         let difference = |i: usize| {
             let ratio = (lambda(i) - lambda(i + 1)) / h;
             (self.history[i].clone() - self.history[i + 1].clone()) / ratio
@@ -326,7 +236,7 @@ impl Scheduler for DpmSolver {
     }
 
     fn needs_noise(&self, _index: usize) -> bool {
-        self.config.algorithm.stochastic
+        self.config.stochastic
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
@@ -337,9 +247,10 @@ impl Scheduler for DpmSolver {
             noise,
         } = input;
         // 1. The clean image, or the noise.
-        let [denoised, kept] = self.convert(self.path.level(index), &sample, prediction);
+        let shared = &self.config.shared;
+        let [denoised, kept] = shared.convert(self.path.level(index), &sample, prediction);
         self.history.insert(0, kept.clone());
-        self.history.truncate(self.config.order);
+        self.history.truncate(shared.order);
         // 2. The exact part, and the polynomial as far as history goes.
         let order = self.order(index);
         let factors = self.factors(index, order);
@@ -349,7 +260,7 @@ impl Scheduler for DpmSolver {
             next = next + difference * weight;
         }
         // 3. Fresh noise.
-        if self.config.algorithm.stochastic {
+        if self.config.stochastic {
             next = next + required(noise) * factors.noise;
         }
         StepOutput {

@@ -2,42 +2,12 @@
 
 use burn::tensor::Tensor;
 
+use super::betas::DEFAULTS;
 use super::prediction::Prediction;
-use super::schedule::DEFAULTS;
-use super::sigmas::{SigmaOptions, SigmaPath};
-use super::spacing::Steps;
-use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
+use super::required;
+use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use crate::error::Result;
 use crate::options::Options;
-
-/// Options of [`EulerAncestral`].
-#[derive(Debug, Clone)]
-pub(super) struct EulerAncestralConfig {
-    pub(super) schedule: NoiseSchedule,
-    steps: Steps,
-    prediction: Prediction,
-    sigmas: SigmaOptions,
-}
-
-impl EulerAncestralConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
-        let schedule = NoiseSchedule::take(options, &DEFAULTS)?;
-        Ok(Self {
-            steps: Steps::take(options, schedule.steps(), "linspace")?,
-            prediction: Prediction::take(options, &[Prediction::Epsilon, Prediction::Velocity])?,
-            sigmas: SigmaOptions::STEPS,
-            schedule,
-        })
-    }
-
-    pub(super) fn init(&self, n: usize) -> Result<EulerAncestral> {
-        let path = SigmaPath::fractional(&self.schedule, self.steps, &self.sigmas, true, n)?;
-        Ok(EulerAncestral {
-            path,
-            prediction: self.prediction,
-        })
-    }
-}
 
 /// Steps further down than the next level, and adds noise to come back up to it.
 ///
@@ -48,49 +18,24 @@ impl EulerAncestralConfig {
 /// # References
 ///
 /// Song et al. (2021), "Denoising Diffusion Implicit Models", Eq. 16 with η = 1, written in σ.
-#[derive(Debug)]
-pub(super) struct EulerAncestral {
-    path: SigmaPath,
-    prediction: Prediction,
-}
+#[derive(Debug, Clone)]
+pub(super) struct EulerAncestral;
 
-impl Scheduler for EulerAncestral {
-    fn timesteps(&self) -> &[f64] {
-        &self.path.timesteps
+impl SigmaMethod for EulerAncestral {
+    fn take(options: &mut Options) -> Result<SigmaConfig<Self>> {
+        let known = [Prediction::Epsilon, Prediction::Velocity];
+        SigmaConfig::take_common(options, &DEFAULTS, &known, Self)
     }
 
-    fn init_noise_sigma(&self) -> f64 {
-        self.path.init_noise_sigma()
-    }
-
-    fn noise_level(&self, index: usize) -> NoiseLevel {
-        self.path.level(index)
-    }
-
-    fn scale_model_input(&self, sample: Tensor<4>, index: usize) -> Tensor<4> {
-        sample * self.path.input_scale(index)
-    }
-
-    fn needs_noise(&self, _index: usize) -> bool {
+    fn needs_noise(&self) -> bool {
         true
     }
 
-    fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            noise,
-        } = input;
-        let (sigma, next) = (self.path.sigmas[index], self.path.sigmas[index + 1]);
+    fn advance(&mut self, call: Call<'_>) -> Tensor<4> {
+        let (sigma, next) = call.ends();
         let (up, down) = ancestral_step(sigma, next);
-        // 1. The clean image and the slope towards it.
-        let level = self.path.level(index);
-        let denoised = self.prediction.denoised(level, sample.clone(), prediction);
-        let slope = (sample.clone() - denoised.clone()) / sigma;
-        // 2. Down along the slope, and up with noise.
-        let sample = sample + slope * (down - sigma) + required(noise) * up;
-        StepOutput { sample, denoised }
+        // Down along the slope, and up with noise.
+        call.sample + call.slope * (down - sigma) + required(call.noise) * up
     }
 }
 

@@ -3,7 +3,7 @@
 use super::prediction::Prediction;
 use super::sigmas::{SigmaOptions, Spread, check_positive, round};
 use super::spacing::linspace;
-use super::{NoiseLevel, Scheduler, StepInput, StepOutput, required};
+use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
 use crate::error::{Result, check_range};
 use crate::options::Options;
 
@@ -21,8 +21,8 @@ pub(super) struct FlowMatchEulerConfig {
     stochastic: bool,
 }
 
-impl FlowMatchEulerConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
+impl Method for FlowMatchEulerConfig {
+    fn take(options: &mut Options) -> Result<Self> {
         let train = options.usize("num_train_timesteps", 1000)?;
         check_range("num_train_timesteps", train as f64, 2.0, 1e5)?;
         let shift = options.f64("shift", 1.0)?;
@@ -42,7 +42,11 @@ impl FlowMatchEulerConfig {
         })
     }
 
-    pub(super) fn init(&self, n: usize) -> Result<FlowMatchEuler> {
+    fn schedule(&self) -> Option<&NoiseSchedule> {
+        None
+    }
+
+    fn start(&self, n: usize) -> Result<Box<dyn Scheduler>> {
         check_range("steps", n as f64, 1.0, self.train as f64)?;
         let mut sigmas = self.levels(n);
         check_positive(&sigmas)?;
@@ -56,13 +60,15 @@ impl FlowMatchEulerConfig {
             .map(|sigma| round(sigma * self.train as f64))
             .collect();
         sigmas.push(if self.inverted { 1.0 } else { 0.0 });
-        Ok(FlowMatchEuler {
+        Ok(Box::new(FlowMatchEuler {
             timesteps,
             sigmas,
             stochastic: self.stochastic,
-        })
+        }))
     }
+}
 
+impl FlowMatchEulerConfig {
     /// Noise levels from 1 down. diffusers shifts twice: the ends of its range, then every level.
     fn levels(&self, n: usize) -> Vec<f64> {
         let train = self.train as f64;
@@ -105,7 +111,7 @@ fn stretch(sigmas: &mut [f64], terminal: f64) {
 /// Lipman et al. (2023), "Flow Matching for Generative Modeling", Eq. 20. Esser et al. (2024),
 /// "Scaling Rectified Flow Transformers for High-Resolution Image Synthesis", Eq. 23 (shift).
 #[derive(Debug)]
-pub(super) struct FlowMatchEuler {
+struct FlowMatchEuler {
     timesteps: Vec<f64>,
     sigmas: Vec<f64>,
     stochastic: bool,

@@ -1,8 +1,11 @@
 //! Latent consistency models: a few large jumps straight to the clean image.
 
+use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::{Clipping, Prediction};
-use super::schedule::{DEFAULTS, ScheduleDefaults};
-use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required};
+use super::whole_path::WholePath;
+use super::{
+    Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
+};
 use crate::error::{Result, check_range};
 use crate::options::Options;
 
@@ -12,15 +15,15 @@ const SIGMA_DATA: f64 = 0.5;
 /// Options of [`Lcm`].
 #[derive(Debug, Clone)]
 pub(super) struct LcmConfig {
-    pub(super) schedule: NoiseSchedule,
+    schedule: NoiseSchedule,
     prediction: Prediction,
     clipping: Clipping,
     original_steps: usize,
     timestep_scaling: f64,
 }
 
-impl LcmConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
+impl Method for LcmConfig {
+    fn take(options: &mut Options) -> Result<Self> {
         let defaults = ScheduleDefaults {
             curve: "scaled_linear",
             ends: (0.00085, 0.012),
@@ -28,11 +31,6 @@ impl LcmConfig {
             ..DEFAULTS
         };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [
-            Prediction::Epsilon,
-            Prediction::Sample,
-            Prediction::Velocity,
-        ];
         let original_steps = options.usize("original_inference_steps", 50)?;
         check_range(
             "original_inference_steps",
@@ -41,7 +39,7 @@ impl LcmConfig {
             schedule.steps() as f64,
         )?;
         Ok(Self {
-            prediction: Prediction::take(options, &known)?,
+            prediction: Prediction::take(options, &Prediction::CURVED)?,
             clipping: Clipping::take(options, false)?,
             timestep_scaling: options.f64("timestep_scaling", 10.0)?,
             original_steps,
@@ -49,25 +47,29 @@ impl LcmConfig {
         })
     }
 
-    pub(super) fn init(&self, n: usize) -> Result<Lcm> {
+    fn schedule(&self) -> Option<&NoiseSchedule> {
+        Some(&self.schedule)
+    }
+
+    fn start(&self, n: usize) -> Result<Box<dyn Scheduler>> {
         check_range("steps", n as f64, 1.0, self.original_steps as f64)?;
-        let visited = visited(self.schedule.steps(), self.original_steps, n);
-        self.prediction
-            .check_signal(self.schedule.noise_level(visited[0]).signal)?;
-        let timesteps = visited.iter().map(|&t| t as f64).collect();
-        Ok(Lcm {
-            config: self.clone(),
-            timesteps,
-            visited,
-        })
+        let steps = visited(self.schedule.steps(), self.original_steps, n);
+        Ok(Box::new(Lcm {
+            path: WholePath::new(&steps, &self.schedule, self.prediction)?,
+            prediction: self.prediction,
+            clipping: self.clipping,
+            timestep_scaling: self.timestep_scaling,
+        }))
     }
 }
 
 /// n of the steps that the model was distilled at, from the noisiest down.
-fn visited(train: usize, original: usize, n: usize) -> Vec<usize> {
+fn visited(train: usize, original: usize, n: usize) -> Vec<i64> {
     let stride = train / original;
     let nth = |i: usize| (i as f64 * (original as f64 / n as f64)).floor() as usize;
-    (0..n).map(|i| (original - nth(i)) * stride - 1).collect()
+    (0..n)
+        .map(|i| ((original - nth(i)) * stride) as i64 - 1)
+        .collect()
 }
 
 /// The sampler of a consistency model: denoise, and add noise again up to the next level.
@@ -81,23 +83,24 @@ fn visited(train: usize, original: usize, n: usize) -> Vec<usize> {
 ///
 /// Luo et al. (2023), "Latent Consistency Models", algorithm 3 and appendix C.
 #[derive(Debug)]
-pub(super) struct Lcm {
-    config: LcmConfig,
-    timesteps: Vec<f64>,
-    visited: Vec<usize>,
+struct Lcm {
+    path: WholePath,
+    prediction: Prediction,
+    clipping: Clipping,
+    timestep_scaling: f64,
 }
 
 impl Scheduler for Lcm {
     fn timesteps(&self) -> &[f64] {
-        &self.timesteps
+        &self.path.timesteps
     }
 
     fn noise_level(&self, index: usize) -> NoiseLevel {
-        self.config.schedule.noise_level(self.visited[index])
+        self.path.level(index)
     }
 
     fn needs_noise(&self, index: usize) -> bool {
-        index + 1 < self.visited.len()
+        index + 1 < self.path.len()
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
@@ -109,13 +112,10 @@ impl Scheduler for Lcm {
         } = input;
         // 1. The clean image that the prediction stands for, limited.
         let level = self.noise_level(index);
-        let clean = self
-            .config
-            .prediction
-            .denoised(level, sample.clone(), prediction);
-        let clean = self.config.clipping.apply(clean);
+        let clean = self.prediction.denoised(level, sample.clone(), prediction);
+        let clean = self.clipping.apply(clean);
         // 2. The boundary condition: at t = 0 the sample itself.
-        let tau = self.timesteps[index] * self.config.timestep_scaling;
+        let tau = self.path.timesteps[index] * self.timestep_scaling;
         let skip = SIGMA_DATA * SIGMA_DATA / (tau * tau + SIGMA_DATA * SIGMA_DATA);
         let denoised = clean * (tau / tau.hypot(SIGMA_DATA)) + sample * skip;
         // 3. Up to the next level, except on arrival.

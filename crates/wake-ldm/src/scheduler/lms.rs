@@ -2,57 +2,12 @@
 
 use burn::tensor::Tensor;
 
+use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::Prediction;
-use super::schedule::{DEFAULTS, ScheduleDefaults};
-use super::sigmas::{SigmaOptions, SigmaPath, Spread};
-use super::spacing::Steps;
-use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
+use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
+use super::sigmas::{SigmaOptions, Spread};
 use crate::error::{Result, check_range};
 use crate::options::Options;
-
-/// Options of [`Lms`].
-#[derive(Debug, Clone)]
-pub(super) struct LmsConfig {
-    pub(super) schedule: NoiseSchedule,
-    steps: Steps,
-    prediction: Prediction,
-    sigmas: SigmaOptions,
-    order: usize,
-}
-
-impl LmsConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
-        let defaults = ScheduleDefaults {
-            rescaled: None,
-            ..DEFAULTS
-        };
-        let schedule = NoiseSchedule::take(options, &defaults)?;
-        let known = [
-            Prediction::Epsilon,
-            Prediction::Sample,
-            Prediction::Velocity,
-        ];
-        let order = options.usize("order", 4)?;
-        check_range("order", order as f64, 1.0, 4.0)?;
-        Ok(Self {
-            steps: Steps::take(options, schedule.steps(), "linspace")?,
-            prediction: Prediction::take(options, &known)?,
-            sigmas: SigmaOptions::take(options, &[Spread::Karras, Spread::Exponential])?,
-            order,
-            schedule,
-        })
-    }
-
-    pub(super) fn init(&self, n: usize) -> Result<Lms> {
-        let path = SigmaPath::fractional(&self.schedule, self.steps, &self.sigmas, true, n)?;
-        Ok(Lms {
-            path,
-            prediction: self.prediction,
-            order: self.order,
-            slopes: Vec::new(),
-        })
-    }
-}
 
 /// A polynomial through the slopes of the last four levels, integrated to the next.
 ///
@@ -67,61 +22,45 @@ impl LmsConfig {
 ///
 /// The Adams-Bashforth method on uneven steps, Hairer, Nørsett & Wanner (1993), "Solving Ordinary
 /// Differential Equations I", section III.5.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Lms {
-    path: SigmaPath,
-    prediction: Prediction,
     order: usize,
     /// Slopes at the last levels, newest first.
     slopes: Vec<Tensor<4>>,
 }
 
-impl Scheduler for Lms {
-    fn timesteps(&self) -> &[f64] {
-        &self.path.timesteps
+impl SigmaMethod for Lms {
+    fn take(options: &mut Options) -> Result<SigmaConfig<Self>> {
+        let defaults = ScheduleDefaults {
+            rescaled: None,
+            ..DEFAULTS
+        };
+        let order = options.usize("order", 4)?;
+        check_range("order", order as f64, 1.0, 4.0)?;
+        let method = Self {
+            order,
+            slopes: Vec::new(),
+        };
+        let mut config = SigmaConfig::take_common(options, &defaults, &Prediction::CURVED, method)?;
+        config.sigmas = SigmaOptions::take(options, &[Spread::Karras, Spread::Exponential])?;
+        Ok(config)
     }
 
-    fn init_noise_sigma(&self) -> f64 {
-        self.path.init_noise_sigma()
-    }
-
-    fn noise_level(&self, index: usize) -> NoiseLevel {
-        self.path.level(index)
-    }
-
-    fn scale_model_input(&self, sample: Tensor<4>, index: usize) -> Tensor<4> {
-        sample * self.path.input_scale(index)
-    }
-
-    fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            ..
-        } = input;
-        let level = self.path.level(index);
-        // 1. The slope here.
-        let denoised = self.prediction.denoised(level, sample.clone(), prediction);
-        let slope = (sample.clone() - denoised.clone()) / level.noise;
-        self.slopes.insert(0, slope);
+    fn advance(&mut self, call: Call<'_>) -> Tensor<4> {
+        let (_, next) = call.ends();
+        self.slopes.insert(0, call.slope);
         self.slopes.truncate(self.order);
-        // 2. The weights of this and the older ones; a level visited twice tells nothing new.
+        // A level visited twice tells nothing new, and ends what may be leaned on.
         let nodes: Vec<f64> = (0..self.slopes.len())
-            .map(|back| self.path.sigmas[index - back])
+            .map(|back| call.sigmas[call.index - back])
             .collect();
-        let usable = 1 + nodes
-            .windows(2)
-            .take_while(|pair| pair[1] > pair[0])
-            .count();
-        let weights = interpolation_weights(&nodes[..usable], self.path.sigmas[index + 1]);
-        // 3. The step.
-        let sample = self
-            .slopes
-            .iter()
-            .zip(weights)
-            .fold(sample, |sum, (slope, weight)| sum + slope.clone() * weight);
-        StepOutput { sample, denoised }
+        let rising = nodes.windows(2).take_while(|pair| pair[1] > pair[0]);
+        let usable = 1 + rising.count();
+        let weights = interpolation_weights(&nodes[..usable], next);
+        let weighted = self.slopes.iter().zip(weights);
+        weighted.fold(call.sample, |sum, (slope, weight)| {
+            sum + slope.clone() * weight
+        })
     }
 }
 

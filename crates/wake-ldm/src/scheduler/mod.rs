@@ -11,6 +11,7 @@
 //!     x = step(prediction, x, i)
 //! ```
 
+mod betas;
 mod config;
 mod ddim;
 mod ddpm;
@@ -19,21 +20,30 @@ mod euler;
 mod euler_ancestral;
 mod flow_match_euler;
 mod heun;
+mod integrator;
+mod known_options;
 mod lcm;
 mod lms;
-mod multistep;
+mod log_snr_path;
 mod pndm;
 mod prediction;
 mod schedule;
+mod sigma_sampler;
 mod sigmas;
 mod spacing;
 mod unipc;
+mod unipc_weights;
+mod whole_path;
 
 use burn::tensor::Tensor;
 
+use crate::error::Result;
+use crate::options::Options;
+
+pub use betas::BetaCurve;
 pub use config::SchedulerConfig;
 pub use prediction::{Clipping, Prediction};
-pub use schedule::{BetaCurve, NoiseSchedule, TerminalSnr};
+pub use schedule::{NoiseSchedule, TerminalSnr};
 
 /// How much of the clean image and how much noise a noisy image holds.
 ///
@@ -141,6 +151,20 @@ pub trait Scheduler: std::fmt::Debug + Send {
     /// When `index` is not that of a timestep, or noise is missing where
     /// [`needs_noise`](Self::needs_noise) asks for it.
     fn step(&mut self, input: StepInput) -> StepOutput;
+}
+
+/// The options of a method, read and checked: what runs are started from.
+trait Method: std::fmt::Debug + Send + Sync {
+    /// Reads the method's options.
+    fn take(options: &mut Options) -> Result<Self>
+    where
+        Self: Sized;
+
+    /// The noise of the training steps; `None` for straight paths, which have none.
+    fn schedule(&self) -> Option<&NoiseSchedule>;
+
+    /// A scheduler for a run of n steps.
+    fn start(&self, n: usize) -> Result<Box<dyn Scheduler>>;
 }
 
 /// The noise of a step that must have some.

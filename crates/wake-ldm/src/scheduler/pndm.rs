@@ -2,10 +2,11 @@
 
 use burn::tensor::Tensor;
 
+use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::Prediction;
-use super::schedule::{DEFAULTS, ScheduleDefaults, check_timestep};
 use super::spacing::{Steps, steps_out_of_range};
-use super::{NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
+use super::whole_path::WholePath;
+use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
 use crate::error::Result;
 use crate::options::Options;
 
@@ -15,15 +16,15 @@ const ORDER: usize = 4;
 /// Options of [`Pndm`].
 #[derive(Debug, Clone)]
 pub(super) struct PndmConfig {
-    pub(super) schedule: NoiseSchedule,
+    schedule: NoiseSchedule,
     steps: Steps,
     prediction: Prediction,
     skip_runge_kutta: bool,
     end_at_one: bool,
 }
 
-impl PndmConfig {
-    pub(super) fn take(options: &mut Options) -> Result<Self> {
+impl Method for PndmConfig {
+    fn take(options: &mut Options) -> Result<Self> {
         let defaults = ScheduleDefaults {
             rescaled: None,
             ..DEFAULTS
@@ -38,7 +39,11 @@ impl PndmConfig {
         })
     }
 
-    pub(super) fn init(&self, n: usize) -> Result<Pndm> {
+    fn schedule(&self) -> Option<&NoiseSchedule> {
+        Some(&self.schedule)
+    }
+
+    fn start(&self, n: usize) -> Result<Box<dyn Scheduler>> {
         let steps = self.steps.whole(n)?;
         let train = self.schedule.steps();
         let stride = train / n;
@@ -49,21 +54,16 @@ impl PndmConfig {
         } else {
             with_runge_kutta(&steps, stride / 2)
         };
-        let visited: Vec<usize> = calls
-            .iter()
-            .map(|&t| check_timestep(t, train))
-            .collect::<Result<_>>()?;
-        Ok(Pndm {
+        Ok(Box::new(Pndm {
+            path: WholePath::new(&calls, &self.schedule, self.prediction)?,
             config: self.clone(),
-            timesteps: calls.iter().map(|&t| t as f64).collect(),
-            visited,
             stride,
             runge_kutta_calls,
             calls: 0,
             history: Vec::new(),
             saved: None,
             sum: None,
-        })
+        }))
     }
 }
 
@@ -103,10 +103,9 @@ fn with_runge_kutta(steps: &[i64], half: usize) -> (Vec<i64>, usize) {
 ///
 /// Liu et al. (2022), "Pseudo Numerical Methods for Diffusion Models on Manifolds", Eqs. 11 to 13.
 #[derive(Debug)]
-pub(super) struct Pndm {
+struct Pndm {
     config: PndmConfig,
-    timesteps: Vec<f64>,
-    visited: Vec<usize>,
+    path: WholePath,
     stride: usize,
     runge_kutta_calls: usize,
     /// Calls made so far.
@@ -120,19 +119,14 @@ pub(super) struct Pndm {
 }
 
 impl Pndm {
-    /// ᾱ of a training step; below the first, that of the end.
-    fn alpha(&self, t: i64) -> f64 {
-        let schedule = &self.config.schedule;
-        match usize::try_from(t) {
-            Ok(t) => schedule.alpha_cumprod(t),
-            Err(_) if self.config.end_at_one => 1.0,
-            Err(_) => schedule.alpha_cumprod(0),
-        }
-    }
-
     /// Carries a sample from one training step to another, Eq. 11.
     fn transfer(&self, sample: Tensor<4>, from: i64, to: i64, prediction: Tensor<4>) -> StepOutput {
-        let (now, next) = (self.alpha(from), self.alpha(to));
+        let PndmConfig {
+            schedule,
+            end_at_one,
+            ..
+        } = &self.config;
+        let [now, next] = [from, to].map(|t| schedule.alpha_or_end(t, *end_at_one));
         let level = NoiseLevel::from_alpha_cumprod(now);
         let kind = self.config.prediction;
         let denoised = kind.denoised(level, sample.clone(), prediction.clone());
@@ -166,7 +160,7 @@ impl Pndm {
             self.keep_sum(sum, prediction)
         };
         let start = self.saved.clone().unwrap_or(sample);
-        let first = self.timesteps[self.calls / 4 * 4] as i64;
+        let first = self.path.step(self.calls / 4 * 4) as i64;
         self.transfer(start, first, t - half as i64, direction)
     }
 
@@ -213,11 +207,11 @@ fn adams_bashforth(history: &[Tensor<4>]) -> Tensor<4> {
 
 impl Scheduler for Pndm {
     fn timesteps(&self) -> &[f64] {
-        &self.timesteps
+        &self.path.timesteps
     }
 
     fn noise_level(&self, index: usize) -> NoiseLevel {
-        self.config.schedule.noise_level(self.visited[index])
+        self.path.level(index)
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
@@ -227,7 +221,7 @@ impl Scheduler for Pndm {
             sample,
             ..
         } = input;
-        let t = self.timesteps[index] as i64;
+        let t = self.path.step(index) as i64;
         let output = if self.calls < self.runge_kutta_calls {
             self.runge_kutta(t, sample, prediction)
         } else {

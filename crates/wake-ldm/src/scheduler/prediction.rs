@@ -20,6 +20,9 @@ pub enum Prediction {
 }
 
 impl Prediction {
+    /// What models of curved paths, α² + σ² = 1, are trained to predict.
+    pub(super) const CURVED: [Self; 3] = [Self::Epsilon, Self::Sample, Self::Velocity];
+
     /// The clean image that a prediction stands for.
     ///
     /// ```text

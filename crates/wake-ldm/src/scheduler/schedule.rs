@@ -1,27 +1,9 @@
 //! How much noise each training step adds, and how much has gathered up to it.
 
-use serde_json::Value;
-
 use super::NoiseLevel;
-use crate::error::{Error, Result, check_range};
+use super::betas::{BetaCurve, ScheduleDefaults};
+use crate::error::{Result, check_range};
 use crate::options::Options;
-
-/// The shape of the noise added per training step, βₜ.
-#[derive(Debug, Clone, PartialEq)]
-pub enum BetaCurve {
-    /// Evenly spaced from the first number to the second.
-    Linear(f64, f64),
-    /// Squares of evenly spaced square roots: Stable Diffusion's.
-    ScaledLinear(f64, f64),
-    /// From a signal that falls as the square of a cosine, at most 0.999.
-    SquaredCosine,
-    /// From a signal that falls as exp(−12 t), at most 0.999.
-    Exponential,
-    /// A logistic curve from the first number to the second.
-    Sigmoid(f64, f64),
-    /// Numbers given one by one.
-    Trained(Vec<f64>),
-}
 
 /// What becomes of the little signal that usually survives the last training step.
 ///
@@ -113,6 +95,15 @@ impl NoiseSchedule {
         f64::from(self.alphas_cumprod[t])
     }
 
+    /// The signal left after step `t`; below the first step all of it, or else as much as after that.
+    pub(super) fn alpha_or_end(&self, t: i64, end_at_one: bool) -> f64 {
+        match usize::try_from(t) {
+            Ok(t) => self.alpha_cumprod(t),
+            Err(_) if end_at_one => 1.0,
+            Err(_) => self.alpha_cumprod(0),
+        }
+    }
+
     /// The noise level after step `t`: √ᾱₜ and √(1 − ᾱₜ).
     ///
     /// # Panics
@@ -142,74 +133,6 @@ impl NoiseLevel {
     }
 }
 
-impl BetaCurve {
-    fn betas(&self, steps: usize) -> Result<Vec<f32>> {
-        if let Self::Linear(first, last)
-        | Self::ScaledLinear(first, last)
-        | Self::Sigmoid(first, last) = *self
-        {
-            check_range("beta_start", first, 1e-8, 0.9999)?;
-            check_range("beta_end", last, 1e-8, 0.9999)?;
-        }
-        Ok(match self {
-            Self::Linear(first, last) => linspace(*first, *last, steps),
-            Self::ScaledLinear(first, last) => linspace(first.sqrt(), last.sqrt(), steps)
-                .iter()
-                .map(|root| root * root)
-                .collect(),
-            Self::SquaredCosine => betas_of(squared_cosine, steps),
-            Self::Exponential => betas_of(|t| (-12.0 * t).exp(), steps),
-            Self::Sigmoid(first, last) => sigmoid_betas(*first, *last, steps),
-            Self::Trained(betas) => trained(betas, steps)?,
-        })
-    }
-
-    /// Reads `beta_schedule`, `beta_start`, `beta_end` and `trained_betas`.
-    pub(super) fn take(options: &mut Options, defaults: &ScheduleDefaults) -> Result<Self> {
-        let (first, last) = defaults.ends;
-        let ends = (
-            options.f64("beta_start", first)?,
-            options.f64("beta_end", last)?,
-        );
-        let name = options.string("beta_schedule", defaults.curve)?;
-        if let Some(list) = options.take("trained_betas") {
-            return trained_list(options, &list);
-        }
-        match name.as_str() {
-            "linear" => Ok(Self::Linear(ends.0, ends.1)),
-            "scaled_linear" => Ok(Self::ScaledLinear(ends.0, ends.1)),
-            "squaredcos_cap_v2" => Ok(Self::SquaredCosine),
-            other if defaults.further == Some(other) && other == "exp" => Ok(Self::Exponential),
-            other if defaults.further == Some(other) => Ok(Self::Sigmoid(ends.0, ends.1)),
-            other => {
-                let supported = "linear, scaled_linear, squaredcos_cap_v2";
-                Err(options.unsupported("beta_schedule", &other.into(), supported))
-            }
-        }
-    }
-}
-
-/// What a scheduler assumes about the schedule where its configuration is silent.
-#[derive(Debug)]
-pub(super) struct ScheduleDefaults {
-    /// Name of the curve.
-    pub(super) curve: &'static str,
-    /// First and last β.
-    pub(super) ends: (f64, f64),
-    /// The curve that only this scheduler knows.
-    pub(super) further: Option<&'static str>,
-    /// What rescaling to zero terminal signal means to it; `None`: it does not know it.
-    pub(super) rescaled: Option<TerminalSnr>,
-}
-
-/// The defaults that most schedulers share.
-pub(super) const DEFAULTS: ScheduleDefaults = ScheduleDefaults {
-    curve: "linear",
-    ends: (1e-4, 0.02),
-    further: None,
-    rescaled: Some(TerminalSnr::AlmostZero),
-};
-
 impl NoiseSchedule {
     /// Reads the options that shape the schedule.
     pub(super) fn take(options: &mut Options, defaults: &ScheduleDefaults) -> Result<Self> {
@@ -223,65 +146,17 @@ impl NoiseSchedule {
     }
 }
 
-/// Evenly spaced f32 numbers, counted from both ends as PyTorch does.
-fn linspace(first: f64, last: f64, steps: usize) -> Vec<f32> {
-    let (first, last) = (first as f32, last as f32);
-    let step = (last - first) / (steps - 1) as f32;
-    let value = |i: usize| {
-        if i < steps / 2 {
-            first + step * i as f32
-        } else {
-            last - step * (steps - 1 - i) as f32
-        }
-    };
-    (0..steps).map(value).collect()
-}
-
-/// The β that make the signal fall as a function of t in [0, 1], at most 0.999.
-fn betas_of(signal: impl Fn(f64) -> f64, steps: usize) -> Vec<f32> {
-    let at = |i: usize| signal(i as f64 / steps as f64);
-    (0..steps)
-        .map(|i| (1.0 - at(i + 1) / at(i)).min(0.999) as f32)
-        .collect()
-}
-
-fn squared_cosine(t: f64) -> f64 {
-    ((t + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2)
-        .cos()
-        .powi(2)
-}
-
-fn sigmoid_betas(first: f64, last: f64, steps: usize) -> Vec<f32> {
-    let rise = (last - first) as f32;
-    let logistic = |x: f32| 1.0 / (1.0 + (-x).exp());
-    linspace(-6.0, 6.0, steps)
-        .into_iter()
-        .map(|x| logistic(x) * rise + first as f32)
-        .collect()
-}
-
-fn trained(betas: &[f64], steps: usize) -> Result<Vec<f32>> {
-    check_range(
-        "length of trained_betas",
-        betas.len() as f64,
-        steps as f64,
-        steps as f64,
-    )?;
-    for (i, &beta) in betas.iter().enumerate() {
-        let (min, max) = if i == 0 { (1e-8, 0.9999) } else { (0.0, 1.0) };
-        check_range("trained_betas", beta, min, max)?;
-    }
-    Ok(betas.iter().map(|&beta| beta as f32).collect())
-}
-
-fn trained_list(options: &Options, list: &Value) -> Result<BetaCurve> {
-    let numbers: Option<Vec<f64>> = list
-        .as_array()
-        .and_then(|list| list.iter().map(Value::as_f64).collect());
-    match numbers {
-        Some(betas) => Ok(BetaCurve::Trained(betas)),
-        None => Err(options.unsupported("trained_betas", list, "a list of numbers")),
-    }
+/// The variance of a step back where the clean image is known, from ᾱ to ᾱ'.
+///
+/// ```text
+/// β̃ = (1 − ᾱ')/(1 − ᾱ) (1 − ᾱ/ᾱ')
+/// ```
+///
+/// # References
+///
+/// Ho et al. (2020), "Denoising Diffusion Probabilistic Models", Eq. 7.
+pub(super) fn posterior_variance(now: f64, next: f64) -> f64 {
+    (1.0 - next) / (1.0 - now) * (1.0 - now / next)
 }
 
 /// Products of the first factors, kept in f64 and rounded one by one.
@@ -312,19 +187,6 @@ fn without_terminal_signal(betas: &[f32]) -> Vec<f32> {
         .chain(ratios)
         .map(|alpha| 1.0 - alpha)
         .collect()
-}
-
-/// The error for a training step that the schedule does not have.
-pub(super) fn check_timestep(t: i64, steps: usize) -> Result<usize> {
-    match usize::try_from(t) {
-        Ok(index) if index < steps => Ok(index),
-        _ => Err(Error::OutOfRange {
-            name: "timestep (from steps, steps_offset and timestep_spacing)".to_owned(),
-            value: t as f64,
-            min: 0.0,
-            max: (steps - 1) as f64,
-        }),
-    }
 }
 
 #[cfg(test)]
@@ -358,18 +220,6 @@ mod tests {
         assert!((f64::from(schedule.sigmas()[999]) / 14.6146412 - 1.0).abs() < 2e-6);
         assert!((f64::from(schedule.betas()[0]) - 0.00085).abs() < 1e-10);
         assert!((f64::from(schedule.betas()[999]) - 0.012).abs() < 1e-9);
-    }
-
-    /// The closed form of the cosine curve at both ends and in the middle: the famous integer
-    /// division makes all but the last of these zero.
-    #[test]
-    fn cosine_betas_match_their_closed_form() {
-        let schedule =
-            NoiseSchedule::new(&BetaCurve::SquaredCosine, 1000, TerminalSnr::Kept).unwrap();
-        let ratio = squared_cosine(0.5) / squared_cosine(0.0);
-        assert!((schedule.alpha_cumprod(499) / ratio - 1.0).abs() < 1e-5);
-        assert!((f64::from(schedule.betas()[0]) - 4.1284e-5).abs() < 1e-8);
-        assert!((schedule.betas()[999] - 0.999).abs() < 1e-7);
     }
 
     #[test]
@@ -417,5 +267,22 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert_eq!(error, "length of trained_betas is 1, outside [3, 3]");
+    }
+
+    /// Published variances of the linear schedule.
+    #[test]
+    fn variances_are_the_published_ones() {
+        let curve = BetaCurve::Linear(1e-4, 0.02);
+        let schedule = NoiseSchedule::new(&curve, 1000, TerminalSnr::Kept).unwrap();
+        for (t, next, expected) in [
+            (420, 400, 0.14771),
+            (980, 960, 0.32460),
+            (487, 486, 0.00979),
+            (999, 998, 0.02),
+        ] {
+            let variance =
+                posterior_variance(schedule.alpha_cumprod(t), schedule.alpha_cumprod(next));
+            assert!((variance - expected).abs() < 1e-5, "{t}: {variance}");
+        }
     }
 }

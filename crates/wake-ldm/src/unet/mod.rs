@@ -52,9 +52,8 @@ pub struct UNet {
     up_blocks: Vec<UpBlock>,
     conv_norm_out: GroupNorm,
     conv_out: Conv2d,
-    time_channels: usize,
-    cos_first: bool,
-    frequency_shift: f64,
+    #[module(skip)]
+    config: UNetConfig,
 }
 
 impl UNetConfig {
@@ -81,19 +80,20 @@ impl UNetConfig {
             up_blocks: levels.up(device),
             conv_norm_out: GroupNorm::new(self.norm_groups, width, self.norm_epsilon, device),
             conv_out: conv3x3(width, self.out_channels, device),
-            time_channels: width,
-            cos_first: self.cos_first,
-            frequency_shift: self.frequency_shift,
+            config: self.clone(),
         }
     }
 }
 
 impl UNet {
+    /// What the model was built from.
+    pub fn config(&self) -> &UNetConfig {
+        &self.config
+    }
+
     /// Length of the condition vector, if the model has one.
     pub fn condition_channels(&self) -> Option<usize> {
-        self.class_embedding
-            .as_ref()
-            .map(TimestepEmbedding::input_channels)
+        self.config.condition_channels
     }
 
     /// Predicts the noise (or velocity, or clean image, as the model was trained to).
@@ -137,9 +137,9 @@ impl UNet {
         let dtype = self.conv_in.weight.val().dtype();
         let waves = sinusoidal_embedding(
             timesteps,
-            self.time_channels,
-            self.cos_first,
-            self.frequency_shift,
+            self.config.block_out_channels[0],
+            self.config.cos_first,
+            self.config.frequency_shift,
         );
         let embedded = self.time_embedding.forward(cast_to(waves, dtype));
         match (condition, &self.class_embedding) {

@@ -47,7 +47,7 @@ fn write_all(
 }
 
 /// Writes a text file that is either whole or not there.
-pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |writer| writer.write_all(text.as_bytes()))
 }
 

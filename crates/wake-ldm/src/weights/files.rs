@@ -1,94 +1,163 @@
-//! Finding and mapping the weight files of a folder.
+//! Finding the weight files of a folder, and reading them one tensor at a time.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+use std::fmt;
 use std::fs::File;
+use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use memmap2::Mmap;
-use safetensors::SafeTensors;
-use safetensors::tensor::TensorView;
-use serde_json::Value;
+use half::{bf16, f16};
+use safetensors::Dtype;
+use safetensors::tensor::{Metadata, TensorInfo};
 
-use super::header;
+use super::header::{self, Header};
+use super::index::ShardIndex;
 use super::names::modern;
-use super::read_text;
 use crate::error::{Error, Result};
 
-/// File names of models, the preferred ones first; each may also come in shards with an index.
-const NAMES: [&str; 4] = [
-    "diffusion_pytorch_model.safetensors",
-    "model.safetensors",
-    "diffusion_pytorch_model.fp16.safetensors",
-    "model.fp16.safetensors",
+/// File names of models, the preferred ones first, each with the names of the index that it may have
+/// instead, in shards.
+const NAMES: [(&str, &[&str]); 4] = [
+    (
+        "diffusion_pytorch_model.safetensors",
+        &["diffusion_pytorch_model.safetensors.index.json"],
+    ),
+    ("model.safetensors", &["model.safetensors.index.json"]),
+    (
+        "diffusion_pytorch_model.fp16.safetensors",
+        &[
+            "diffusion_pytorch_model.safetensors.index.fp16.json",
+            "diffusion_pytorch_model.safetensors.fp16.index.json",
+            "diffusion_pytorch_model.fp16.safetensors.index.json",
+        ],
+    ),
+    (
+        "model.fp16.safetensors",
+        &[
+            "model.safetensors.index.fp16.json",
+            "model.fp16.safetensors.index.json",
+        ],
+    ),
 ];
 
-/// One tensor in a mapped file.
+/// Bytes that are read and converted at once, so that no tensor lies in memory twice.
+const CHUNK: usize = 1 << 20;
+
+/// One open file, its header read and checked.
 #[derive(Debug)]
+pub(super) struct WeightFile {
+    pub(super) path: PathBuf,
+    contents: Contents,
+    header: Header,
+}
+
+/// Where the bytes of a file are.
+#[derive(Debug)]
+enum Contents {
+    Disk(File),
+    /// Part of the program.
+    Memory(&'static [u8]),
+}
+
+/// What tensors are read from.
+trait ReadSeek: Read + Seek {}
+impl<T: Read + Seek> ReadSeek for T {}
+
+impl Contents {
+    fn reader(&self) -> Box<dyn ReadSeek + '_> {
+        match self {
+            Self::Disk(file) => Box::new(file),
+            Self::Memory(bytes) => Box::new(Cursor::new(*bytes)),
+        }
+    }
+
+    fn size(&self) -> std::io::Result<u64> {
+        match self {
+            Self::Disk(file) => Ok(file.metadata()?.len()),
+            Self::Memory(bytes) => Ok(bytes.len() as u64),
+        }
+    }
+}
+
+/// One tensor of a file, not read yet.
 pub(super) struct Stored<'a> {
-    pub(super) view: TensorView<'a>,
+    info: &'a TensorInfo,
+    file: &'a WeightFile,
 }
 
-/// The files of one model, mapped into memory.
+/// The files of one model.
 #[derive(Debug)]
-pub(super) struct MappedFiles {
-    files: Vec<(PathBuf, Mmap)>,
+pub(super) struct WeightFiles {
+    files: Vec<WeightFile>,
 }
 
-impl MappedFiles {
-    /// Maps a file, or the files of a folder.
+impl WeightFiles {
+    /// Opens a file, or the files of a folder.
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let paths = if path.is_dir() {
-            weight_files(path)?
-        } else {
-            vec![path.to_owned()]
-        };
-        let files = paths
-            .into_iter()
-            .map(|path| Ok((path.clone(), map(&path)?)));
-        Ok(Self {
-            files: files.collect::<Result<_>>()?,
+        if !path.is_dir() {
+            return Self::whole(path);
+        }
+        for (name, indices) in NAMES {
+            let whole = path.join(name);
+            if whole.is_file() {
+                return Self::whole(&whole);
+            }
+            let mut indices = indices.iter().map(|index| path.join(index));
+            if let Some(index) = indices.find(|index| index.is_file()) {
+                return Self::shards(&ShardIndex::read(&index)?);
+            }
+        }
+        let expected = NAMES
+            .iter()
+            .flat_map(|(name, indices)| std::iter::once(name).chain(*indices));
+        Err(Error::MissingFile {
+            folder: path.to_owned(),
+            expected: expected.map(|name| (*name).to_owned()).collect(),
         })
     }
 
-    /// Refuses files whose header has an entry that would change the numbers.
-    pub(super) fn refuse_metadata(&self, key: &str) -> Result<()> {
-        for (path, bytes) in &self.files {
-            let header =
-                SafeTensors::read_metadata(bytes).map_err(|error| Error::InvalidSafetensors {
-                    path: path.clone(),
-                    reason: error.to_string(),
-                })?;
-            let entry = header
-                .1
-                .metadata()
-                .as_ref()
-                .and_then(|entries| entries.get(key));
-            if let Some(value) = entry {
-                return Err(Error::Unsupported {
-                    option: key.to_owned(),
-                    value: value.chars().take(80).collect(),
-                    supported: "absent".to_owned(),
-                });
-            }
+    /// A file that is part of the program; `name` only serves messages.
+    pub(super) fn embedded(name: &str, bytes: &'static [u8]) -> Result<Self> {
+        Ok(Self {
+            files: vec![WeightFile::new(Path::new(name), Contents::Memory(bytes))?],
+        })
+    }
+
+    fn whole(path: &Path) -> Result<Self> {
+        Ok(Self {
+            files: vec![WeightFile::open(path)?],
+        })
+    }
+
+    /// The shards of an index, which must hold what it says.
+    fn shards(index: &ShardIndex) -> Result<Self> {
+        let files = index.paths().map(|path| WeightFile::open(&path));
+        let files: Vec<WeightFile> = files.collect::<Result<_>>()?;
+        for file in &files {
+            index.check(&file.path, file.metadata().offset_keys())?;
         }
-        Ok(())
+        Ok(Self { files })
+    }
+
+    /// An entry of the headers' free text, where one of them has it.
+    pub(super) fn note(&self, key: &str) -> Option<&str> {
+        let headers = self.files.iter().map(WeightFile::metadata);
+        let mut notes = headers.filter_map(|header| header.metadata().as_ref());
+        notes.find_map(|notes| notes.get(key)).map(String::as_str)
     }
 
     /// All tensors under their present names.
     pub(super) fn tensors(&self) -> Result<BTreeMap<String, Stored<'_>>> {
         let mut tensors = BTreeMap::new();
-        for (path, bytes) in &self.files {
-            let invalid = |reason: String| Error::InvalidSafetensors {
-                path: path.clone(),
-                reason,
-            };
-            header::refuse_duplicates(bytes).map_err(invalid)?;
-            let file =
-                SafeTensors::deserialize(bytes).map_err(|error| invalid(error.to_string()))?;
-            for (name, view) in file.tensors() {
+        for file in &self.files {
+            for (name, info) in file.metadata().tensors() {
                 let name = modern(&name);
-                if tensors.insert(name.clone(), Stored { view }).is_some() {
-                    return Err(invalid(format!("two tensors are called {name}")));
+                let stored = Stored { info, file };
+                if tensors.insert(name.clone(), stored).is_some() {
+                    return Err(Error::InvalidSafetensors {
+                        path: file.path.clone(),
+                        reason: format!("two tensors are called {name}"),
+                    });
                 }
             }
         }
@@ -96,69 +165,94 @@ impl MappedFiles {
     }
 }
 
-/// The weight files of a folder: one, or all that an index names.
-fn weight_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    for name in NAMES {
-        let whole = folder.join(name);
-        if whole.is_file() {
-            return Ok(vec![whole]);
-        }
-        let index = folder.join(format!("{name}.index.json"));
-        if index.is_file() {
-            return shards(folder, &index);
-        }
+impl WeightFile {
+    fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|source| unreadable(path, source))?;
+        Self::new(path, Contents::Disk(file))
     }
-    let expected = NAMES
-        .iter()
-        .flat_map(|name| [(*name).to_owned(), format!("{name}.index.json")]);
-    Err(Error::MissingFile {
-        folder: folder.to_owned(),
-        expected: expected.collect(),
-    })
+
+    fn new(path: &Path, contents: Contents) -> Result<Self> {
+        let size = contents.size().map_err(|source| unreadable(path, source))?;
+        let header = header::read(path, contents.reader(), size)?;
+        Ok(Self {
+            path: path.to_owned(),
+            contents,
+            header,
+        })
+    }
+
+    fn metadata(&self) -> &Metadata {
+        &self.header.metadata
+    }
+
+    /// Hands the bytes of a tensor over, a chunk of whole numbers at a time.
+    fn for_chunks(&self, info: &TensorInfo, mut each: impl FnMut(&[u8])) -> std::io::Result<()> {
+        let (start, end) = info.data_offsets;
+        let mut file = self.contents.reader();
+        file.seek(SeekFrom::Start(self.header.data_start + start as u64))?;
+        let mut left = end - start;
+        let mut buffer = vec![0; left.min(CHUNK)];
+        while left > 0 {
+            let chunk = &mut buffer[..left.min(CHUNK)];
+            file.read_exact(chunk)?;
+            each(chunk);
+            left -= chunk.len();
+        }
+        Ok(())
+    }
 }
 
-/// The files that an index names, which must lie beside it.
-fn shards(folder: &Path, index: &Path) -> Result<Vec<PathBuf>> {
-    let json: Value = serde_json::from_str(&read_text(index)?).map_err(|source| Error::Json {
-        path: index.to_owned(),
-        source,
-    })?;
-    let invalid = |reason: &str| Error::InvalidSafetensors {
-        path: index.to_owned(),
-        reason: reason.to_owned(),
-    };
-    let map = json["weight_map"]
-        .as_object()
-        .ok_or_else(|| invalid("no weight_map"))?;
-    let mut names = BTreeSet::new();
-    for name in map.values() {
-        let name = name
-            .as_str()
-            .ok_or_else(|| invalid("weight_map holds other than names"))?;
-        if Path::new(name).file_name() != Some(name.as_ref()) {
-            return Err(invalid("a shard lies outside the folder"));
-        }
-        names.insert(folder.join(name));
+impl Stored<'_> {
+    pub(super) fn shape(&self) -> &[usize] {
+        &self.info.shape
     }
-    Ok(names.into_iter().collect())
+
+    pub(super) fn dtype(&self) -> Dtype {
+        self.info.dtype
+    }
+
+    /// Whether the numbers are of a kind that weights are stored in.
+    pub(super) fn is_float(&self) -> bool {
+        matches!(
+            self.dtype(),
+            Dtype::F32 | Dtype::F16 | Dtype::BF16 | Dtype::F64
+        )
+    }
+
+    /// Reads the numbers, as f32.
+    pub(super) fn read(&self) -> Result<Vec<f32>> {
+        match self.dtype() {
+            Dtype::F16 => self.converted(|b: [u8; 2]| f16::from_le_bytes(b).to_f32()),
+            Dtype::BF16 => self.converted(|b: [u8; 2]| bf16::from_le_bytes(b).to_f32()),
+            Dtype::F64 => self.converted(|b: [u8; 8]| f64::from_le_bytes(b) as f32),
+            _ => self.converted(f32::from_le_bytes),
+        }
+    }
+
+    fn converted<const N: usize>(&self, number: impl Fn([u8; N]) -> f32) -> Result<Vec<f32>> {
+        let (start, end) = self.info.data_offsets;
+        // The header's offsets lie within the file, so this is no more than it holds.
+        let mut numbers = Vec::with_capacity((end - start) / N);
+        let converted = self.file.for_chunks(self.info, |bytes| {
+            let (whole, _) = bytes.as_chunks::<N>();
+            numbers.extend(whole.iter().map(|bytes| number(*bytes)));
+        });
+        converted.map_err(|source| unreadable(&self.file.path, source))?;
+        Ok(numbers)
+    }
 }
 
-#[allow(unsafe_code, reason = "mapping a file has no safe interface")]
-fn map(path: &Path) -> Result<Mmap> {
-    let io = |source| Error::Io {
+impl fmt::Debug for Stored<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?} {:?}", self.dtype(), self.shape())
+    }
+}
+
+/// The error for a file that cannot be read.
+pub(super) fn unreadable(path: &Path, source: std::io::Error) -> Error {
+    Error::Io {
         action: "read",
         path: path.to_owned(),
         source,
-    };
-    let file = File::open(path).map_err(io)?;
-    if file.metadata().map_err(io)?.len() < 8 {
-        let reason = "too short for a header".to_owned();
-        return Err(Error::InvalidSafetensors {
-            path: path.to_owned(),
-            reason,
-        });
     }
-    // SAFETY: the map is only read, its header is checked before use, and any bytes are valid
-    // numbers. Truncating the file while it is mapped is the one thing that the caller must not do.
-    unsafe { Mmap::map(&file) }.map_err(io)
 }

@@ -1,26 +1,74 @@
-//! The one check of a safetensors header that its reader leaves out: that no name occurs twice.
+//! The header of a safetensors file: read without the data, and checked before anything is trusted.
 
 use std::collections::BTreeSet;
 use std::fmt;
+use std::io::Read;
+use std::path::Path;
 
+use safetensors::tensor::Metadata;
 use serde::de::{Deserializer as _, Error as _, IgnoredAny, MapAccess, Visitor};
 
-/// Refuses a header in which a name occurs twice; a reader would take the last one in silence.
-///
-/// `bytes` is the whole file. A file without a readable header is left to the reader to refuse.
-pub(super) fn refuse_duplicates(bytes: &[u8]) -> Result<(), String> {
-    let Some(header) = header(bytes) else {
-        return Ok(());
-    };
-    let mut json = serde_json::Deserializer::from_slice(header);
-    json.deserialize_map(DistinctNames)
-        .map_err(|error| error.to_string())
+use super::files::unreadable;
+use crate::error::{Error, Result};
+
+/// The format's own limit on the length of a header.
+const LONGEST: u64 = 100_000_000;
+
+/// Bytes of the header's length.
+const LENGTH: u64 = 8;
+
+/// What a file says about its tensors.
+#[derive(Debug)]
+pub(super) struct Header {
+    pub(super) metadata: Metadata,
+    /// Where in the file the data begin.
+    pub(super) data_start: u64,
 }
 
-/// The JSON between the length and the data.
-fn header(bytes: &[u8]) -> Option<&[u8]> {
-    let (length, rest) = bytes.split_first_chunk::<8>()?;
-    rest.get(..usize::try_from(u64::from_le_bytes(*length)).ok()?)
+/// Reads and checks the header of a file.
+///
+/// Tensors must lie side by side from the header to the end of the file, as long as their shapes
+/// say, each under a name of its own. Nothing is allocated that the file does not hold.
+///
+/// - `file`: at its first byte
+/// - `size`: its length in bytes
+pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header> {
+    let io = |source| unreadable(path, source);
+    let invalid = |reason: String| Error::InvalidSafetensors {
+        path: path.to_owned(),
+        reason,
+    };
+    let Some(rest) = size.checked_sub(LENGTH) else {
+        return Err(invalid("too short for a header".to_owned()));
+    };
+    let mut length = [0; LENGTH as usize];
+    file.read_exact(&mut length).map_err(io)?;
+    let length = u64::from_le_bytes(length);
+    if length > rest.min(LONGEST) {
+        return Err(invalid(format!("a header of {length} bytes")));
+    }
+    let mut text = vec![0; length as usize];
+    file.read_exact(&mut text).map_err(io)?;
+    let metadata = parse(&text).map_err(invalid)?;
+    let found = rest - length;
+    if metadata.data_len() as u64 != found {
+        let told = metadata.data_len();
+        return Err(invalid(format!(
+            "{told} bytes of data, but {found} are there"
+        )));
+    }
+    Ok(Header {
+        metadata,
+        data_start: LENGTH + length,
+    })
+}
+
+/// The tensors of a header, of which none may occur twice: a reader would take the last in silence.
+fn parse(text: &[u8]) -> Result<Metadata, String> {
+    let mut json = serde_json::Deserializer::from_slice(text);
+    json.deserialize_map(DistinctNames)
+        .map_err(|error| error.to_string())?;
+    serde_json::from_slice(text).map_err(|error| error.to_string())
 }
 
 struct DistinctNames;
@@ -48,25 +96,26 @@ impl<'de> Visitor<'de> for DistinctNames {
 mod tests {
     use super::*;
 
-    fn file(header: &str) -> Vec<u8> {
-        let mut bytes = (header.len() as u64).to_le_bytes().to_vec();
-        bytes.extend(header.as_bytes());
-        bytes
-    }
-
     #[test]
     fn a_name_that_occurs_twice_is_refused() {
-        assert_eq!(refuse_duplicates(&file(r#"{"a": 1, "b": 2}  "#)), Ok(()));
-        let refusal = refuse_duplicates(&file(r#"{"a": 1, "b": 2, "a": 3}"#)).unwrap_err();
+        let entry = |from: usize| {
+            format!(
+                r#"{{"dtype": "F32", "shape": [1], "data_offsets": [{from}, {}]}}"#,
+                from + 4
+            )
+        };
+        let [first, second, third] = [0, 4, 8].map(entry);
+        let good = format!(r#"{{"a": {first}, "b": {second}}}  "#);
+        assert_eq!(parse(good.as_bytes()).unwrap().data_len(), 8);
+        let twice = format!(r#"{{"a": {first}, "b": {second}, "a": {third}}}"#);
+        let refusal = parse(twice.as_bytes()).unwrap_err();
         assert!(refusal.contains("the name a occurs twice"), "{refusal}");
-        // A million open brackets are skipped without recursion, and refused for having no end.
-        let deep = file(&format!("{{\"a\": {}", "[".repeat(1 << 20)));
-        assert!(refuse_duplicates(&deep).is_err());
     }
 
+    /// A million open brackets are skipped without recursion, and refused for having no end.
     #[test]
-    fn what_has_no_header_is_left_to_the_reader() {
-        assert_eq!(refuse_duplicates(&[]), Ok(()));
-        assert_eq!(refuse_duplicates(&u64::MAX.to_le_bytes()), Ok(()));
+    fn deep_nesting_is_refused() {
+        let deep = format!("{{\"a\": {}", "[".repeat(1 << 20));
+        assert!(parse(deep.as_bytes()).is_err());
     }
 }

@@ -6,9 +6,10 @@ use std::path::Path;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
-use super::files::{MappedFiles, Stored};
+use super::files::{Stored, WeightFiles};
+use super::lora_strength::{NOTE, Strength};
 use super::names::{Layout, Path as ModulePath};
-use super::{shapes, widened};
+use super::shapes;
 use crate::error::{Error, Mismatch, Misshapen, Result};
 
 /// The two factors of one layer's change.
@@ -20,15 +21,17 @@ struct Factors<'a> {
 
 impl Factors<'_> {
     fn rank(&self) -> usize {
-        self.down.view.shape().first().copied().unwrap_or(0)
+        self.down.shape().first().copied().unwrap_or(0)
     }
 
     /// Whether the product has as many rows and columns as the weight.
     fn fit(&self, shape: &[usize]) -> bool {
-        let (down, up) = (self.down.view.shape(), self.up.view.shape());
+        let (down, up) = (self.down.shape(), self.up.shape());
         let count = |shape: &[usize]| shape.iter().product::<usize>();
         let rank = self.rank();
-        rank > 0
+        let float = self.down.is_float() && self.up.is_float();
+        float
+            && rank > 0
             && shape.len() > 1
             && down.len() > 1
             && up.len() > 1
@@ -38,34 +41,32 @@ impl Factors<'_> {
     }
 
     /// The change of the weight, flattened to rows and columns.
-    fn product(&self, rows: usize, device: &Device) -> Tensor<2> {
-        let rank = self.rank();
-        let matrix = |stored: &Stored<'_>, rows: usize| -> Tensor<2> {
-            let numbers = widened(&stored.view);
+    fn product(&self, rows: usize, device: &Device) -> Result<Tensor<2>> {
+        let matrix = |stored: &Stored<'_>, rows: usize| -> Result<Tensor<2>> {
+            let numbers = stored.read()?;
             let columns = numbers.len() / rows;
-            Tensor::from_data(
-                TensorData::new(numbers, [rows, columns]),
-                (device, DType::F32),
-            )
+            let data = TensorData::new(numbers, [rows, columns]);
+            Ok(Tensor::from_data(data, (device, DType::F32)))
         };
-        matrix(self.up, rows).matmul(matrix(self.down, rank))
+        Ok(matrix(self.up, rows)?.matmul(matrix(self.down, self.rank())?))
     }
 }
 
 /// Adds a low-rank adaptation in diffusers' format to the weights of a model.
 ///
 /// ```text
-/// W' = W + scale · B A
+/// W' = W + scale · α/r · B A
 /// ```
 ///
-/// - A, B: `PREFIX.LAYER.lora_A.weight` and `….lora_B.weight` of the file, with α equal to the rank
+/// - A, B: `PREFIX.LAYER.lora_A.weight` and `….lora_B.weight` of the file, of rank r
+/// - α: as the file's header says, for all layers or for single ones; where it says nothing, r
 /// - `prefix`: whose layers to take, `unet` or `text_encoder`; the others are left alone
 ///
 /// # Errors
 ///
 /// As [`load`](super::load); a layer that the model does not have, or whose factors do not fit it, is a
 /// [`Error::WeightsMismatch`], and so is a file without any layer of this prefix.
-/// [`Error::Unsupported`] for a file that brings its own α.
+/// [`Error::Unsupported`] for a file trained with an option that changes the sum, such as `use_dora`.
 ///
 /// # References
 ///
@@ -77,8 +78,8 @@ pub fn merge_lora<M: Module>(
     path: &Path,
     scale: f64,
 ) -> Result<M> {
-    let files = MappedFiles::open(path)?;
-    files.refuse_metadata("lora_adapter_metadata")?;
+    let files = WeightFiles::open(path)?;
+    let strength = Strength::read(files.note(NOTE), prefix, path)?;
     let stored = files.tensors()?;
     let layers = layers(&stored, prefix)
         .and_then(|layers| checked(layers, &shapes(&model, layout), prefix))
@@ -86,12 +87,16 @@ pub fn merge_lora<M: Module>(
             path: path.to_owned(),
             mismatch: Box::new(mismatch),
         })?;
-    Ok(model.map(&mut Merger {
+    let mut merger = Merger {
         path: ModulePath::default(),
         layout,
         layers,
+        strength,
         scale,
-    }))
+        result: Ok(()),
+    };
+    let model = model.map(&mut merger);
+    merger.result.map(|()| model)
 }
 
 /// The factors of each weight, by its name in the model.
@@ -143,11 +148,7 @@ fn checked<'a>(
             Some(shape) => mismatch.misshapen.push(Misshapen {
                 name: format!("{prefix}.{name}"),
                 expected: format!("factors of {shape:?}"),
-                found: format!(
-                    "{:?} {:?}",
-                    factors.up.view.shape(),
-                    factors.down.view.shape()
-                ),
+                found: format!("{:?} {:?}", factors.up, factors.down),
             }),
         }
     }
@@ -162,7 +163,22 @@ struct Merger<'a> {
     path: ModulePath,
     layout: Layout,
     layers: BTreeMap<String, Factors<'a>>,
+    strength: Strength,
     scale: f64,
+    /// The first factor that could not be read.
+    result: Result<()>,
+}
+
+impl Merger<'_> {
+    /// The change of a layer's weight, as it is stored: `[out, in]`, or flattened to that.
+    fn change(&self, name: &str, rows: usize, device: &Device) -> Result<Option<Tensor<2>>> {
+        let Some(factors) = self.layers.get(name) else {
+            return Ok(None);
+        };
+        let layer = name.strip_suffix(".weight").unwrap_or(name);
+        let factor = self.scale * self.strength.factor(layer, factors.rank());
+        Ok(Some(factors.product(rows, device)? * factor))
+    }
 }
 
 impl ModuleMapper for Merger<'_> {
@@ -175,21 +191,24 @@ impl ModuleMapper for Merger<'_> {
     }
 
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let Some(factors) = self.layers.get(&self.path.file_name(self.layout)) else {
-            return param;
-        };
         let transposed = self.path.is_transposed(D);
-        let scale = self.scale;
+        let dims = param.lazy_shape();
+        let rows = if transposed { dims[1] } else { dims[0] };
+        let name = self.path.file_name(self.layout);
+        let mut change = match self.change(&name, rows, &param.lazy_device()) {
+            Ok(Some(change)) => change,
+            Ok(None) => return param,
+            Err(error) => {
+                self.result = Err(error);
+                return param;
+            }
+        };
+        if transposed {
+            change = change.swap_dims(0, 1);
+        }
         param.map(|weight| {
-            let dims = weight.dims();
-            let rows = if transposed { dims[1] } else { dims[0] };
-            let change = factors.product(rows, &weight.device()) * scale;
-            let change = if transposed {
-                change.swap_dims(0, 1)
-            } else {
-                change
-            };
             let dtype: burn::tensor::FloatDType = weight.dtype().into();
+            let dims = weight.dims();
             weight + change.reshape(dims).cast(dtype)
         })
     }

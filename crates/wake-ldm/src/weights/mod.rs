@@ -3,7 +3,10 @@
 mod atomic;
 mod files;
 mod header;
+mod index;
 mod lora;
+mod lora_strength;
+mod low_rank;
 mod names;
 mod precision;
 mod save;
@@ -13,18 +16,17 @@ use std::path::Path;
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Device, Tensor, TensorData};
-use half::{bf16, f16};
-use safetensors::Dtype;
-use safetensors::tensor::TensorView;
 
 use crate::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
 use crate::error::{Error, Mismatch, Misshapen, Result};
 use crate::text::{ClipText, ClipTextConfig};
 use crate::unet::{UNet, UNetConfig};
-use files::{MappedFiles, Stored};
+use files::{Stored, WeightFiles};
 use names::Path as ModulePath;
 
+pub(crate) use atomic::write_text;
 pub use lora::merge_lora;
+pub use low_rank::LowRank;
 pub use names::Layout;
 pub use precision::Precision;
 pub use save::{save_as, save_folder};
@@ -98,8 +100,9 @@ pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
 /// Reads weights into a model: all of them, or none.
 ///
 /// `path` is a safetensors file, or a folder that holds one, in one piece or in shards with an index.
-/// Files are mapped, and tensors converted to `precision` one by one, whatever the file holds. The attention names of
-/// early autoencoders (`query`, `key`, `value`, `proj_attn`) and the buffer `position_ids` are known.
+/// Tensors are read and converted to `precision` one by one, whatever the file holds, so that the model
+/// is never held twice. The attention names of early autoencoders (`query`, `key`, `value`,
+/// `proj_attn`) and the buffer `position_ids` are known.
 ///
 /// # Errors
 ///
@@ -113,7 +116,31 @@ pub fn load_as<M: Module>(
     precision: Precision,
 ) -> Result<M> {
     precision.check(&model.devices())?;
-    let files = MappedFiles::open(path)?;
+    load_files(model, layout, path, precision, &WeightFiles::open(path)?)
+}
+
+/// Reads weights that are part of the program, as f32; `name` only serves messages.
+///
+/// # Errors
+///
+/// As [`load_as`], for what is no weight file or that of another model.
+pub fn load_bytes<M: Module>(
+    model: M,
+    layout: Layout,
+    name: &str,
+    bytes: &'static [u8],
+) -> Result<M> {
+    let files = WeightFiles::embedded(name, bytes)?;
+    load_files(model, layout, Path::new(name), Precision::F32, &files)
+}
+
+fn load_files<M: Module>(
+    model: M,
+    layout: Layout,
+    path: &Path,
+    precision: Precision,
+    files: &WeightFiles,
+) -> Result<M> {
     let stored = files.tensors()?;
     let expected = shapes(&model, layout);
     let mismatch = compare(&expected, &stored);
@@ -123,17 +150,20 @@ pub fn load_as<M: Module>(
             mismatch: Box::new(mismatch),
         });
     }
-    Ok(model.map(&mut Loader {
+    let mut loader = Loader {
         path: ModulePath::default(),
         layout,
         precision,
         stored: &stored,
-    }))
+        result: Ok(()),
+    };
+    let model = model.map(&mut loader);
+    loader.result.map(|()| model)
 }
 
 /// Whether a file has tensors below a prefix.
 pub(crate) fn has_prefix(path: &Path, prefix: &str) -> Result<bool> {
-    let files = MappedFiles::open(path)?;
+    let files = WeightFiles::open(path)?;
     Ok(files
         .tensors()?
         .keys()
@@ -173,7 +203,7 @@ fn compare(
             Some(tensor) => mismatch.misshapen.push(Misshapen {
                 name: name.clone(),
                 expected: format!("float {shape:?}"),
-                found: format!("{:?} {:?}", tensor.view.dtype(), tensor.view.shape()),
+                found: format!("{tensor:?}"),
             }),
         }
     }
@@ -184,13 +214,9 @@ fn compare(
 
 /// Whether a tensor is a weight of that shape; matrices may be stored as 1 × 1 convolutions.
 fn fits(shape: &[usize], tensor: &Stored<'_>) -> bool {
-    let float = matches!(
-        tensor.view.dtype(),
-        Dtype::F32 | Dtype::F16 | Dtype::BF16 | Dtype::F64
-    );
-    let found = tensor.view.shape();
+    let found = tensor.shape();
     let as_convolution = shape.len() == 2 && found.len() == 4 && found[2..] == [1, 1];
-    float && (found == shape || (as_convolution && found[..2] == *shape))
+    tensor.is_float() && (found == shape || (as_convolution && found[..2] == *shape))
 }
 
 struct Lister {
@@ -222,6 +248,8 @@ struct Loader<'a> {
     layout: Layout,
     precision: Precision,
     stored: &'a BTreeMap<String, Stored<'a>>,
+    /// The first tensor that could not be read.
+    result: Result<()>,
 }
 
 impl ModuleMapper for Loader<'_> {
@@ -237,9 +265,18 @@ impl ModuleMapper for Loader<'_> {
         let Some(tensor) = self.stored.get(&self.path.file_name(self.layout)) else {
             return param;
         };
+        if self.result.is_err() {
+            return param;
+        }
+        let numbers = match tensor.read() {
+            Ok(numbers) => numbers,
+            Err(error) => {
+                self.result = Err(error);
+                return param;
+            }
+        };
+        let data = TensorData::new(numbers, tensor.shape()[..D].to_vec());
         let device = param.lazy_device();
-        let shape = tensor.view.shape()[..D].to_vec();
-        let data = TensorData::new(widened(&tensor.view), shape);
         let mut value = Tensor::from_data(data, (&device, self.precision.dtype()));
         if self.path.is_transposed(D) {
             value = value.swap_dims(0, 1);
@@ -247,20 +284,4 @@ impl ModuleMapper for Loader<'_> {
         let id = param.id;
         param.transform_for_load(value, id)
     }
-}
-
-/// The numbers of a tensor as f32.
-fn widened(view: &TensorView<'_>) -> Vec<f32> {
-    let bytes = view.data();
-    match view.dtype() {
-        Dtype::F16 => numbers(bytes, |b: [u8; 2]| f16::from_le_bytes(b).to_f32()),
-        Dtype::BF16 => numbers(bytes, |b: [u8; 2]| bf16::from_le_bytes(b).to_f32()),
-        Dtype::F64 => numbers(bytes, |b: [u8; 8]| f64::from_le_bytes(b) as f32),
-        _ => numbers(bytes, f32::from_le_bytes),
-    }
-}
-
-fn numbers<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f32) -> Vec<f32> {
-    let (chunks, _) = bytes.as_chunks::<N>();
-    chunks.iter().map(|chunk| number(*chunk)).collect()
 }

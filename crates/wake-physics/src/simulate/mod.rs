@@ -1,19 +1,22 @@
 //! From a scene to a SAR image: the only file that knows the order of the stages.
 //!
-//! `stages` calls the method of each stage, `clock` times them, `report` writes what came out.
+//! `stages` calls the method of each stage, `label` says what is where, `clock` times, `report` writes what came out.
 
 use crate::error::Result;
 use crate::labels::Labels;
+use crate::memory;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
 use crate::setup::Setup;
 use clock::Clock;
 pub use clock::Seconds;
+pub use label::labels_of;
 use serde::Serialize;
 use stages::Run;
 
 mod clock;
+mod label;
 mod report;
 mod stages;
 
@@ -81,6 +84,7 @@ pub fn simulate(scene: &Scene) -> Result<Simulation> {
 /// As [`simulate`].
 pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
     scene.validate()?;
+    memory::keep_large_blocks();
     let mut clock = Clock::start();
     let mut seconds = Seconds::default();
     let setup = Setup::new(scene);
@@ -102,7 +106,7 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
     seconds.imaging = clock.lap();
     let speckled = run.speckle(&plan, &intensity);
     seconds.speckle = clock.lap();
-    let labels = run.labels();
+    let labels = labels_of(scene);
     let [
         elevation,
         slope_x,
@@ -110,8 +114,8 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
         velocity_x,
         velocity_y,
         velocity_z,
-    ] = fields.outputs.map(|field| run.crop(&field));
-    let (radial_velocity, sigma0) = (run.crop(&radial_velocity), run.crop(&sigma0));
+    ] = fields.outputs.map(|field| run.crop(field));
+    let (radial_velocity, sigma0) = (run.crop(radial_velocity), run.crop(sigma0));
     seconds.labels = clock.lap();
     seconds.total = clock.total();
     Ok(Simulation {

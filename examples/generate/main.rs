@@ -1,11 +1,15 @@
 //! A sentence (or a scene) becomes a radar image with the diffusion model.
 //!
 //! ```text
+//! cargo run --release --example generate
+//! cargo run --release --example generate -- --prompt "a ship at 8 m/s toward 135 degrees, wind 5 m/s" --count 8
 //! cargo run --release --example generate -- --weights stable-diffusion-v1-4 --steps 20
-//! cargo run --release --example generate -- --weights DIR --scene scene.toml --count 4 --seed 7
 //! ```
 //!
-//! Writes `image.png` (`image-0.png`, `image-1.png`, … with `--count`) and `report.json`.
+//! Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and
+//! `report.json`; the model that lies in `wake-ldm` also writes `labels.json`.
+
+mod small;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -29,12 +33,12 @@ struct Arguments {
     /// Scene file (TOML) to put into words.
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Folder of the model, in diffusers layout.
+    /// Folder of a model: one that `train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Steps of the scheduler.
-    #[arg(long, default_value_t = 50)]
-    steps: usize,
+    /// Steps from noise to image [default: 8, or 50 in diffusers layout]
+    #[arg(long)]
+    steps: Option<usize>,
     /// ddpm, ddim, pndm, euler, euler-ancestral, dpm++, heun, lms, unipc, lcm or flow-match-euler;
     /// without it, the model's own.
     #[arg(long, value_name = "NAME")]
@@ -73,15 +77,20 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let weights = arguments.weights.as_ref().ok_or(
-        "--weights is missing: give the folder of a model in diffusers layout, such as Stable \
-         Diffusion v1.4 (this build has no model of its own yet)",
-    )?;
-    let prompt = prompt(arguments)?;
+    match &arguments.weights {
+        Some(weights) if !small::is_small(weights) => diffusers(arguments, weights),
+        _ => small::run(arguments),
+    }
+}
+
+/// A model in the layout of diffusers.
+fn diffusers(arguments: &Arguments, weights: &Path) -> Result<(), Box<dyn Error>> {
+    let (prompt, grid) = prompt(arguments)?;
     let device = device(&arguments.device)?;
     let begin = Instant::now();
     let pipeline = Pipeline::load(weights, &device)?;
     let load = begin.elapsed().as_secs_f64();
+    check_grid(grid, pipeline.image_size())?;
     let request = request(arguments, &prompt, &pipeline)?;
     let (images, mut seconds) = generate(&pipeline, &request, arguments, &prompt)?;
     seconds["load"] = json!(load);
@@ -90,10 +99,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let files = write_images(images, &arguments.out)?;
     let report = json!({
         "prompt": prompt, "negative": arguments.negative, "seed": arguments.seed,
-        "steps": arguments.steps, "guidance": arguments.guidance, "count": arguments.count,
+        "steps": arguments.steps.unwrap_or(50), "guidance": arguments.guidance, "count": arguments.count,
         "scheduler": request_scheduler(arguments, &pipeline)?.to_json(),
         "device": arguments.device, "weights": weights, "files": files, "seconds": seconds,
     });
+    finish(arguments, &report, &files)
+}
+
+/// Writes the report and says what was made.
+fn finish(arguments: &Arguments, report: &Value, files: &[String]) -> Result<(), Box<dyn Error>> {
     std::fs::write(arguments.out.join("report.json"), format!("{report:#}\n"))?;
     if arguments.json {
         println!("{report:#}");
@@ -103,16 +117,29 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The prompt as given, or a scene in words.
-fn prompt(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+/// The prompt as given, or a scene in words; and the rows and columns of a scene that was asked for.
+fn prompt(arguments: &Arguments) -> Result<(String, Option<[usize; 2]>), Box<dyn Error>> {
     if let Some(prompt) = &arguments.prompt {
-        return Ok(prompt.clone());
+        return Ok((prompt.clone(), None));
     }
-    let scene = match &arguments.scene {
-        Some(path) => Scene::read(path)?,
-        None => Scene::default(),
+    let Some(path) = &arguments.scene else {
+        return Ok((wake_text::prompt(&Scene::default())?, None));
     };
-    Ok(wake_text::prompt(&scene)?)
+    let scene = Scene::read(path)?;
+    let grid = [scene.grid.rows, scene.grid.columns];
+    Ok((wake_text::prompt(&scene)?, Some(grid)))
+}
+
+/// Refuses a scene whose image has another size than the model's.
+fn check_grid(grid: Option<[usize; 2]>, [rows, columns]: [usize; 2]) -> Result<(), String> {
+    match grid {
+        Some(grid) if grid != [rows, columns] => Err(format!(
+            "the scene's grid is {} × {} pixels, but the model makes {rows} × {columns}; set grid.rows and \
+             grid.columns to that",
+            grid[0], grid[1]
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn request_scheduler(
@@ -131,7 +158,7 @@ fn request(arguments: &Arguments, prompt: &str, pipeline: &Pipeline) -> wake_ldm
     Ok(Request::new(prompt)
         .with_negative(arguments.negative.as_str())
         .with_guidance(arguments.guidance)
-        .with_steps(arguments.steps)
+        .with_steps(arguments.steps.unwrap_or(50))
         .with_scheduler(request_scheduler(arguments, pipeline)?)
         .with_count(arguments.count)
         .with_seed(arguments.seed))

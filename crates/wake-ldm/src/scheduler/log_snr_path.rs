@@ -1,4 +1,4 @@
-//! What the exponential integrators share: whole training steps, and levels in λ = ln(α/σ).
+//! The path of the exponential integrators: whole training steps, and levels in λ = ln(α/σ).
 
 use super::sigmas::{SigmaOptions, SigmaTable, Spread, check_positive, round};
 use super::spacing::{Steps, linspace};
@@ -84,6 +84,16 @@ impl PathOptions {
     }
 }
 
+/// The part of a step that is solved exactly, x' = `sample` · x + …, and what the rest needs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ExactPart {
+    pub(super) sample: f64,
+    /// Factor of the integral over the predictions.
+    pub(super) amplitude: f64,
+    /// The step in λ, counted down in terms of the clean image and up in terms of the noise.
+    pub(super) h: f64,
+}
+
 impl LogSnrPath {
     /// Number of steps.
     pub(super) fn len(&self) -> usize {
@@ -112,14 +122,37 @@ impl LogSnrPath {
         signal.ln() - noise.ln()
     }
 
-    /// How many levels before `index` a polynomial may lean on: at most `wanted`, and none from
-    /// before a level that is visited twice.
-    pub(super) fn usable_before(&self, index: usize, wanted: usize) -> usize {
-        let distinct = |back: &usize| {
-            index
-                .checked_sub(*back)
-                .is_some_and(|i| self.log_snr(i) < self.log_snr(i + 1))
+    /// The length of a step in λ; 0 between equal levels.
+    pub(super) fn length(&self, index: usize) -> f64 {
+        self.log_snr(index + 1) - self.log_snr(index)
+    }
+
+    /// The exact part of a step in terms of the clean image (`data`), or else of the noise.
+    pub(super) fn exact_part(&self, index: usize, data: bool) -> ExactPart {
+        let (now, next) = (self.level(index), self.level(index + 1));
+        let length = self.length(index);
+        if data {
+            ExactPart {
+                sample: next.noise / now.noise,
+                amplitude: next.signal,
+                h: -length,
+            }
+        } else {
+            ExactPart {
+                sample: next.signal / now.signal,
+                amplitude: next.noise,
+                h: length,
+            }
+        }
+    }
+
+    /// The order that a step can have: at most `wanted`, as far as the `known` predictions go, and
+    /// none from before a level that is visited twice, which would divide by zero.
+    pub(super) fn order(&self, index: usize, wanted: usize, known: usize) -> usize {
+        let moves = |back: &usize| {
+            let from = index.checked_sub(*back);
+            from.is_some_and(|from| self.length(from) > 0.0)
         };
-        (1..=wanted).take_while(distinct).count()
+        (0..wanted.min(known)).take_while(moves).count().max(1)
     }
 }

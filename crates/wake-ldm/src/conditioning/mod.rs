@@ -1,0 +1,27 @@
+//! What the small wake model is told about a scene: numbers, the geometry of the wake, and words.
+//!
+//! ```text
+//! prompt ─► token ids ─► compact ids ──────────────┐
+//! numbers ─► Fourier features ─────────────────────┼─► model
+//! numbers ─► phases of the Kelvin wake at each pixel ┘
+//! ```
+//!
+//! Whatever is not known is left out: a number that no prompt states has the flag 0 and no value, and without
+//! speed, heading and place of the ship the maps are empty.
+
+mod conditions;
+mod features;
+mod maps;
+mod vocabulary;
+
+use wake_text::Tokenizer;
+
+pub use conditions::Conditions;
+pub use features::{FEATURES, features};
+pub use maps::{MapGrid, PATCH, PLACES, WAVES, WakeMaps};
+pub use vocabulary::Vocabulary;
+
+/// CLIP's ids of a prompt, with marks and padding.
+pub fn tokens(prompt: &str) -> Vec<u32> {
+    Tokenizer::clip().encode(prompt).ids.to_vec()
+}

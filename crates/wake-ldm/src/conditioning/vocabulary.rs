@@ -1,0 +1,50 @@
+//! Few of CLIP's 49,408 tokens occur in prompts about wakes; the others are one unknown token.
+
+use std::collections::BTreeSet;
+
+/// CLIP's ids that a small text transformer knows, in increasing order.
+///
+/// Compact id 0 stands for every other token.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Vocabulary {
+    known: Vec<u32>,
+}
+
+impl Vocabulary {
+    /// The vocabulary of the given ids.
+    pub fn new(ids: impl IntoIterator<Item = u32>) -> Self {
+        let known: BTreeSet<u32> = ids.into_iter().collect();
+        Self {
+            known: known.into_iter().collect(),
+        }
+    }
+
+    /// CLIP's ids, in increasing order.
+    pub fn known(&self) -> &[u32] {
+        &self.known
+    }
+
+    /// Number of compact ids, the unknown token included.
+    pub fn size(&self) -> usize {
+        self.known.len() + 1
+    }
+
+    /// The compact id of one of CLIP's.
+    pub fn compact(&self, id: u32) -> usize {
+        self.known.binary_search(&id).map_or(0, |at| at + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_ids_have_their_own_number_and_others_share_one() {
+        let vocabulary = Vocabulary::new([49406, 7, 320, 7]);
+        assert_eq!(vocabulary.known(), [7, 320, 49406]);
+        assert_eq!(vocabulary.size(), 4);
+        assert_eq!([7, 320, 49406].map(|id| vocabulary.compact(id)), [1, 2, 3]);
+        assert_eq!([0, 8, 49407].map(|id| vocabulary.compact(id)), [0, 0, 0]);
+    }
+}

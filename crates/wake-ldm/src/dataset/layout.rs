@@ -1,0 +1,180 @@
+//! Where the files of a data set lie, and what it says of itself.
+
+use super::recipe::Recipe;
+use super::scenes::Simulated;
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use wake_physics::grey::GreyScale;
+use wake_physics::output;
+
+/// Version of the layout; a reader refuses others.
+const FORMAT: u32 = 1;
+
+/// What a data set is: the content of its `dataset.json`.
+///
+/// Every other file follows from it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of the layout.
+    pub format: u32,
+    /// Seed of the whole set.
+    pub seed: u64,
+    /// Number of pairs of the whole set.
+    pub count: u64,
+    /// Which share of it this folder holds, if not all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shard: Option<Shard>,
+    /// The mapping from σ⁰ to grey.
+    pub grey: GreyScale,
+    /// Which scenes.
+    pub recipe: Recipe,
+}
+
+/// Share `number` of `of` equal ones, counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shard {
+    /// Number of the share, 0 up to `of`.
+    pub number: u64,
+    /// How many shares there are.
+    pub of: u64,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let whole = |part: &str| part.trim().parse::<u64>().ok();
+        let parts = text.split_once('/').map(|(i, n)| (whole(i), whole(n)));
+        match parts {
+            Some((Some(number), Some(of))) if number < of => Ok(Self { number, of }),
+            _ => Err("a shard is i/n with i from 0 to n − 1, such as 0/4".to_owned()),
+        }
+    }
+}
+
+impl Manifest {
+    /// The whole set of `count` pairs of a recipe and a seed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recipe::validate`].
+    pub fn new(recipe: Recipe, seed: u64, count: u64) -> Result<Self> {
+        recipe.validate()?;
+        Ok(Self {
+            format: FORMAT,
+            seed,
+            count,
+            shard: None,
+            grey: GreyScale::default(),
+            recipe,
+        })
+    }
+
+    /// The pairs that it makes.
+    ///
+    /// # Errors
+    ///
+    /// As [`Simulated::new`].
+    pub fn source(&self) -> Result<Simulated> {
+        Simulated::new(self.recipe.clone(), self.seed)
+    }
+
+    /// The indices of this folder: all, or one of nearly equal runs of neighbours.
+    pub fn indices(&self) -> Range<u64> {
+        let Some(Shard { number, of }) = self.shard else {
+            return 0..self.count;
+        };
+        let end = |share: u64| (u128::from(self.count) * u128::from(share) / u128::from(of)) as u64;
+        end(number)..end(number + 1)
+    }
+
+    /// Reads the manifest of a folder; `None` if it has none.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dataset`] if it is not the manifest of this layout.
+    pub(super) fn read(folder: &Path) -> Result<Option<Self>> {
+        let path = Layout(folder).manifest();
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(cannot("read", &path, e)),
+        };
+        let manifest: Self =
+            serde_json::from_str(&text).map_err(|e| broken(&path, e.line(), e.to_string()))?;
+        if manifest.format != FORMAT {
+            let message = format!("format {} is not {FORMAT}", manifest.format);
+            return Err(broken(&path, 1, message));
+        }
+        Ok(Some(manifest))
+    }
+
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        Ok(output::write_json(&Layout(folder).manifest(), self)?)
+    }
+}
+
+/// Paths of a data set in a folder.
+#[derive(Clone, Copy)]
+pub(super) struct Layout<'a>(pub(super) &'a Path);
+
+impl Layout<'_> {
+    pub(super) fn manifest(self) -> PathBuf {
+        self.0.join("dataset.json")
+    }
+
+    pub(super) fn metadata(self) -> PathBuf {
+        self.0.join("metadata.jsonl")
+    }
+
+    pub(super) fn coco(self) -> PathBuf {
+        self.0.join("coco.json")
+    }
+
+    pub(super) fn yolo(self) -> PathBuf {
+        self.0.join("data.yaml")
+    }
+
+    pub(super) fn images(self) -> PathBuf {
+        self.0.join("images")
+    }
+
+    pub(super) fn labels(self) -> PathBuf {
+        self.0.join("labels")
+    }
+
+    /// The image and the YOLO labels of one pair.
+    pub(super) fn files_of(self, index: u64) -> [PathBuf; 2] {
+        let labels = self.labels().join(format!("{index:06}.txt"));
+        [self.0.join(image_name(index)), labels]
+    }
+
+    pub(super) fn shard(self, shard: Shard) -> PathBuf {
+        self.0.join(format!("shard-{}", shard.number))
+    }
+}
+
+/// `file_name` of a pair.
+pub(super) fn image_name(index: u64) -> String {
+    format!("images/{index:06}.png")
+}
+
+pub(super) fn cannot(action: &'static str, path: &Path, source: std::io::Error) -> Error {
+    Error::Io {
+        action,
+        path: path.to_owned(),
+        source,
+    }
+}
+
+pub(super) fn broken(path: &Path, line: usize, message: impl Into<String>) -> Error {
+    Error::Dataset {
+        path: path.to_owned(),
+        line,
+        message: message.into(),
+    }
+}

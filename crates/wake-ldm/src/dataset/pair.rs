@@ -1,0 +1,102 @@
+//! One image with its words, numbers and labels.
+
+use super::parameters::Parameters;
+use super::scenes::Simulated;
+use crate::error::Result;
+use wake_physics::grey::GreyScale;
+use wake_physics::labels::Labels;
+use wake_physics::{Field, labels_of, simulate};
+
+/// A picture in grey 0…1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grey {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// The pixels `[rows, columns]`, row after row.
+    pub pixels: Vec<f32>,
+}
+
+/// An image with its prompt, the numbers it was made from, and its labels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair {
+    /// Its number in the data set.
+    pub index: u64,
+    /// The image, in the grey of [`GreyScale::default`].
+    pub image: Grey,
+    /// The scene in words.
+    pub prompt: String,
+    /// The scene in numbers.
+    pub parameters: Parameters,
+    /// What is where.
+    pub labels: Labels,
+}
+
+impl Simulated {
+    /// Simulates pair number `index`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`](crate::Error::Scene) if the grid does not fit in memory.
+    pub fn pair(&self, index: u64) -> Result<Pair> {
+        let scene = self.scene(index);
+        let simulation = simulate(&scene)?;
+        let power = if self.recipe().speckle {
+            &simulation.speckled
+        } else {
+            &simulation.intensity
+        };
+        Ok(Pair {
+            image: Grey::of_power(power, &GreyScale::default()),
+            ..self.pair_without_image(index)?
+        })
+    }
+
+    /// Pair number `index` with an image of no pixels: quick, for it is not simulated.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Text`](crate::Error::Text) if the scene is not valid.
+    pub fn pair_without_image(&self, index: u64) -> Result<Pair> {
+        let scene = self.scene(index);
+        Ok(Pair {
+            index,
+            image: Grey {
+                rows: 0,
+                columns: 0,
+                pixels: Vec::new(),
+            },
+            prompt: self.wording(index).prompt(&scene)?,
+            parameters: Parameters::of(&scene),
+            labels: labels_of(&scene),
+        })
+    }
+}
+
+impl Grey {
+    /// The grey of a field of σ⁰ or intensity.
+    pub fn of_power(power: &Field, scale: &GreyScale) -> Self {
+        let grey = |&p: &f32| scale.grey(f64::from(p)) as f32;
+        Self {
+            rows: power.rows,
+            columns: power.columns,
+            pixels: power.values.iter().map(grey).collect(),
+        }
+    }
+
+    /// The pixels as the nearest levels of 8 bits.
+    pub fn levels(&self) -> Vec<u8> {
+        let level = |&grey: &f32| (255.0 * grey).round() as u8;
+        self.pixels.iter().map(level).collect()
+    }
+
+    /// The picture of levels of 8 bits.
+    pub fn of_levels(levels: &[u8], rows: usize, columns: usize) -> Self {
+        Self {
+            rows,
+            columns,
+            pixels: levels.iter().map(|&l| f32::from(l) / 255.0).collect(),
+        }
+    }
+}

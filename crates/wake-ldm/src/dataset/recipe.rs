@@ -1,0 +1,153 @@
+//! What a data set is made of: the paper's grid, or ranges to draw from.
+
+use super::ranges::Ranges;
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use wake_physics::Scene;
+use wake_physics::scene::Grid;
+
+/// Which scenes a data set has, and how they become images and prompts.
+///
+/// As a TOML file, keys that are absent keep their defaults and unknown ones are errors:
+///
+/// ```toml
+/// speckle = true            # false: the image before speckle
+/// paraphrase = false        # true: four wordings in turn, false: the paper's
+/// [scene.grid]              # [scene] is a scene file: what is not drawn
+/// rows = 128
+/// [draw.ranges]
+/// open_sea = 0.2
+/// ship_speed = [6.0, 12.0]
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// Whether the image has speckle.
+    pub speckle: bool,
+    /// Whether prompts take all wordings of [`wake_text::Wording`] at random, or the paper's alone.
+    pub paraphrase: bool,
+    /// How scenes are chosen.
+    pub draw: Draw,
+    /// The values that are not drawn: grid, radar, size of the ship, tolerance.
+    pub scene: Scene,
+}
+
+/// How scenes are chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Draw {
+    /// The 3,456 scenes of the paper's grid in a fixed mixed order, then again with other seas.
+    PaperGrid,
+    /// Independent values from closed ranges.
+    Ranges(Ranges),
+}
+
+impl Default for Recipe {
+    /// The recipe of a small model: [`Ranges::default`], 256 × 256 pixels of 4 m, no speckle, tolerance 1e-2.
+    fn default() -> Self {
+        let mut scene = Scene {
+            grid: Grid {
+                rows: 256,
+                columns: 256,
+                spacing: 4.0,
+            },
+            ..Scene::default()
+        };
+        scene.model.tolerance = 1e-2;
+        Self {
+            speckle: false,
+            paraphrase: false,
+            draw: Draw::Ranges(Ranges::default()),
+            scene,
+        }
+    }
+}
+
+impl Recipe {
+    /// The paper's grid at the defaults of a scene file: 512 × 512 pixels of 2.5 m, with speckle.
+    pub fn paper() -> Self {
+        Self {
+            speckle: true,
+            paraphrase: false,
+            draw: Draw::PaperGrid,
+            scene: Scene::default(),
+        }
+    }
+
+    /// Reads a recipe from the text of a TOML file and checks it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Recipe`] with the key or line at fault, [`Error::Scene`] for a value out of its range.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        Self::default().merged(text)
+    }
+
+    /// Reads a recipe file and checks it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if the file cannot be read, else as [`Recipe::from_toml`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
+            action: "read",
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::from_toml(&text)
+    }
+
+    /// The recipe with assignments such as `scene.radar.looks = 1` made, in order, then checked.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recipe::from_toml`].
+    pub fn with_assignments<S: AsRef<str>>(&self, assignments: &[S]) -> Result<Self> {
+        let mut recipe = self.clone();
+        for assignment in assignments {
+            recipe = recipe.merged(assignment.as_ref())?;
+        }
+        recipe.validate()?;
+        Ok(recipe)
+    }
+
+    fn merged(&self, text: &str) -> Result<Self> {
+        let fail = |message: String| Error::Recipe {
+            message: message.trim().to_owned(),
+        };
+        let changes: toml::Table = toml::from_str(text).map_err(|e| fail(e.to_string()))?;
+        let mut table = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
+        merge(&mut table, changes);
+        let recipe: Self = table
+            .try_into()
+            .map_err(|e: toml::de::Error| fail(e.to_string()))?;
+        recipe.validate()?;
+        Ok(recipe)
+    }
+
+    /// Checks every value against its range.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] or [`Error::Scene`] with name, value and range.
+    pub fn validate(&self) -> Result<()> {
+        self.scene.validate()?;
+        match &self.draw {
+            Draw::PaperGrid => Ok(()),
+            Draw::Ranges(ranges) => ranges.validate(&self.scene),
+        }
+    }
+}
+
+/// Puts the values of `changes` in the place of those of `table`, table by table.
+fn merge(table: &mut toml::Table, changes: toml::Table) {
+    for (key, change) in changes {
+        match (table.get_mut(&key), change) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(change)) => merge(inner, change),
+            (_, change) => {
+                table.insert(key, change);
+            }
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Makes a data set in a folder, or what is missing of it.
+
+use super::coco::Coco;
+use super::layout::{Layout, Manifest, broken, cannot};
+use super::log::{Log, Rows, echo};
+use super::ordered::Ordered;
+use super::row::Row;
+use super::yolo::{data_yaml, yolo};
+use crate::error::Result;
+use std::path::Path;
+use wake_physics::output;
+
+/// How far a data set is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Pairs that are there.
+    pub done: u64,
+    /// Pairs that there will be.
+    pub total: u64,
+    /// Pairs made by this run.
+    pub made: u64,
+}
+
+/// Makes the data set of a manifest in a folder on `jobs` threads, continuing what an earlier run began.
+///
+/// The folder's content is a function of the manifest alone, byte for byte. A run that is killed leaves no
+/// half-written file; the next one continues. `watch` hears of every pair.
+///
+/// # Errors
+///
+/// [`Error::Dataset`](crate::Error::Dataset) if the folder holds something else,
+/// [`Error::Io`](crate::Error::Io) if it cannot be written.
+pub fn write(
+    folder: &Path,
+    manifest: &Manifest,
+    jobs: usize,
+    mut watch: impl FnMut(Progress),
+) -> Result<()> {
+    claim(folder, manifest)?;
+    let mut log = Log::open(folder, manifest)?;
+    let missing = missing(folder, manifest, log.rows.len());
+    let total = manifest.indices().end - manifest.indices().start;
+    let mut progress = Progress {
+        done: total - missing.len() as u64,
+        total,
+        made: 0,
+    };
+    watch(progress);
+    let next = manifest.indices().start + log.rows.len() as u64;
+    for made in make(folder, manifest, jobs, missing)? {
+        let (index, row) = made?;
+        if index >= next {
+            log.push(index, row)?;
+        }
+        progress.done += 1;
+        progress.made += 1;
+        watch(progress);
+    }
+    finish(folder, manifest, &log.finish()?)
+}
+
+/// Takes a folder that is empty, or that an earlier run of the same manifest began.
+pub(super) fn claim(folder: &Path, manifest: &Manifest) -> Result<()> {
+    output::make_folder(folder)?;
+    let layout = Layout(folder);
+    match Manifest::read(folder)? {
+        Some(found) if found == *manifest => {}
+        Some(_) => {
+            let message = "made with another recipe, seed, count or shard; choose another folder";
+            return Err(broken(&layout.manifest(), 1, message));
+        }
+        None if is_empty(folder)? => manifest.write(folder)?,
+        None => {
+            let message = "no data set, but not empty either; choose another folder";
+            return Err(broken(folder, 0, message));
+        }
+    }
+    for inner in [layout.images(), layout.labels()] {
+        output::make_folder(&inner)?;
+    }
+    [folder, &layout.images(), &layout.labels()]
+        .into_iter()
+        .try_for_each(sweep)
+}
+
+fn is_empty(folder: &Path) -> Result<bool> {
+    let mut entries = std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))?;
+    // What `make_dataset` itself may have left: shards, and files half-written.
+    Ok(entries.all(|entry| {
+        entry.is_ok_and(|e| {
+            let name = e.file_name();
+            let name = name.to_string_lossy();
+            name.starts_with("shard-") || is_temporary(&name)
+        })
+    }))
+}
+
+fn is_temporary(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(".tmp")
+}
+
+/// Removes the half-written files of a killed run.
+fn sweep(folder: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))? {
+        let entry = entry.map_err(|e| cannot("read", folder, e))?;
+        if is_temporary(&entry.file_name().to_string_lossy()) {
+            std::fs::remove_file(entry.path()).map_err(|e| cannot("remove", &entry.path(), e))?;
+        }
+    }
+    Ok(())
+}
+
+/// Indices without a line, or without their files.
+fn missing(folder: &Path, manifest: &Manifest, lines: usize) -> Vec<u64> {
+    let start = manifest.indices().start;
+    let [image, labels] = [0, 1]
+        .map(|which| move |index: u64| std::fs::metadata(&Layout(folder).files_of(index)[which]));
+    let is_there =
+        |index: u64| image(index).is_ok_and(|file| file.len() > 0) && labels(index).is_ok();
+    manifest
+        .indices()
+        .filter(|&index| index - start >= lines as u64 || !is_there(index))
+        .collect()
+}
+
+/// Makes pairs and writes their files on `jobs` threads; their rows come in order.
+fn make(
+    folder: &Path,
+    manifest: &Manifest,
+    jobs: usize,
+    indices: Vec<u64>,
+) -> Result<Ordered<(u64, Row)>> {
+    let (source, echo) = (manifest.source()?, echo(manifest));
+    let folder = folder.to_owned();
+    Ordered::new(indices.into_iter(), jobs, move |index| {
+        let pair = source.pair(index)?;
+        let row = Row::of(&pair, echo);
+        let [image, labels] = Layout(&folder).files_of(index);
+        let (rows, columns) = (pair.image.rows, pair.image.columns);
+        output::write_png(&image, &pair.image.levels(), rows, columns)?;
+        let text = yolo(&row.objects, [rows, columns]);
+        output::write_atomically(&labels, text.as_bytes())?;
+        Ok((index, row))
+    })
+}
+
+/// Writes what is known only at the end.
+pub(super) fn finish(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<()> {
+    let (layout, grid) = (Layout(folder), &manifest.recipe.scene.grid);
+    let coco = Coco::of(rows, [grid.rows, grid.columns]);
+    output::write_json(&layout.coco(), &coco)?;
+    output::write_atomically(&layout.yolo(), data_yaml().as_bytes())?;
+    Ok(())
+}

@@ -1,0 +1,62 @@
+//! An image as a radar would deliver it, with what is known about it.
+
+use wake_physics::grey::GreyScale;
+use wake_physics::labels::Labels;
+use wake_physics::sar::speckle::speckle;
+use wake_physics::{Field, Scene, labels_of};
+
+/// Seconds of the stages of one call, for all images of its batch together.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SampleSeconds {
+    /// Words, numbers and maps.
+    pub text: f64,
+    /// Steps from noise to latents.
+    pub denoise: f64,
+    /// Latents to grey.
+    pub decode: f64,
+    /// All of it.
+    pub total: f64,
+}
+
+/// A generated image. Fields are `[rows, columns]`.
+#[derive(Debug, Clone)]
+pub struct WakeImage {
+    /// Grey 0…1 without speckle, as the model draws it.
+    pub grey: Field,
+    /// Intensity without speckle, linear, in the unit of σ⁰.
+    pub intensity: Field,
+    /// Intensity with speckle of the scene's number of looks.
+    pub speckled: Field,
+    /// Where ship and wake are.
+    pub labels: Labels,
+    /// The scene that the prompt describes; what it leaves open has its default value.
+    pub scene: Scene,
+    /// Seconds by stage.
+    pub seconds: SampleSeconds,
+}
+
+impl WakeImage {
+    pub(super) fn new(grey: Field, scene: &Scene, seconds: SampleSeconds) -> Self {
+        let scale = GreyScale::default();
+        let intensity = Field {
+            values: grey.values.iter().map(|&g| scale.sigma0(f64::from(g)) as f32).collect(),
+            ..grey.clone()
+        };
+        let mut speckled = intensity.clone();
+        speckle(&mut speckled, scene.radar.looks, scene.seed);
+        Self {
+            grey,
+            intensity,
+            speckled,
+            labels: labels_of(scene),
+            scene: scene.clone(),
+            seconds,
+        }
+    }
+
+    /// The speckled image as 8-bit levels of grey, row after row.
+    pub fn levels(&self) -> Vec<u8> {
+        let scale = GreyScale::default();
+        self.speckled.values.iter().map(|&v| scale.level(f64::from(v))).collect()
+    }
+}

@@ -1,0 +1,78 @@
+//! What the exponential integrators share: their options, and what they keep of a prediction.
+
+use burn::tensor::Tensor;
+
+use super::NoiseLevel;
+use super::prediction::{Clipping, Prediction};
+use super::sigmas::Spread;
+use crate::error::Result;
+use crate::options::Options;
+
+/// Options of every exponential integrator.
+#[derive(Debug, Clone)]
+pub(super) struct IntegratorOptions {
+    pub(super) prediction: Prediction,
+    pub(super) clipping: Clipping,
+    /// In terms of the clean image, or else of the noise.
+    pub(super) data: bool,
+    pub(super) order: usize,
+    pub(super) lower_order_final: bool,
+}
+
+impl IntegratorOptions {
+    /// Reads the options of a method of orders 1 to `most`.
+    pub(super) fn take(
+        options: &mut Options,
+        spread: Spread,
+        data: bool,
+        most: usize,
+    ) -> Result<Self> {
+        options.only("use_dynamic_shifting", &[false])?;
+        Ok(Self {
+            prediction: take_prediction(options, spread, data)?,
+            clipping: Clipping::take_dynamic(options)?,
+            data,
+            order: take_order(options, most)?,
+            lower_order_final: options.bool("lower_order_final", true)?,
+        })
+    }
+
+    /// The clean image that a prediction stands for, limited, and what the history keeps of it.
+    pub(super) fn convert(
+        &self,
+        level: NoiseLevel,
+        sample: &Tensor<4>,
+        prediction: Tensor<4>,
+    ) -> [Tensor<4>; 2] {
+        let kind = self.prediction;
+        let denoised = kind.denoised(level, sample.clone(), prediction.clone());
+        let denoised = self.clipping.apply(denoised);
+        let kept = if self.data {
+            denoised.clone()
+        } else if self.clipping == Clipping::Off {
+            kind.noise(level, sample.clone(), prediction)
+        } else {
+            Prediction::Sample.noise(level, sample.clone(), denoised.clone())
+        };
+        [denoised, kept]
+    }
+}
+
+fn take_prediction(options: &mut Options, spread: Spread, data: bool) -> Result<Prediction> {
+    match (spread, data) {
+        (Spread::Flow, true) => Prediction::take(options, &[Prediction::Flow]),
+        (Spread::Flow, false) => {
+            let supported = "false in terms of the noise (dpmsolver, predict_x0 false)";
+            Err(options.unsupported("use_flow_sigmas", &true.into(), supported))
+        }
+        _ => Prediction::take(options, &Prediction::CURVED),
+    }
+}
+
+fn take_order(options: &mut Options, most: usize) -> Result<usize> {
+    let order = options.usize("solver_order", 2)?;
+    if (1..=most).contains(&order) {
+        return Ok(order);
+    }
+    Err(options.unsupported("solver_order", &order.into(), &format!("1 to {most}")))
+}

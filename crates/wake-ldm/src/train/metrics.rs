@@ -1,0 +1,124 @@
+//! What a run reports: one JSON object a line, and how long it still takes.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde_json::{Value, json};
+
+use super::trainer::StepReport;
+use crate::error::{Error, Result};
+
+/// The log of a run.
+#[derive(Debug)]
+pub struct Metrics {
+    file: File,
+    path: PathBuf,
+    begin: Instant,
+    first: usize,
+}
+
+impl Metrics {
+    /// Opens a log to go on after `step` steps; lines of later steps, which a killed run wrote after its last
+    /// checkpoint, are dropped.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] when the file cannot be read or written.
+    pub fn open(path: &Path, step: usize) -> Result<Self> {
+        let io = |source| Error::Io {
+            action: "write",
+            path: path.to_owned(),
+            source,
+        };
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(io)?;
+        }
+        let kept = kept_lines(path, step).map_err(io)?;
+        let temporary = path.with_extension("tmp");
+        fs::write(&temporary, kept).map_err(io)?;
+        fs::rename(&temporary, path).map_err(io)?;
+        Ok(Self {
+            file: OpenOptions::new().append(true).open(path).map_err(io)?,
+            path: path.to_owned(),
+            begin: Instant::now(),
+            first: step,
+        })
+    }
+
+    /// Writes the line of a step that ended with `step` steps made, and returns it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] when it cannot be written.
+    pub fn write(&mut self, step: usize, of: usize, report: StepReport, more: &Value) -> Result<Value> {
+        let seconds = self.begin.elapsed().as_secs_f64();
+        let each = seconds / step.saturating_sub(self.first).max(1) as f64;
+        let mut line = json!({
+            "step": step, "loss": report.loss, "gradient_norm": report.norm, "rate": report.rate,
+            "applied": report.applied, "seconds_per_step": each,
+            "seconds_left": each * of.saturating_sub(step) as f64,
+        });
+        if let (Value::Object(line), Value::Object(more)) = (&mut line, more) {
+            line.extend(more.clone());
+        }
+        writeln!(self.file, "{line}").map_err(|source| Error::Io {
+            action: "write",
+            path: self.path.clone(),
+            source,
+        })?;
+        Ok(line)
+    }
+}
+
+/// The lines of the first `step` steps.
+fn kept_lines(path: &Path, step: usize) -> std::io::Result<String> {
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
+        Err(error) => return Err(error),
+    };
+    let mut kept = String::new();
+    for line in BufReader::new(file).lines() {
+        let line = line?;
+        let parsed: Option<Value> = serde_json::from_str(&line).ok();
+        let made = parsed.and_then(|line| line["step"].as_u64());
+        if made.is_some_and(|made| made <= step as u64) {
+            kept.push_str(&line);
+            kept.push('\n');
+        }
+    }
+    Ok(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resumed_log_has_no_line_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log/metrics.jsonl");
+        let report = StepReport {
+            loss: 1.0,
+            norm: 2.0,
+            rate: 1e-3,
+            applied: true,
+        };
+        let mut metrics = Metrics::open(&path, 0).unwrap();
+        for step in 1..=5 {
+            metrics.write(step, 8, report, &json!({"grey": 0.5})).unwrap();
+        }
+        // A killed run leaves half a line.
+        metrics.file.write_all(b"{\"step\": 6, \"lo").unwrap();
+        let mut metrics = Metrics::open(&path, 3).unwrap();
+        metrics.write(4, 8, report, &json!({})).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        let steps: Vec<u64> = text
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap()["step"].as_u64().unwrap())
+            .collect();
+        assert_eq!(steps, [1, 2, 3, 4]);
+    }
+}

@@ -1,0 +1,197 @@
+//! A toy model goes through everything that a real run does.
+
+use std::path::Path;
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+
+use super::*;
+use crate::conditioning::{Conditions, Vocabulary};
+use crate::small::{PatchTransform, WakeModelConfig};
+
+const END: u32 = 49407;
+const SIZE: usize = 32;
+
+fn config() -> WakeModelConfig {
+    WakeModelConfig {
+        image_size: SIZE,
+        latent_channels: 4,
+        widths: vec![16, 32],
+        text_width: 32,
+        text_layers: 1,
+        map_channels: 8,
+        norm_groups: 8,
+        ..WakeModelConfig::standard(&Vocabulary::new([1, 2, END]))
+    }
+}
+
+/// Waves whose direction the conditions tell.
+fn set() -> LatentSet {
+    let device = Device::flex();
+    let wave = |i: usize| -> Vec<f32> {
+        let (sin, cos) = (i as f64).sin_cos();
+        let at = |p: usize| ((p / SIZE) as f64 * sin + (p % SIZE) as f64 * cos) * 0.8;
+        (0..SIZE * SIZE).map(|p| (0.5 + 0.1 * at(p).sin()) as f32).collect()
+    };
+    let images: Vec<Vec<f32>> = (0..12).map(wave).collect();
+    let (transform, _) = PatchTransform::fit(images.iter().map(Vec::as_slice), SIZE, 4, &device);
+    let mut set = LatentSet::default();
+    for (i, image) in images.into_iter().enumerate() {
+        let mut prompt = vec![END; 8];
+        (prompt[0], prompt[1]) = (1, 2);
+        let example = Example {
+            conditions: Conditions {
+                ship: Some(true),
+                ship_speed: Some(8.0),
+                ship_heading: Some((i as f64).to_degrees()),
+                ship_position: Some([0.0, 0.0]),
+                ..Conditions::default()
+            },
+            prompts: vec![prompt],
+            grey: 0.0,
+        };
+        set.push(&transform, image, SIZE, example).unwrap();
+    }
+    set
+}
+
+fn options(accumulation: usize) -> DiffusionOptions {
+    DiffusionOptions {
+        batch: 4,
+        seed: 5,
+        trainer: TrainerOptions {
+            rate: Rate {
+                peak: 3e-3,
+                warmup: 3,
+                steps: 40,
+            },
+            accumulation,
+            ..TrainerOptions::default()
+        },
+        ..DiffusionOptions::default()
+    }
+}
+
+fn run(workers: usize, accumulation: usize) -> Diffusion {
+    let devices = vec![Device::flex().autodiff(); workers];
+    Diffusion::new(config(), options(accumulation), vec![END; 8], devices).unwrap()
+}
+
+/// The weights after a checkpoint, as numbers.
+fn weights(run: &Diffusion, folder: &Path) -> Tensors {
+    run.checkpoint(folder).unwrap();
+    Checkpoint::newest(folder).unwrap().unwrap().tensors
+}
+
+fn advance(run: &mut Diffusion, set: &LatentSet, steps: usize) -> Vec<f64> {
+    (0..steps).map(|_| run.step(set).0.loss).collect()
+}
+
+/// The same start for several runs: random initialisation draws from a generator that other tests share.
+fn start(folder: &Path) -> Checkpoint {
+    run(1, 1).checkpoint(folder).unwrap();
+    Checkpoint::newest(folder).unwrap().unwrap()
+}
+
+#[test]
+fn a_killed_run_gives_the_same_curve_to_the_bit() {
+    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let start = start(&folder.path().join("start"));
+    let mut whole = run(1, 1).resumed(start.clone()).unwrap();
+    let curve = advance(&mut whole, &set, 6);
+    let mut first = run(1, 1).resumed(start).unwrap();
+    let mut pieces = advance(&mut first, &set, 3);
+    first.checkpoint(&folder.path().join("half")).unwrap();
+    drop(first);
+    let half = Checkpoint::newest(&folder.path().join("half")).unwrap().unwrap();
+    let mut second = run(1, 1).resumed(half).unwrap();
+    pieces.extend(advance(&mut second, &set, 3));
+    assert_eq!(curve, pieces);
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    assert_eq!(weights(&whole, &a), weights(&second, &b));
+}
+
+#[test]
+fn two_workers_and_two_parts_make_the_step_of_one() {
+    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let start = start(&folder.path().join("start"));
+    let after = |workers: usize, accumulation: usize| {
+        let mut run = run(workers, accumulation).resumed(start.clone()).unwrap();
+        let losses = advance(&mut run, &set, 2);
+        let name = format!("{workers}-{accumulation}");
+        (losses, weights(&run, &folder.path().join(name)))
+    };
+    let (losses, one) = after(1, 1);
+    for (workers, accumulation) in [(2, 1), (1, 2), (2, 2)] {
+        let (other_losses, other) = after(workers, accumulation);
+        for (a, b) in losses.iter().zip(&other_losses) {
+            // Means of f32 over another order of some thousand terms.
+            assert!((a - b).abs() < 1e-5 * a.abs(), "{a} {b}");
+        }
+        for (name, (_, numbers)) in one.iter().filter(|(name, _)| name.starts_with("first.")) {
+            let largest = numbers.iter().fold(0f32, |m, x| m.max(x.abs()));
+            let differences = numbers.iter().zip(&other[name].1).map(|(a, b)| (a - b).abs());
+            // Gradients are sums over batch and pixels with cancellation: a few thousand roundings.
+            let allowed = 1e-3 * largest + 1e-7;
+            assert!(differences.fold(0f32, f32::max) <= allowed, "{name} {largest}");
+        }
+    }
+}
+
+#[test]
+fn the_loss_falls() {
+    let (set, mut run) = (set(), run(1, 1));
+    let losses = advance(&mut run, &set, 30);
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    assert!(losses.iter().all(|loss| loss.is_finite()));
+    let (early, late) = (mean(&losses[..5]), mean(&losses[25..]));
+    assert!(late < 0.8 * early, "{early} {late}");
+}
+
+#[test]
+fn a_checkpoint_of_another_model_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = start(folder.path());
+    let other = WakeModelConfig {
+        map_channels: 16,
+        ..config()
+    };
+    let device = Device::flex().autodiff();
+    let other = Diffusion::new(other, options(1), vec![END; 8], vec![device]).unwrap();
+    assert!(other.resumed(start.clone()).is_err());
+    let mut broken = start;
+    broken.tensors.pop_last();
+    assert!(run(1, 1).resumed(broken).is_err());
+}
+
+#[test]
+fn long_gradients_are_shortened_to_the_largest_norm() {
+    let device = Device::flex().autodiff();
+    let layer = burn::nn::LinearConfig::new(2, 1).with_bias(false).init(&device);
+    let options = TrainerOptions {
+        rate: Rate {
+            peak: 0.1,
+            warmup: 0,
+            steps: 1,
+        },
+        ..TrainerOptions::default()
+    };
+    let mut trainer = Trainer::new(layer, options, vec![device]);
+    // The gradient of 30 w₀ + 40 w₁ has the norm 50.
+    let report = trainer.step(|layer, device, _| {
+        let slope = Tensor::<2>::from_floats([[30.0], [40.0]], device);
+        (layer.weight.val() * slope).sum()
+    });
+    assert!((report.norm - 50.0).abs() < 1e-4);
+    let first = trainer.state()[2][0].clone().into_data();
+    let expected = [0.1 * 30.0 / 50.0, 0.1 * 40.0 / 50.0];
+    for (found, expected) in first.iter::<f64>().zip(expected) {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+    let before = trainer.model().clone();
+    let broken = trainer.step(|layer, _, _| (layer.weight.val() * f32::NAN).sum());
+    assert!(!broken.applied);
+    let same = (before.weight.val() - trainer.model().weight.val()).abs().sum();
+    assert!(same.into_scalar::<f32>() < f32::MIN_POSITIVE);
+    assert_eq!(trainer.model().num_params(), 2);
+}

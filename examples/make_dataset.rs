@@ -1,0 +1,137 @@
+//! Simulated images with prompts and labels, as a folder that training scripts read.
+//!
+//! ```text
+//! cargo run --release --example make_dataset
+//! cargo run --release --example make_dataset -- --grid paper --out out/paper
+//! cargo run --release --example make_dataset -- --grid ranges.toml --count 100000 --shard 3/16
+//! cargo run --release --example make_dataset -- --merge
+//! ```
+//!
+//! Writes `images/*.png`, `labels/*.txt` (YOLO), `metadata.jsonl`, `coco.json`, `data.yaml` and `dataset.json`; see
+//! docs/dataset.md. A run that was killed continues where it stopped.
+
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+use wake_ldm::Result;
+use wake_ldm::dataset::{Manifest, Progress, Recipe, Shard, merge, shard_folder, write};
+
+/// Number of scenes in the paper's grid.
+const PAPER_COUNT: u64 = 3456;
+
+/// Simulate a labelled data set of ship wakes.
+#[derive(Parser)]
+struct Arguments {
+    /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), or a TOML file of ranges
+    #[arg(long, value_name = "NAME|FILE", default_value = "ranges")]
+    grid: String,
+    /// Change one value of the recipe, such as speckle=true or draw.ranges.open_sea=0; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Number of images of the whole set [default: 100; 3456 for the paper's grid]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    count: Option<u64>,
+    /// Seed of the whole set
+    #[arg(long, default_value_t = 7)]
+    seed: u64,
+    /// Make only share i of n, into the folder shard-i
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Join the shards made before
+    #[arg(long, conflicts_with_all = ["shard", "count", "set"])]
+    merge: bool,
+    /// Images made at the same time [default: one for each core]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Folder of the set, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/make_dataset")]
+    out: PathBuf,
+    /// Print a report as JSON on standard output, and nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let start = Instant::now();
+    let (folder, manifest, made) = if arguments.merge {
+        (arguments.out.clone(), merge(&arguments.out)?, 0)
+    } else {
+        let manifest = manifest(arguments)?;
+        let folder = match manifest.shard {
+            Some(shard) => shard_folder(&arguments.out, shard),
+            None => arguments.out.clone(),
+        };
+        let made = make(&folder, &manifest, arguments)?;
+        (folder, manifest, made)
+    };
+    let seconds = start.elapsed().as_secs_f64();
+    let there = manifest.indices().end - manifest.indices().start;
+    if arguments.json {
+        let report = json!({
+            "folder": folder, "images": there, "made": made, "seconds": seconds,
+            "images_per_second": made as f64 / seconds, "dataset": manifest,
+        });
+        println!("{report:#}");
+    } else {
+        println!(
+            "{there} images in {}, {made} of them made in {seconds:.1} s",
+            folder.display()
+        );
+    }
+    Ok(())
+}
+
+fn manifest(arguments: &Arguments) -> Result<Manifest> {
+    let recipe = match arguments.grid.as_str() {
+        "paper" => Recipe::paper(),
+        "ranges" => Recipe::default(),
+        file => Recipe::read(Path::new(file))?,
+    };
+    let default_count = if arguments.grid == "paper" {
+        PAPER_COUNT
+    } else {
+        100
+    };
+    let count = arguments.count.unwrap_or(default_count);
+    let recipe = recipe.with_assignments(&arguments.set)?;
+    Ok(Manifest {
+        shard: arguments.shard,
+        ..Manifest::new(recipe, arguments.seed, count)?
+    })
+}
+
+/// Makes what is missing under a progress bar; returns how many images that were.
+fn make(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> Result<u64> {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = arguments.jobs.map_or_else(cores, usize::from);
+    let bar = ProgressBar::new(0);
+    let template = "{bar:30} {pos}/{len} images, {per_sec}, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    let mut made = 0;
+    write(folder, manifest, jobs, |progress: Progress| {
+        made = progress.made;
+        if made == 0 {
+            bar.set_length(progress.total);
+            bar.set_position(progress.done);
+            bar.reset_eta();
+        }
+        bar.set_position(progress.done);
+    })?;
+    bar.finish_and_clear();
+    Ok(made)
+}
