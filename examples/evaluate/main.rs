@@ -1,6 +1,7 @@
 //! How good are generated images? Every figure beside the simulator's own, on scenes that no training set holds.
 //!
 //! ```text
+//! cargo run --release --example evaluate
 //! cargo run --release --example evaluate -- --simulator-only
 //! ```
 //!
@@ -9,6 +10,7 @@
 
 mod judge;
 mod measurements;
+mod model;
 mod pixels;
 mod plot;
 mod report;
@@ -22,7 +24,8 @@ mod wake;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use judge::{Judged, Plan, judge};
-use source::{OtherSea, Result};
+use model::Model;
+use source::{OtherSea, Result, Told};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_ldm::metrics::{Lpips, LpipsNetwork};
@@ -35,6 +38,12 @@ struct Arguments {
     /// Judge the simulator itself, with another random sea, in the place of a model: what a perfect model would get
     #[arg(long)]
     simulator_only: bool,
+    /// Folder of a small model that `train` wrote; without it, the model in the crate
+    #[arg(long, value_name = "DIR", conflicts_with = "simulator_only")]
+    weights: Option<PathBuf>,
+    /// Steps from noise to image; without it, the sampler's own number
+    #[arg(long, conflicts_with = "simulator_only")]
+    steps: Option<usize>,
     /// Held-out scenes
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
     count: u32,
@@ -66,16 +75,21 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<()> {
     output::make_folder(&arguments.out)?;
     let lpips = lpips(arguments)?;
-    if !arguments.simulator_only {
-        return Err(
-            "there is no trained model in this version; judge the simulator with --simulator-only"
-                .into(),
-        );
-    }
-    let judged = Judged {
-        source: &OtherSea,
-        name: "simulator with another random sea",
-        conditions: Vec::new(),
+    let model = match arguments.simulator_only {
+        true => None,
+        false => Some(Model::load(arguments.weights.as_deref(), arguments.steps)?),
+    };
+    let judged = match &model {
+        Some(model) => Judged {
+            source: model,
+            name: "model",
+            conditions: vec![Told::Text, Told::Numbers, Told::Paraphrase],
+        },
+        None => Judged {
+            source: &OtherSea,
+            name: "simulator with another random sea",
+            conditions: Vec::new(),
+        },
     };
     let plan = Plan::of(arguments.count as usize);
     let bar = ProgressBar::new(plan.steps(&judged) as u64);

@@ -20,12 +20,12 @@ pub mod small;
 pub mod pipeline;
 pub mod sampler;
 
+pub mod metrics;
+
 #[cfg(feature = "train")]
 pub mod dataset;
 #[cfg(feature = "train")]
 pub mod train;
-
-pub mod metrics;
 #[cfg(feature = "flex")]
 mod self_check;
 
