@@ -10,7 +10,7 @@
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use wake_physics::{Method, Scene, Simulation, output, simulate_with};
+use wake_physics::{Method, Plan, Scene, Simulation, output, simulate_with};
 
 /// Simulate the SAR image of a ship wake from the numbers of a scene.
 #[derive(Parser)]
@@ -59,6 +59,8 @@ fn run(arguments: &Arguments) -> wake_physics::Result<()> {
         None => Scene::default(),
     };
     let scene = scene.with_assignments(&arguments.set)?;
+    // A scene that cannot be simulated leaves no folder behind.
+    Plan::new(&scene)?;
     output::make_folder(&arguments.out)?;
     let method = match arguments.method {
         MethodName::Fast => Method::Fast,

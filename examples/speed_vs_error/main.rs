@@ -16,7 +16,7 @@ use clap::Parser;
 use indicatif::ProgressBar;
 use row::Row;
 use serde_json::json;
-use stages::{STAGES, measure};
+use stages::{Memo, STAGES, measure};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use wake_physics::output;
@@ -66,10 +66,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
             .map(|n| (n, DEFAULT_TOLERANCE)),
     );
     let bar = ProgressBar::new((cases.len() * STAGES.len()) as u64);
-    let mut rows = Vec::new();
+    let (mut rows, mut memo) = (Vec::new(), Memo::default());
     for stage in STAGES {
         for &(size, tolerance) in &cases {
-            rows.push(measure(stage, size, tolerance)?);
+            rows.push(measure(stage, size, tolerance, &mut memo)?);
             bar.inc(1);
         }
     }

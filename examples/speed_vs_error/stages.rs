@@ -4,7 +4,6 @@ use crate::row::{Errors, Row, median_seconds, seconds};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
-use std::sync::{Mutex, PoisonError};
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::KelvinWake;
 use wake_physics::sar::direct::DirectImage;
@@ -17,7 +16,7 @@ use wake_physics::surface::Surface;
 use wake_physics::waves::{PlaneWaves, Quantity, Transfer, harmonic_sum, matrix_product};
 use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
 use wake_physics::{
-    Field, Method, Raster, Scene, Track, nufft, permittivity, simulate, simulate_with,
+    Field, Method, Raster, Scene, Simulation, Track, nufft, permittivity, simulate, simulate_with,
 };
 
 /// Stages in the order of the data flow.
@@ -57,14 +56,15 @@ pub(crate) fn measure(
     stage: &'static str,
     size: usize,
     tolerance: f64,
+    memo: &mut Memo,
 ) -> wake_physics::Result<Row> {
     let raster = Raster::image(size, size, 2.5);
     Ok(match stage {
         "sea" => sea(&raster, tolerance),
         "kelvin" => kelvin(&raster, tolerance),
-        "backscatter" => backscatter(&raster, tolerance),
+        "backscatter" => backscatter(&raster, tolerance, memo),
         "bunching" => bunching(&raster, tolerance),
-        _ => return scene(size, tolerance),
+        _ => return scene(size, tolerance, memo),
     })
 }
 
@@ -156,17 +156,14 @@ fn pixels(raster: &Raster) -> (Vec<[usize; 2]>, f64) {
         let all = (0..raster.len()).map(|n| [n / raster.columns, n % raster.columns]);
         return (all.collect(), 1.0);
     }
+    (sample(raster), raster.len() as f64 / SAMPLE as f64)
+}
+
+/// Random pixels of a raster.
+fn sample(raster: &Raster) -> Vec<[usize; 2]> {
     let mut random = StdRng::seed_from_u64(1);
-    let one = |_| {
-        [
-            random.random_range(0..raster.rows),
-            random.random_range(0..raster.columns),
-        ]
-    };
-    (
-        (0..SAMPLE).map(one).collect(),
-        raster.len() as f64 / SAMPLE as f64,
-    )
+    let mut one = || [raster.rows, raster.columns].map(|n| random.random_range(0..n));
+    (0..SAMPLE).map(|_| one()).collect()
 }
 
 /// Surface and wake together: slopes, and what the imaging needs.
@@ -207,7 +204,7 @@ fn backscatter_model(spacing: f64) -> Backscatter {
 }
 
 /// Table over slopes, built anew each time, against quadrature at each pixel.
-fn backscatter(raster: &Raster, tolerance: f64) -> Row {
+fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
     let slopes = fields(raster, &[Quantity::SlopeX, Quantity::SlopeY]);
     let facets = FacetFields {
         slope_x: &slopes[0],
@@ -222,22 +219,21 @@ fn backscatter(raster: &Raster, tolerance: f64) -> Row {
             BackscatterTable::covering(model.clone(), &slopes[0], &slopes[1], tolerance * mean);
         table.sigma0_field(&facets)
     });
-    // Quadrature is slow: a sample above 128 pixels a side.
-    let (mut pixels, mut scale) = pixels(raster);
-    if raster.rows > WHOLE / 2 && scale <= 1.0 {
-        pixels = pixels.into_iter().step_by(16).collect();
-        scale = 16.0;
-    }
-    let (oracle, exact) = seconds(|| model.sigma0_pixels(&facets, &pixels));
-    let exact: Vec<f64> = exact.into_iter().map(f64::from).collect();
+    // Quadrature takes a millisecond a pixel: a sample on every raster, and the same for every tolerance.
+    let pixels = sample(raster);
+    let scale = raster.len() as f64 / pixels.len() as f64;
+    let oracle = memo.at_size(raster.rows, || {
+        let (seconds, exact) = seconds(|| model.sigma0_pixels(&facets, &pixels));
+        (seconds, exact.into_iter().map(f64::from).collect())
+    });
     let values = pixels.iter().map(|&[i, j]| f64::from(sigma0.at(i, j)));
-    let errors = Errors::of(values, &exact, sigma0.mean());
+    let errors = Errors::of(values, &oracle.1, sigma0.mean());
     row(
         "backscatter",
         raster,
         tolerance,
         fast_seconds,
-        (oracle * scale, scale > 1.0),
+        (oracle.0 * scale, true),
         errors,
     )
 }
@@ -295,22 +291,30 @@ fn bunching(raster: &Raster, tolerance: f64) -> Row {
     )
 }
 
-/// The whole simulation: fast at the size; the oracles of all stages on a small grid, scaled by modes and pixels.
-fn scene(size: usize, tolerance: f64) -> wake_physics::Result<Row> {
-    let scaled = |n: usize| {
-        let mut scene = Scene::default();
-        (scene.grid.rows, scene.grid.columns) = (n, n);
-        scene.model.tolerance = tolerance;
-        scene
-    };
-    let big = scaled(size);
+/// The whole simulation: seconds of the fast methods at the size; the error on a small grid, against the oracles of
+/// all stages at the strictest tolerance, whose seconds are scaled by waves and pixels.
+fn scene(size: usize, tolerance: f64, memo: &mut Memo) -> wake_physics::Result<Row> {
+    let mut big = Scene::default();
+    (big.grid.rows, big.grid.columns) = (size, size);
+    big.model.tolerance = tolerance;
     big.validate()?;
     let (fast_seconds, image) = median_seconds(RUNS, || simulate(&big));
     let computed = image?.plan.sizes;
-    let small = direct(tolerance, &scaled(SMALL))?;
-    let oracle = small.seconds * work(&computed) / small.work;
+    let direct = match &memo.scene {
+        Some(direct) => direct,
+        None => memo
+            .scene
+            .insert(simulate_with(&small(STRICTEST), Method::Direct)?),
+    };
+    let fast = simulate(&small(tolerance))?;
+    let (max, rms) = fast.intensity.difference(&direct.intensity);
+    let mean = direct.intensity.mean();
+    let oracle = direct.seconds.total * work(&computed) / work(&direct.plan.sizes);
+    let errors = Errors {
+        max: max / mean,
+        rms: rms / mean,
+    };
     let raster = Raster::image(size, size, 2.5);
-    let errors = small.errors;
     Ok(row(
         "scene",
         &raster,
@@ -321,39 +325,39 @@ fn scene(size: usize, tolerance: f64) -> wake_physics::Result<Row> {
     ))
 }
 
-/// A small scene by both methods.
-#[derive(Clone, Copy)]
-struct Direct {
-    tolerance: f64,
-    seconds: f64,
-    work: f64,
-    errors: Errors,
+/// A scene that the oracles can do: a few pixels in the wake, 180 m astern.
+fn small(tolerance: f64) -> Scene {
+    let mut scene = Scene::default();
+    (scene.grid.rows, scene.grid.columns) = (SMALL, SMALL);
+    scene.model.tolerance = tolerance;
+    if let Some(ship) = &mut scene.ship {
+        ship.position = [200.0, 200.0];
+    }
+    scene
 }
 
-/// Simulates a small scene directly, once for each tolerance.
-fn direct(tolerance: f64, scene: &Scene) -> wake_physics::Result<Direct> {
-    static KNOWN: Mutex<Vec<Direct>> = Mutex::new(Vec::new());
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(known) = known
-        .iter()
-        .find(|d| d.tolerance.to_bits() == tolerance.to_bits())
-    {
-        return Ok(*known);
+/// What several rows share, because it is slow.
+#[derive(Default)]
+pub(crate) struct Memo {
+    /// Seconds and exact σ⁰ of the sample, by size.
+    backscatter: Vec<(usize, (f64, Vec<f64>))>,
+    /// The small scene by the oracles.
+    scene: Option<Simulation>,
+}
+
+impl Memo {
+    fn at_size(
+        &mut self,
+        size: usize,
+        compute: impl FnOnce() -> (f64, Vec<f64>),
+    ) -> &(f64, Vec<f64>) {
+        let known = self.backscatter.iter().position(|(s, _)| *s == size);
+        let index = known.unwrap_or_else(|| {
+            self.backscatter.push((size, compute()));
+            self.backscatter.len() - 1
+        });
+        &self.backscatter[index].1
     }
-    let slow = simulate_with(scene, Method::Direct)?;
-    let (max, rms) = simulate(scene)?.intensity.difference(&slow.intensity);
-    let mean = slow.intensity.mean();
-    let direct = Direct {
-        tolerance,
-        seconds: slow.seconds.total,
-        work: work(&slow.plan.sizes),
-        errors: Errors {
-            max: max / mean,
-            rms: rms / mean,
-        },
-    };
-    known.push(direct);
-    Ok(direct)
 }
 
 /// Direct cost grows with waves × pixels.
@@ -365,6 +369,8 @@ fn work(sizes: &wake_physics::Sizes) -> f64 {
 
 /// Pixels along a side of the scene that is also simulated directly.
 const SMALL: usize = 10;
+/// Tolerance of the direct simulation: its nodes of the wake stand for all others.
+const STRICTEST: f64 = 1e-6;
 
 fn row(
     stage: &'static str,

@@ -132,9 +132,15 @@ impl<T: Real> Synthesis<T> {
             re.len() == keep_rows * keep_columns && im.len() == re.len(),
             "output of another size"
         );
+        let zero = Complex::new(T::zero(), T::zero());
         spectrum.par_chunks_mut(self.rows).for_each_init(
-            || vec![Complex::new(T::zero(), T::zero()); self.along_y.get_inplace_scratch_len()],
-            |scratch, line| self.along_y.process_with_scratch(line, scratch),
+            || vec![zero; self.along_y.get_inplace_scratch_len()],
+            |scratch, line| {
+                // Waves of a narrow band leave many lines empty.
+                if line.iter().any(|&v| v != zero) {
+                    self.along_y.process_with_scratch(line, scratch);
+                }
+            },
         );
         let spectrum = &*spectrum;
         let block_len = BLOCK * keep_columns.max(1);

@@ -5,13 +5,11 @@
 
 mod clip;
 
+use crate::kelvin::KELVIN_ANGLE;
 use crate::raster::Raster;
 use crate::sar::geometry::direction;
 use clip::{Polygon, Rectangle};
 use serde::{Deserialize, Serialize};
-
-/// Half-angle of the Kelvin wake in deep water, asin(1/3) \[rad\]: 19.47°.
-pub const KELVIN_HALF_ANGLE: f64 = 0.339_836_909_454_121_9;
 
 /// A place in the image, (column, row), with fractions.
 pub type Pixel = [f64; 2];
@@ -198,7 +196,7 @@ impl<'a> Frame<'a> {
     fn wake(&self, track: &Track) -> WakeLabel {
         let apex = self.offset(track.position, 0.5 * track.length, 0.0);
         let stern = self.offset(track.position, -0.5 * track.length, 0.0);
-        let (sin, cos) = KELVIN_HALF_ANGLE.sin_cos();
+        let (sin, cos) = KELVIN_ANGLE.sin_cos();
         let [port, starboard] = [-sin, sin].map(|side| self.offset([0.0; 2], -cos, side));
         let wedge = Polygon::from(&self.image)
             .right_of(apex, starboard)

@@ -22,8 +22,8 @@ fn close(a: Pixel, b: Pixel) -> bool {
 
 #[test]
 fn kelvin_angle_is_its_sine() {
-    assert!((KELVIN_HALF_ANGLE.sin() - 1.0 / 3.0).abs() < 1e-16);
-    assert!((KELVIN_HALF_ANGLE.to_degrees() - 19.4712).abs() < 1e-4);
+    assert!((KELVIN_ANGLE.sin() - 1.0 / 3.0).abs() < 1e-16);
+    assert!((KELVIN_ANGLE.to_degrees() - 19.4712).abs() < 1e-4);
 }
 
 /// Ship in the middle, toward 0°: apex 100 m ahead (row 90); the arms reach the lower edge 1100 m behind it,
@@ -64,7 +64,7 @@ fn eight_headings() {
         assert!(close(from, [100.0 - 10.0 * sin, 100.0 + 10.0 * cos]));
         for (arm, side) in wake.arms_px.iter().zip([1.0, -1.0]) {
             // Port lies clockwise of astern, starboard counter-clockwise.
-            let bearing = (heading + 180.0).to_radians() + side * KELVIN_HALF_ANGLE;
+            let bearing = (heading + 180.0).to_radians() + side * KELVIN_ANGLE;
             let [dx, dy] = [arm[1][0] - arm[0][0], arm[1][1] - arm[0][1]];
             let length = dx.hypot(dy);
             assert!(close(
@@ -121,7 +121,7 @@ fn boxes_hold_every_pixel_of_the_wedge() {
             for column in 0..raster.columns {
                 let [x, y] = [raster.x(column) - apex[0], raster.y(row) - apex[1]];
                 let (astern, aside) = (-(x * sin + y * cos), (x * cos - y * sin).abs());
-                if aside <= astern * KELVIN_HALF_ANGLE.tan() {
+                if aside <= astern * KELVIN_ANGLE.tan() {
                     any = true;
                     for (a, v) in [column as f64, row as f64].into_iter().enumerate() {
                         low[a] = low[a].min(v);

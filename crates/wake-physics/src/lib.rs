@@ -36,6 +36,7 @@
 // In the order of the data flow; docs/architecture.md is the same list.
 mod error;
 pub mod constants;
+mod vectorize;
 mod raster;
 pub mod quadrature;
 mod memory;

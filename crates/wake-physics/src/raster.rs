@@ -1,6 +1,13 @@
 //! Pixels and their places: the raster every stage works on, and the fields that live on it.
 
+use crate::vectorize::vectorized;
 use rayon::prelude::*;
+
+/// Values that one task works on.
+const CHUNK: usize = 1 << 14;
+
+/// Partial sums kept side by side.
+const LANES: usize = 8;
 
 /// A grid of square pixels over the sea.
 ///
@@ -137,37 +144,83 @@ impl Field {
         self.values[row * self.columns + column]
     }
 
+    /// Adds a·b, value by value.
+    ///
+    /// # Panics
+    ///
+    /// If the fields are not of one size.
+    pub(crate) fn add_product(&mut self, a: &Self, b: &Self) {
+        assert!(
+            a.values.len() == self.values.len() && b.values.len() == self.values.len(),
+            "fields of different sizes"
+        );
+        let factors = a.values.par_chunks(CHUNK).zip(b.values.par_chunks(CHUNK));
+        let sums = self.values.par_chunks_mut(CHUNK).zip(factors);
+        sums.for_each(|(sums, (a, b))| {
+            vectorized(
+                #[inline(always)]
+                || {
+                    for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+                        *sum += a * b;
+                    }
+                },
+            );
+        });
+    }
+
     /// The middle of the field: without `rows` above and below and `columns` left and right.
     ///
     /// # Panics
     ///
     /// If the margins are larger than the field.
     #[must_use]
-    pub fn crop(&self, rows: usize, columns: usize) -> Self {
+    pub fn crop(mut self, rows: usize, columns: usize) -> Self {
         let (height, width) = (self.rows - 2 * rows, self.columns - 2 * columns);
-        let mut values = Vec::with_capacity(height * width);
-        for i in rows..rows + height {
-            let start = i * self.columns + columns;
-            values.extend_from_slice(&self.values[start..start + width]);
+        // In place: a row moves toward the start, never over one that is still to move.
+        for i in 0..height {
+            let start = (i + rows) * self.columns + columns;
+            self.values.copy_within(start..start + width, i * width);
         }
+        self.values.truncate(height * width);
         Self {
             rows: height,
             columns: width,
-            values,
+            values: self.values,
         }
     }
 
     /// Mean of the values, summed in double precision.
     #[must_use]
     pub fn mean(&self) -> f64 {
-        self.values.iter().map(|&v| f64::from(v)).sum::<f64>() / self.values.len().max(1) as f64
+        self.sum_of(|v| v) / self.values.len().max(1) as f64
     }
 
     /// Root of the mean square of the values.
     #[must_use]
     pub fn rms(&self) -> f64 {
-        let sum: f64 = self.values.iter().map(|&v| f64::from(v).powi(2)).sum();
-        (sum / self.values.len().max(1) as f64).sqrt()
+        (self.sum_of(|v| v * v) / self.values.len().max(1) as f64).sqrt()
+    }
+
+    /// Sum of a function of the values, in an order that does not depend on the number of threads.
+    fn sum_of(&self, term: impl Fn(f64) -> f64 + Sync) -> f64 {
+        let of_chunk = |chunk: &[f32]| {
+            vectorized(
+                #[inline(always)]
+                || {
+                    let mut sums = [0.0; LANES];
+                    let (groups, rest) = chunk.as_chunks::<LANES>();
+                    for group in groups {
+                        for (sum, &v) in sums.iter_mut().zip(group) {
+                            *sum += term(f64::from(v));
+                        }
+                    }
+                    let rest: f64 = rest.iter().map(|&v| term(f64::from(v))).sum();
+                    sums.iter().sum::<f64>() + rest
+                },
+            )
+        };
+        let parts: Vec<f64> = self.values.par_chunks(CHUNK).map(of_chunk).collect();
+        parts.iter().sum()
     }
 
     /// Largest and root-mean-square absolute difference to another field.

@@ -13,6 +13,8 @@
 use crate::kelvin::fade;
 use crate::raster::{Field, Raster};
 use crate::track::Track;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Damping on the centreline at the stern, D(0) = 0.6, that is −4 dB: chosen.
 pub const STERN_DAMPING: f64 = 0.6;
@@ -87,31 +89,34 @@ impl TurbulentWake {
         let farthest = corners.iter().map(|c| -c[0]).fold(0.0, f64::max);
         // Six standard deviations: exp(−18) ≈ 1.5e-8 lies below the rounding of 1 − damping in f32.
         let reach = 3.0 * width(self.beam, farthest);
-        Field::from_fn(raster, |i, j| {
-            let seen = self.track.seen_from_ship([raster.x(j), raster.y(i)]);
-            if seen[1].abs() > reach || seen[0] >= 0.5 * self.length {
-                return 0.0;
-            }
-            self.damping(seen) as f32
-        })
+        let corner = self.track.seen_from_ship([raster.x(0), raster.y(0)]);
+        // Places seen from the ship change by the same step from pixel to pixel of a row.
+        let step = self.track.seen_from_ship([raster.x(1), raster.y(0)]);
+        let mut field = Field::constant(raster, 0.0);
+        field
+            .values
+            .par_chunks_mut(raster.columns.max(1))
+            .enumerate()
+            .for_each(|(i, row)| {
+                let seen = |j: usize| self.track.seen_from_ship([raster.x(j), raster.y(i)]);
+                let columns = within(seen(0)[1], step[1] - corner[1], reach, row.len());
+                for (j, value) in columns.clone().zip(&mut row[columns]) {
+                    *value = self.damping(seen(j)) as f32;
+                }
+            });
+        field
     }
+}
 
-    /// Distance astern of the stern \[m\] at which the damping on the centreline has fallen to `threshold`;
-    /// 0 where it never reaches it.
-    ///
-    /// - `threshold` \[1\], above 0
-    #[must_use]
-    pub fn extent(&self, threshold: f64) -> f64 {
-        let decades = (STERN_DAMPING / threshold).ln().max(0.0);
-        self.speed * RECOVERY_TIME * decades
+/// The numbers j below `count` with |start + j·step| ≤ reach.
+fn within(start: f64, step: f64, reach: f64, count: usize) -> Range<usize> {
+    if step == 0.0 {
+        return if start.abs() <= reach { 0..count } else { 0..0 };
     }
-
-    /// The centreline as a segment on the sea \[m\], from the stern to the end of its [`Self::extent`].
-    #[must_use]
-    pub fn centreline(&self, threshold: f64) -> [[f64; 2]; 2] {
-        let stern = -0.5 * self.length;
-        [stern, stern - self.extent(threshold)].map(|forward| self.track.on_sea([forward, 0.0]))
-    }
+    let ends = [-reach, reach].map(|end| (end - start) / step);
+    let first = ends[0].min(ends[1]).ceil().max(0.0) as usize;
+    let last = (ends[0].max(ends[1]).floor() + 1.0).max(0.0) as usize;
+    first.min(count)..last.min(count).max(first.min(count))
 }
 
 #[cfg(test)]
@@ -163,7 +168,6 @@ mod tests {
         };
         let raster = Raster::image(20, 30, 10.0);
         assert_eq!(still.damping_field(&raster), Field::constant(&raster, 0.0));
-        assert_eq!(still.extent(0.1), 0.0);
     }
 
     #[test]
@@ -182,11 +186,19 @@ mod tests {
     }
 
     #[test]
-    fn centreline_ends_at_the_threshold() {
-        let wake = wake();
-        let [stern, end] = wake.centreline(0.2).map(|p| wake.track.seen_from_ship(p));
-        assert!((stern[0] + 97.5).abs() < 1e-9 && end[1].abs() < 1e-8);
-        assert!((wake.damping(end) - 0.2).abs() < 1e-9);
-        assert_eq!(wake.extent(0.9), 0.0);
+    fn columns_within_reach_are_those_counted_one_by_one() {
+        for (start, step, reach) in [
+            (-10.0, 0.7, 4.0),
+            (3.0, -0.3, 2.0),
+            (50.0, 1.0, 5.0),
+            (-2.0, -1.0, 1.0),
+            (1.0, 0.0, 2.0),
+            (3.0, 0.0, 2.0),
+        ] {
+            let inside = |&j: &usize| (start + j as f64 * step).abs() <= reach;
+            let counted: Vec<usize> = (0..40).filter(inside).collect();
+            let range: Vec<usize> = within(start, step, reach, 40).collect();
+            assert_eq!(range, counted, "{start} {step} {reach}");
+        }
     }
 }

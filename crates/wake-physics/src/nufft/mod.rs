@@ -27,7 +27,6 @@ use crate::raster::{Field, Raster};
 use crate::waves::{PlaneWaves, Quantity, Transfer, strengths};
 use gridding::Demand;
 use num_complex::{Complex, Complex64};
-use rayon::prelude::*;
 use spread::Footprints;
 use std::f64::consts::TAU;
 
@@ -60,8 +59,31 @@ pub fn synthesize(
     raster: &Raster,
     tolerance: f64,
 ) -> Vec<Field> {
-    let sums = CentredSums::new(waves, transfer, quantities, raster);
     let mut fields = vec![Field::constant(raster, 0.0); quantities.len()];
+    synthesize_each(
+        waves,
+        transfer,
+        quantities,
+        raster,
+        tolerance,
+        |q, field| {
+            std::mem::swap(&mut fields[q], field);
+        },
+    );
+    fields
+}
+
+/// [`synthesize`], one field at a time: `take` gets the number of a quantity and its field, once each and in any
+/// order; what it leaves of the field is overwritten. Fields that are 0 everywhere are not computed.
+pub fn synthesize_each(
+    waves: &PlaneWaves,
+    transfer: &Transfer,
+    quantities: &[Quantity],
+    raster: &Raster,
+    tolerance: f64,
+    mut take: impl FnMut(usize, &mut Field),
+) {
+    let sums = CentredSums::new(waves, transfer, quantities, raster);
     let mut rms: Vec<f64> = sums.sizes.iter().map(|s| s.expected_rms()).collect();
     let mut todo: Vec<usize> = (0..quantities.len()).filter(|&q| rms[q] > 0.0).collect();
     for attempt in 1..=ATTEMPTS {
@@ -70,20 +92,23 @@ pub fn synthesize(
         }
         let demand = Demand::strictest(todo.iter().map(|&q| (sums.sizes[q], rms[q])), tolerance);
         let gridding = Gridding::fastest(&demand, raster, [waves.len(), todo.len()]);
-        if gridding.double_precision {
-            sums.run::<f64>(&gridding, &todo, &mut fields);
-        } else {
-            sums.run::<f32>(&gridding, &todo, &mut fields);
-        }
-        let measured: Vec<f64> = todo.par_iter().map(|&q| fields[q].rms()).collect();
-        for (&q, measured) in todo.iter().zip(measured) {
+        let mut again = Vec::new();
+        let check = |q: usize, field: &mut Field| {
             // A field below its own error says nothing yet; the estimate falls, but never to nothing.
-            rms[q] = measured.max(1e-6 * rms[q]);
+            rms[q] = field.rms().max(1e-6 * rms[q]);
+            if attempt < ATTEMPTS && gridding.error_bound(&sums.sizes[q]) > tolerance * rms[q] {
+                again.push(q);
+            } else {
+                take(q, field);
+            }
+        };
+        if gridding.double_precision {
+            sums.run::<f64>(&gridding, &todo, check);
+        } else {
+            sums.run::<f32>(&gridding, &todo, check);
         }
-        let spare = attempt < ATTEMPTS;
-        todo.retain(|&q| spare && gridding.error_bound(&sums.sizes[q]) > tolerance * rms[q]);
+        todo = again;
     }
-    fields
 }
 
 /// The first choice of kernel and lattice that [`synthesize`] makes.
@@ -155,8 +180,13 @@ impl<'a> CentredSums<'a> {
         }
     }
 
-    /// Computes the fields numbered `todo`, two at a time.
-    fn run<T: Real>(&self, gridding: &Gridding, todo: &[usize], fields: &mut [Field]) {
+    /// Computes the fields numbered `todo`, two at a time, and hands each to `done`.
+    fn run<T: Real>(
+        &self,
+        gridding: &Gridding,
+        todo: &[usize],
+        mut done: impl FnMut(usize, &mut Field),
+    ) {
         let [rows, columns] = gridding.lattice;
         let scaled: Vec<[f64; 2]> = self
             .cycles
@@ -177,15 +207,18 @@ impl<'a> CentredSums<'a> {
         ];
         let keep = [self.raster.rows, self.raster.columns];
         let mut lattice = vec![Complex::new(T::zero(), T::zero()); rows * columns];
-        let mut spare = Vec::new();
+        let mut fields = [(); 2].map(|()| Field::constant(self.raster, 0.0));
         for pair in todo.chunks(2) {
-            let [re, im] = pair_of(fields, pair, &mut spare);
+            let [re, im] = fields.each_mut().map(|field| &mut field.values[..]);
             footprints.spread(&self.paired::<T>(pair), &mut lattice);
             synthesis.run_window(&mut lattice, start, keep, (re, im), |i, row| {
                 for (v, &factor) in row.iter_mut().zip(&right) {
                     *v = *v * (factor * down[i]);
                 }
             });
+            for (&q, field) in pair.iter().zip(&mut fields) {
+                done(q, field);
+            }
         }
     }
 
@@ -206,23 +239,6 @@ impl<'a> CentredSums<'a> {
                 [round(c + i * d), round(c.conj() + i * d.conj())]
             })
             .collect()
-    }
-}
-
-/// The values of one or two fields; a lone field is paired with `spare`.
-fn pair_of<'f>(
-    fields: &'f mut [Field],
-    pair: &[usize],
-    spare: &'f mut Vec<f32>,
-) -> [&'f mut [f32]; 2] {
-    let (before, after) = fields.split_at_mut(pair[0] + 1);
-    let first = &mut before[pair[0]].values;
-    match pair.get(1) {
-        Some(&second) => [first, &mut after[second - pair[0] - 1].values],
-        None => {
-            spare.resize(first.len(), 0.0);
-            [first, spare]
-        }
     }
 }
 

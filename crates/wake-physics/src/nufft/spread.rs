@@ -2,6 +2,7 @@
 
 use super::kernel::{Kernel, WIDEST};
 use crate::fft::Real;
+use crate::vectorize::vectorized;
 use num_complex::Complex;
 use rayon::prelude::*;
 
@@ -78,28 +79,38 @@ impl<T: Real> Footprints<T> {
             .par_chunks_mut(LINES * rows)
             .enumerate()
             .for_each(|(bin, lines)| {
-                lines.fill(Complex::new(T::zero(), T::zero()));
-                let first = bin * LINES;
-                let last = first + lines.len() / rows;
-                // Kernels that begin in the bin or up to width − 1 columns before it, around the end too.
-                let before = first as i64 - self.width as i64 + 1;
-                self.add(
-                    self.range(before.max(0), last as i64),
-                    first,
-                    strengths,
-                    lines,
+                vectorized(
+                    #[inline(always)]
+                    || self.spread_lines(bin, strengths, lines),
                 );
-                if before < 0 {
-                    let wrapped = before + self.lattice[1] as i64;
-                    let from = wrapped.max(last as i64);
-                    self.add(
-                        self.range(from, self.lattice[1] as i64),
-                        first,
-                        strengths,
-                        lines,
-                    );
-                }
             });
+    }
+
+    /// Clears the lines of a task and adds all waves that touch them.
+    #[inline(always)]
+    fn spread_lines(&self, bin: usize, strengths: &[[Complex<T>; 2]], lines: &mut [Complex<T>]) {
+        let rows = self.lattice[0];
+        lines.fill(Complex::new(T::zero(), T::zero()));
+        let first = bin * LINES;
+        let last = first + lines.len() / rows;
+        // Kernels that begin in the bin or up to width − 1 columns before it, around the end too.
+        let before = first as i64 - self.width as i64 + 1;
+        self.add(
+            self.range(before.max(0), last as i64),
+            first,
+            strengths,
+            lines,
+        );
+        if before < 0 {
+            let wrapped = before + self.lattice[1] as i64;
+            let from = wrapped.max(last as i64);
+            self.add(
+                self.range(from, self.lattice[1] as i64),
+                first,
+                strengths,
+                lines,
+            );
+        }
     }
 
     /// Places whose first column lies in [from, to).
@@ -109,6 +120,7 @@ impl<T: Real> Footprints<T> {
         start..end.max(start)
     }
 
+    #[inline(always)]
     fn add(
         &self,
         places: std::ops::Range<usize>,
@@ -136,6 +148,7 @@ impl<T: Real> Footprints<T> {
 }
 
 /// Adds `strength` times the weights to a line from `start` on, around its end.
+#[inline(always)]
 fn add_wrapped<T: Real>(
     line: &mut [Complex<T>],
     start: usize,

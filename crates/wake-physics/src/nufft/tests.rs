@@ -147,9 +147,14 @@ fn rounding_is_bounded() {
                     ..single
                 };
                 let todo: Vec<usize> = (0..ALL.len()).collect();
-                let mut fields = vec![vec![Field::constant(&raster, 0.0); ALL.len()]; 2];
-                sums.run::<f32>(&single, &todo, &mut fields[0]);
-                sums.run::<f64>(&double, &todo, &mut fields[1]);
+                let mut fields = [(); 2].map(|()| vec![Field::constant(&raster, 0.0); ALL.len()]);
+                let [by_single, by_double] = &mut fields;
+                sums.run::<f32>(&single, &todo, |q, field| {
+                    std::mem::swap(&mut by_single[q], field)
+                });
+                sums.run::<f64>(&double, &todo, |q, field| {
+                    std::mem::swap(&mut by_double[q], field)
+                });
                 for &q in &todo {
                     let (max, _) = fields[0][q].difference(&fields[1][q]);
                     let bound = single.rounding() * sums.sizes[q].root;

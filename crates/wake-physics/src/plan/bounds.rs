@@ -15,12 +15,36 @@ const SAFETY: f64 = 3.0;
 /// What the rounding of `f32` fields may change, whatever is left out: a few times 6e-8 of each of several fields.
 const ROUNDING: f64 = 1e-6;
 
+/// A wave with what it does to the image.
+struct Weighed<'a> {
+    wave: &'a WaveSample,
+    modulation: Modulation,
+    /// Smear without the defocus of accelerated pixels: some pixels are not accelerated.
+    sharpest: f64,
+}
+
+impl AsRef<WaveSample> for Weighed<'_> {
+    fn as_ref(&self) -> &WaveSample {
+        self.wave
+    }
+}
+
+/// The waves of a situation, weighed once for all terms.
+struct Bounds<'a> {
+    situation: &'a Situation,
+    sea: Vec<Weighed<'a>>,
+    wake: Vec<Weighed<'a>>,
+    /// Standard deviation over mean of the image.
+    contrast: f64,
+}
+
 impl Situation {
     /// One effect a term, in the order of the data flow.
     pub(crate) fn effects(&self) -> Vec<Effect> {
+        let bounds = Bounds::new(self);
         let effect = |&term: &Term| Effect {
             term,
-            bound: self.bound(term),
+            bound: bounds.of(term),
             absent: self
                 .absent
                 .iter()
@@ -30,102 +54,121 @@ impl Situation {
         Term::ALL.iter().map(effect).collect()
     }
 
-    fn bound(&self, term: Term) -> f64 {
-        let both = |of: &dyn Fn(&[WaveSample]) -> f64| of(&self.sea).hypot(of(&self.wake));
-        let effect = match term {
-            Term::Sea => self.waves(&self.sea),
-            Term::Kelvin => self.waves(&self.wake),
-            Term::Turbulent => self.damping * self.image.bragg_share,
-            Term::TiltAverage => self.backscatter[0],
-            Term::Specular => self.backscatter[1],
-            Term::RangeBunching => {
-                self.part(|m| m.range_bunching) + both(&|w| self.range_shift(w)) * self.contrast()
-            }
-            Term::Hydrodynamic => self.part(|m| m.hydrodynamic),
-            Term::Bunching => {
-                self.part(|m| m.bunching) + both(&|w| self.azimuth_shift(w)) * self.contrast()
-            }
-            Term::Coherence => self.coherence(),
-            // Speckle multiplies: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
-            Term::Speckle => return 2.0 / self.looks.sqrt(),
-        };
-        SAFETY * effect + ROUNDING
-    }
-
-    /// Modulation by waves as imaged, with the second order of the tilt and the shifts of all else.
-    fn waves(&self, waves: &[WaveSample]) -> f64 {
-        let linear = rms(waves, |w| self.modulation(w).total() * self.sharpest(w));
-        let variance =
-            |axis: usize| -> f64 { waves.iter().map(|w| w.variance * w.k[axis].powi(2)).sum() };
-        let tilt = self.curvature[0] * variance(0) + self.curvature[1] * variance(1);
-        let shift = self.azimuth_shift(waves).hypot(self.range_shift(waves));
-        (linear + tilt) * self.contrast().hypot(1.0) + shift * self.contrast()
-    }
-
-    /// One effect of all waves, as imaged.
-    fn part(&self, of: impl Fn(&Modulation) -> Complex64) -> f64 {
-        self.imaged(&self.sea, &of)
-            .hypot(self.imaged(&self.wake, &of))
-    }
-
-    /// A modulation by waves, in the image: smeared in azimuth where it stands alone; where the image has contrast
-    /// of its own, their product is there too, at other wavenumbers and so not smeared alike.
-    fn imaged(&self, waves: &[WaveSample], of: impl Fn(&Modulation) -> Complex64) -> f64 {
-        let alone = rms(waves, |w| of(&self.modulation(w)) * self.sharpest(w));
-        alone + self.contrast() * rms(waves, |w| of(&self.modulation(w)))
-    }
-
-    /// The change of the smear of everything that is imaged.
-    fn coherence(&self) -> f64 {
-        let accelerations = |w: &WaveSample| {
-            self.image
-                .transfer
-                .factor(Quantity::RadialAcceleration, w.k, w.omega)
-        };
-        let acceleration = rms(&self.sea, accelerations).hypot(rms(&self.wake, accelerations));
-        let moving = self.resolution.at(acceleration);
-        let change = |w: &WaveSample| {
-            let lost = smear(w.k[1], self.resolution.nominal) - smear(w.k[1], moving);
-            self.modulation(w).total() * lost
-        };
-        let modulation = rms(&self.sea, change).hypot(rms(&self.wake, change));
-        // A spot of width w spread to w' loses about (1 − w²/w'²)/2 of its height.
-        let widths = [self.resolution.nominal, moving].map(|rho| self.width(rho));
-        let spots = 0.5 * (1.0 - (widths[0] / widths[1]).powi(2));
-        modulation * self.contrast().hypot(1.0) + spots * self.backscatter[1]
-    }
-
-    /// Standard deviation over mean of the image: the modulation by all waves, and the glints.
-    fn contrast(&self) -> f64 {
-        let linear =
-            |waves: &[WaveSample]| rms(waves, |w| self.modulation(w).total() * self.sharpest(w));
-        linear(&self.sea)
-            .hypot(linear(&self.wake))
-            .hypot(self.backscatter[1])
-    }
-
-    /// Displacements in azimuth over the width of what is displaced.
-    fn azimuth_shift(&self, waves: &[WaveSample]) -> f64 {
-        let velocity = rms(waves, |w| self.image.transfer.radial(w.k, w.omega));
-        self.image.range_to_velocity * velocity / self.width(self.resolution.at(0.0))
-    }
-
-    /// Displacements in range over the width of what is displaced.
-    fn range_shift(&self, waves: &[WaveSample]) -> f64 {
-        rms(waves, |_| Complex64::ONE) / (self.image.transfer.incidence.tan() * self.spacing)
-    }
-
     /// Width of a point of azimuth resolution ρ on the pixels \[m\].
     fn width(&self, resolution: f64) -> f64 {
         self.spacing.hypot(resolution / (SQRT_2 * PI))
     }
+}
 
-    fn modulation(&self, wave: &WaveSample) -> Modulation {
-        self.image.modulation(wave.k, wave.omega)
+impl<'a> Bounds<'a> {
+    fn new(situation: &'a Situation) -> Self {
+        let at_rest = situation.resolution.at(0.0);
+        let weighed = |waves: &'a [WaveSample]| -> Vec<Weighed<'a>> {
+            let one = |wave: &'a WaveSample| Weighed {
+                wave,
+                modulation: situation.image.modulation(wave.k, wave.omega),
+                sharpest: smear(wave.k[1], at_rest),
+            };
+            waves.iter().map(one).collect()
+        };
+        let (sea, wake) = (weighed(&situation.sea), weighed(&situation.wake));
+        let contrast = linear(&sea)
+            .hypot(linear(&wake))
+            .hypot(situation.backscatter[1]);
+        Self {
+            situation,
+            sea,
+            wake,
+            contrast,
+        }
     }
 
-    /// The smear without the defocus of accelerated pixels: some pixels are not accelerated.
-    fn sharpest(&self, wave: &WaveSample) -> f64 {
-        smear(wave.k[1], self.resolution.at(0.0))
+    fn of(&self, term: Term) -> f64 {
+        let effect = match term {
+            Term::Sea => self.waves(&self.sea),
+            Term::Kelvin => self.waves(&self.wake),
+            Term::Turbulent => self.situation.damping * self.situation.image.bragg_share,
+            Term::TiltAverage => self.situation.backscatter[0],
+            Term::Specular => self.situation.backscatter[1],
+            Term::RangeBunching => {
+                self.part(|m| m.range_bunching) + self.both(|w| self.range_shift(w)) * self.contrast
+            }
+            Term::Hydrodynamic => self.part(|m| m.hydrodynamic),
+            Term::Bunching => {
+                self.part(|m| m.bunching) + self.both(|w| self.azimuth_shift(w)) * self.contrast
+            }
+            Term::Coherence => self.coherence(),
+            // Speckle multiplies: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
+            Term::Speckle => return 2.0 / self.situation.looks.sqrt(),
+        };
+        SAFETY * effect + ROUNDING
     }
+
+    fn both(&self, of: impl Fn(&[Weighed<'_>]) -> f64) -> f64 {
+        of(&self.sea).hypot(of(&self.wake))
+    }
+
+    /// Modulation by waves as imaged, with the second order of the tilt and the shifts of all else.
+    fn waves(&self, waves: &[Weighed<'_>]) -> f64 {
+        let variance = |axis: usize| -> f64 {
+            let square = |w: &Weighed<'_>| w.wave.variance * w.wave.k[axis].powi(2);
+            waves.iter().map(square).sum()
+        };
+        let curvature = self.situation.curvature;
+        let tilt = curvature[0] * variance(0) + curvature[1] * variance(1);
+        let shift = self.azimuth_shift(waves).hypot(self.range_shift(waves));
+        (linear(waves) + tilt) * self.contrast.hypot(1.0) + shift * self.contrast
+    }
+
+    /// One effect of all waves, in the image: smeared in azimuth where it stands alone; where the image has
+    /// contrast of its own, their product is there too, at other wavenumbers and so not smeared alike.
+    fn part(&self, of: impl Fn(&Modulation) -> Complex64) -> f64 {
+        let imaged = |waves: &[Weighed<'_>]| {
+            let alone = rms(waves, |w| of(&w.modulation) * w.sharpest);
+            alone + self.contrast * rms(waves, |w| of(&w.modulation))
+        };
+        self.both(imaged)
+    }
+
+    /// The change of the smear of everything that is imaged.
+    fn coherence(&self) -> f64 {
+        let situation = self.situation;
+        let transfer = &situation.image.transfer;
+        let accelerations = |waves: &[Weighed<'_>]| {
+            rms(waves, |w| {
+                transfer.factor(Quantity::RadialAcceleration, w.wave.k, w.wave.omega)
+            })
+        };
+        let nominal = situation.resolution.nominal;
+        let moving = situation.resolution.at(self.both(accelerations));
+        let change = |waves: &[Weighed<'_>]| {
+            rms(waves, |w| {
+                let lost = smear(w.wave.k[1], nominal) - smear(w.wave.k[1], moving);
+                w.modulation.total() * lost
+            })
+        };
+        // A spot of width w spread to w' loses about (1 − w²/w'²)/2 of its height.
+        let widths = [nominal, moving].map(|rho| situation.width(rho));
+        let spots = 0.5 * (1.0 - (widths[0] / widths[1]).powi(2));
+        self.both(change) * self.contrast.hypot(1.0) + spots * situation.backscatter[1]
+    }
+
+    /// Displacements in azimuth over the width of what is displaced.
+    fn azimuth_shift(&self, waves: &[Weighed<'_>]) -> f64 {
+        let image = &self.situation.image;
+        let velocity = rms(waves, |w| image.transfer.radial(w.wave.k, w.wave.omega));
+        let width = self.situation.width(self.situation.resolution.at(0.0));
+        image.range_to_velocity * velocity / width
+    }
+
+    /// Displacements in range over the width of what is displaced.
+    fn range_shift(&self, waves: &[Weighed<'_>]) -> f64 {
+        let incidence = self.situation.image.transfer.incidence;
+        rms(waves, |_| Complex64::ONE) / (incidence.tan() * self.situation.spacing)
+    }
+}
+
+/// Modulation by all effects, as imaged.
+fn linear(waves: &[Weighed<'_>]) -> f64 {
+    rms(waves, |w| w.modulation.total() * w.sharpest)
 }

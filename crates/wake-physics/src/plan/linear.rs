@@ -17,6 +17,12 @@ pub(crate) struct WaveSample {
     pub(crate) variance: f64,
 }
 
+impl AsRef<Self> for WaveSample {
+    fn as_ref(&self) -> &Self {
+        self
+    }
+}
+
 /// What the intensity of one pixel depends on, linearised about the calm surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LinearImage {
@@ -79,10 +85,10 @@ pub(crate) fn smear(ky: f64, resolution: f64) -> f64 {
 }
 
 /// Root of the mean square of a linear quantity over independent waves.
-pub(crate) fn rms(waves: &[WaveSample], factor: impl Fn(&WaveSample) -> Complex64) -> f64 {
+pub(crate) fn rms<W: AsRef<WaveSample>>(waves: &[W], factor: impl Fn(&W) -> Complex64) -> f64 {
     waves
         .iter()
-        .map(|w| w.variance * factor(w).norm_sqr())
+        .map(|w| w.as_ref().variance * factor(w).norm_sqr())
         .sum::<f64>()
         .sqrt()
 }

@@ -21,6 +21,7 @@ use crate::raster::{Field, Raster};
 use crate::sar::AzimuthResolution;
 use crate::sar::response::{Response, largest, reach};
 use crate::sar::spread::{LANES, Steps, gaussian};
+use crate::vectorize::vectorized;
 use rayon::prelude::*;
 use std::f64::consts::{LOG2_E, PI, SQRT_2};
 use std::ops::Range;
@@ -97,7 +98,13 @@ impl Imaging {
         let width = sum.block_width();
         let blocks: Vec<Vec<f32>> = (0..image.columns.div_ceil(width))
             .into_par_iter()
-            .map(|b| sum.block(b * width..((b + 1) * width).min(image.columns)))
+            .map(|b| {
+                let columns = b * width..((b + 1) * width).min(image.columns);
+                vectorized(
+                    #[inline(always)]
+                    || sum.block(columns),
+                )
+            })
             .collect();
         sum.filled(&blocks, width)
     }
@@ -159,6 +166,7 @@ impl<'a> Sum<'a> {
     }
 
     /// The steps of these columns, `[steps, columns]`.
+    #[inline(always)]
     fn block(&self, columns: Range<usize>) -> Vec<f32> {
         let reaching = self.reaching(&columns);
         let mut lines = Lines {
@@ -167,49 +175,58 @@ impl<'a> Sum<'a> {
             columns: columns.len() as i32,
         };
         let first = reaching.start as i64 + self.response.offset[1] - columns.start as i64;
-        let mut taps = Taps::default();
+        let (mut taps, mut places) = (Taps::default(), Places::default());
         for i in 0..self.sources.raster.rows {
             let row = SourceRow::new(self.sources, i, &reaching);
-            self.add_row(i, &row, first as i32, &mut taps, &mut lines);
+            self.place_row(i, &row, &mut places);
+            self.add_row(&row, &places, first as i32, &mut taps, &mut lines);
         }
         lines.transposed()
     }
 
+    /// Where the sources of row `i` are imaged.
+    #[inline(always)]
+    fn place_row(&self, i: usize, row: &SourceRow<'_>, places: &mut Places) {
+        let step = self.steps.step as f64;
+        let place = (i as i64 + self.response.offset[0]) as f64 / step + self.pad as f64;
+        let (start, fraction) = (place.floor() as i32, place.fract() as f32);
+        let per_velocity = -(self.response.rows_per_velocity / step) as f32;
+        let per_elevation = -self.response.columns_per_elevation as f32;
+        places.resize(row.sigma0.len());
+        let Places {
+            steps,
+            fractions,
+            columns,
+            shares,
+        } = places;
+        split(steps, fractions, fraction, (per_velocity, row.velocity));
+        steps.iter_mut().for_each(|step| *step += start);
+        split(columns, shares, 0.0, (per_elevation, row.elevation));
+    }
+
     /// Adds the sources of one row; `first` is the column of the first in the block.
+    #[inline(always)]
     fn add_row(
         &self,
-        i: usize,
         row: &SourceRow<'_>,
+        places: &Places,
         first: i32,
         taps: &mut Taps,
         lines: &mut Lines,
     ) {
-        let step = self.steps.step as f64;
-        let place = (i as i64 + self.response.offset[0]) as f64 / step + self.pad as f64;
-        let (start, fraction) = (place.floor() as i64, place.fract() as f32);
-        let per_velocity = (self.response.rows_per_velocity / step) as f32;
-        let per_elevation = self.response.columns_per_elevation as f32;
         for (j, &sigma0) in row.sigma0.iter().enumerate() {
-            let at = fraction - per_velocity * value(row.velocity, j);
-            let whole = floor(at);
-            taps.set(self, at - whole as f32, value(row.acceleration, j));
-            let from = start + i64::from(whole) - taps.before as i64;
+            taps.set(self, places.fractions[j], value(row.acceleration, j));
+            let from = i64::from(places.steps[j]) - taps.before as i64;
             let Ok(from) = usize::try_from(from) else {
                 continue;
             };
-            let column = -per_elevation * value(row.elevation, j);
-            let left = floor(column);
-            let share = column - left as f32;
+            let share = places.shares[j];
             let power = sigma0 * taps.scale;
-            let target = first + j as i32 + left;
-            lines.add(
-                target,
-                from,
-                &taps.values[..taps.count],
-                power * (1.0 - share),
-            );
+            let target = first + j as i32 + places.columns[j];
+            let values = &taps.values[..taps.count];
+            lines.add(target, from, values, power * (1.0 - share));
             if share > 0.0 {
-                lines.add(target + 1, from, &taps.values[..taps.count], power * share);
+                lines.add(target + 1, from, values, power * share);
             }
         }
     }
@@ -223,19 +240,27 @@ impl<'a> Sum<'a> {
             .par_chunks_mut(columns)
             .enumerate()
             .for_each(|(m, row)| {
-                let weights = &self.filling[m % self.steps.step];
-                let first = (m / self.steps.step + self.pad) as i64 + self.filling_first;
-                for (out, block) in row.chunks_mut(width).zip(blocks) {
-                    let start = first as usize * out.len();
-                    let steps = block[start..].chunks_exact(out.len());
-                    for (&weight, step) in weights.iter().zip(steps).filter(|(w, _)| **w > 0.0) {
-                        for (out, &value) in out.iter_mut().zip(step) {
-                            *out += weight * value;
-                        }
-                    }
-                }
+                vectorized(
+                    #[inline(always)]
+                    || self.fill_row(m, row, blocks, width),
+                );
             });
         image
+    }
+
+    #[inline(always)]
+    fn fill_row(&self, m: usize, row: &mut [f32], blocks: &[Vec<f32>], width: usize) {
+        let weights = &self.filling[m % self.steps.step];
+        let first = (m / self.steps.step + self.pad) as i64 + self.filling_first;
+        for (out, block) in row.chunks_mut(width).zip(blocks) {
+            let start = first as usize * out.len();
+            let steps = block[start..].chunks_exact(out.len());
+            for (&weight, step) in weights.iter().zip(steps).filter(|(w, _)| **w > 0.0) {
+                for (out, &value) in out.iter_mut().zip(step) {
+                    *out += weight * value;
+                }
+            }
+        }
     }
 }
 
@@ -261,14 +286,53 @@ impl<'a> SourceRow<'a> {
     }
 }
 
+#[inline(always)]
 fn value(row: Option<&[f32]>, column: usize) -> f32 {
     row.map_or(0.0, |row| row[column])
 }
 
 /// Largest integer not above x: [`f32::floor`] is a call without SSE 4.1.
+#[inline(always)]
 fn floor(x: f32) -> i32 {
     let cut = x as i32;
     cut - i32::from(x < cut as f32)
+}
+
+/// Where the sources of a row are imaged.
+#[derive(Default)]
+struct Places {
+    /// Step at or before each source, and how far beyond it the source is, 0 to 1.
+    steps: Vec<i32>,
+    fractions: Vec<f32>,
+    /// Columns that each source leans by, rounded down, and the share of the next column.
+    columns: Vec<i32>,
+    shares: Vec<f32>,
+}
+
+impl Places {
+    fn resize(&mut self, sources: usize) {
+        self.steps.resize(sources, 0);
+        self.fractions.resize(sources, 0.0);
+        self.columns.resize(sources, 0);
+        self.shares.resize(sources, 0.0);
+    }
+}
+
+/// Takes positions `start + factor·value` apart: largest integers not above them, and the rest.
+#[inline(always)]
+fn split(whole: &mut [i32], rest: &mut [f32], start: f32, (factor, values): (f32, Option<&[f32]>)) {
+    let apart = |at: f32| (floor(at), at - floor(at) as f32);
+    match values {
+        None => {
+            whole.fill(apart(start).0);
+            rest.fill(apart(start).1);
+        }
+        Some(values) => {
+            for ((whole, rest), &value) in whole.iter_mut().zip(rest).zip(values) {
+                (*whole, *rest) = apart(start + factor * value);
+            }
+        }
+    }
 }
 
 /// The taps of the last source, kept as long as the next has the same place between steps and the same width.
@@ -284,7 +348,7 @@ struct Taps {
 }
 
 impl Taps {
-    #[inline]
+    #[inline(always)]
     fn set(&mut self, sum: &Sum<'_>, fraction: f32, acceleration: f32) {
         if self.key == Some((fraction, acceleration)) {
             return;
@@ -317,7 +381,7 @@ struct Lines {
 
 impl Lines {
     /// Adds `power × taps` from step `from` of a column on; what lies outside is lost.
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, column: i32, from: usize, taps: &[f32], power: f32) {
         if column < 0 || column >= self.columns || from + taps.len() > self.count {
             return;
@@ -326,13 +390,17 @@ impl Lines {
         let line = &mut self.values[start..start + taps.len()];
         let groups = line.as_chunks_mut::<LANES>().0;
         for (line, taps) in groups.iter_mut().zip(taps.as_chunks::<LANES>().0) {
-            for (line, tap) in line.iter_mut().zip(taps) {
-                *line += power * tap;
+            // Through copies: loads and stores of a group become one instruction each.
+            let (mut sum, taps) = (*line, *taps);
+            for (sum, tap) in sum.iter_mut().zip(taps) {
+                *sum += power * tap;
             }
+            *line = sum;
         }
     }
 
     /// `[count, columns]`.
+    #[inline(always)]
     fn transposed(&self) -> Vec<f32> {
         let columns = self.columns as usize;
         let mut values = vec![0.0; self.values.len()];

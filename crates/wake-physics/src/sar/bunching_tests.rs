@@ -243,7 +243,7 @@ fn the_margin_is_enough_and_nothing_wraps() {
     let tolerance = 1e-4;
     let [rows, columns] = DEFAULT.margin(2.5, &extremes, tolerance);
     assert!(rows < 150 && columns < 40);
-    let cut = |f: &Field| f.crop(150 - rows, 40 - columns);
+    let cut = |f: &Field| f.clone().crop(150 - rows, 40 - columns);
     let small = Scene {
         raster: image.with_margin(rows, columns),
         sigma0: cut(&scene.sigma0),

@@ -4,7 +4,7 @@ use crate::sar::response::reach;
 use std::f64::consts::PI;
 
 /// Taps are computed in groups of this many.
-pub(super) const LANES: usize = 4;
+pub(super) const LANES: usize = 8;
 
 /// How every Gaussian response is made of two: taps on every `step`-th row, then one fixed Gaussian that fills
 /// the rows between.
@@ -41,6 +41,7 @@ impl Steps {
 
     /// Taps for a response of variance `variance` [rows²] around any place, a multiple of [`LANES`]: what is
     /// left out lies beyond `reach` standard deviations (half a tap further, so that a sum is at most the integral).
+    #[inline(always)]
     pub(super) fn taps(&self, variance: f32) -> usize {
         let half = self.reach as f32 * (variance - self.filling as f32).sqrt() / self.step as f32;
         // The conversion cuts a fraction off: one tap more makes up for it.
@@ -70,15 +71,17 @@ impl Steps {
 }
 
 /// Fills `taps` with exp(−(k − centre)²·scale·ln 2), k = 0, 1, …, and returns their sum.
-#[inline]
+#[inline(always)]
 pub(super) fn gaussian(taps: &mut [f32], centre: f32, scale: f32) -> f32 {
     let mut sums = [0f32; LANES];
     let mut first = -centre;
     for group in taps.as_chunks_mut::<LANES>().0 {
-        for (l, (tap, sum)) in group.iter_mut().zip(&mut sums).enumerate() {
-            let d = first + l as f32;
-            *tap = exp2(-d * d * scale);
-            *sum += *tap;
+        *group = std::array::from_fn(|lane| {
+            let d = first + lane as f32;
+            exp2(-d * d * scale)
+        });
+        for (sum, tap) in sums.iter_mut().zip(*group) {
+            *sum += tap;
         }
         first += LANES as f32;
     }
@@ -86,7 +89,7 @@ pub(super) fn gaussian(taps: &mut [f32], centre: f32, scale: f32) -> f32 {
 }
 
 /// 2ˣ for x ≤ 0, relative error below 3e-7; 2⁻¹²⁶ for all below −126. Plain arithmetic, so that it vectorises.
-#[inline]
+#[inline(always)]
 fn exp2(x: f32) -> f32 {
     // Adding 1.5·2²³ leaves the nearest integer in the low bits.
     const ROUND: f32 = 12_582_912.0;

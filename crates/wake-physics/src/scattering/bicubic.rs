@@ -26,7 +26,7 @@ impl Bicubic {
     }
 
     /// The value at a point; `None` less than one cell from the edge of the lattice, and outside it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn at(&self, [u, v]: [f64; 2]) -> Option<f64> {
         let (i, s) = cell((u - self.start[0]) * self.inverse_step, self.nodes[0])?;
         let (j, t) = cell((v - self.start[1]) * self.inverse_step, self.nodes[1])?;
@@ -34,10 +34,8 @@ impl Bicubic {
         // Four columns at once, then across them.
         let mut sums = [0.0; 4];
         for (r, weight) in across.iter().enumerate() {
-            let row = self.values[(j + r) * self.nodes[0] + i..].first_chunk::<4>()?;
-            for (sum, value) in sums.iter_mut().zip(row) {
-                *sum += weight * value;
-            }
+            let row = *self.values[(j + r) * self.nodes[0] + i..].first_chunk::<4>()?;
+            sums = std::array::from_fn(|n| sums[n] + weight * row[n]);
         }
         let terms: [f64; 4] = std::array::from_fn(|n| along[n] * sums[n]);
         Some((terms[0] + terms[2]) + (terms[1] + terms[3]))
@@ -45,7 +43,7 @@ impl Bicubic {
 }
 
 /// First of the four nodes around a position, and the position between the middle two, 0 to 1.
-#[inline]
+#[inline(always)]
 fn cell(position: f64, nodes: usize) -> Option<(usize, f64)> {
     if position >= 1.0 && position <= nodes as f64 - 2.0 {
         // The last admitted position is the right end of the last cell.
@@ -64,7 +62,7 @@ const WEIGHTS: [[f64; 4]; 4] = [
 ];
 
 /// Weights of the nodes −1, 0, 1, 2 at t between 0 and 1, all four at once.
-#[inline]
+#[inline(always)]
 fn weights(t: f64) -> [f64; 4] {
     let [a, b, c, d] = &WEIGHTS;
     std::array::from_fn(|n| ((a[n] * t + b[n]) * t + c[n]) * t + d[n])

@@ -18,6 +18,7 @@ pub struct FacetFields<'a> {
 
 impl FacetFields<'_> {
     /// Slope of pixel `n`, counted row after row.
+    #[inline(always)]
     pub(crate) fn slope(&self, n: usize) -> [f64; 2] {
         [
             f64::from(self.slope_x.values[n]),
@@ -26,6 +27,7 @@ impl FacetFields<'_> {
     }
 
     /// σ⁰ of pixel `n` from its Bragg and specular parts: only the Bragg part is modulated and damped.
+    #[inline(always)]
     pub(crate) fn combine(&self, n: usize, [bragg, specular]: [f64; 2]) -> f32 {
         let modulation = self.modulation.map_or(1.0, |m| bragg_factor(m.values[n]));
         let damping = self.damping.map_or(1.0, |d| d.values[n]);

@@ -1,5 +1,6 @@
 //! Gaussian slopes: their covariance, its axes and its density.
 
+use crate::vectorize::exp;
 use std::f64::consts::PI;
 
 /// Covariance of the slopes ∂ζ/∂x, ∂ζ/∂y of a band of waves \[1\].
@@ -129,13 +130,11 @@ impl SlopeDensity {
     };
 
     /// The density of a slope \[1\].
-    #[inline]
+    #[inline(always)]
     pub(crate) fn at(&self, [x, y]: [f64; 2]) -> f64 {
         let exponent = self.form[0] * x * x + self.form[1] * x * y + self.form[2] * y * y;
-        if exponent > FARTHEST {
-            return 0.0;
-        }
-        self.peak * (-exponent).exp()
+        let density = self.peak * exp(-exponent.min(FARTHEST));
+        if exponent > FARTHEST { 0.0 } else { density }
     }
 }
 

@@ -75,6 +75,7 @@ impl Specular {
 
     /// Cross-section of a facet of resolved slope (`s_x`, `s_y`), per unit area of the horizontal plane.
     #[must_use]
+    #[inline(always)]
     pub fn sigma0(&self, slope: [f64; 2]) -> f64 {
         self.strength * self.density.at(self.missing(slope))
     }
@@ -100,6 +101,7 @@ impl Specular {
     }
 
     /// The slope that turns a facet of resolved slope s into a mirror.
+    #[inline(always)]
     fn missing(&self, [sx, sy]: [f64; 2]) -> [f64; 2] {
         [self.tan_incidence - sx, -sy]
     }

@@ -5,6 +5,7 @@ use crate::scattering::bicubic::Bicubic;
 use crate::scattering::lattice::{Lattice, radius};
 use crate::scattering::slopes::PrincipalAxes;
 use crate::scattering::{Backscatter, FacetFields};
+use crate::vectorize::vectorized;
 use rayon::prelude::*;
 
 /// First spacing of facets tried \[1\]: a quarter of the width of the roll-off near nadir.
@@ -39,7 +40,7 @@ const MOST_FACETS: usize = 1 << 19;
 pub struct BackscatterTable {
     backscatter: Backscatter,
     axes: PrincipalAxes,
-    bragg: Bicubic,
+    interpolation: Bicubic,
     error: f64,
 }
 
@@ -71,7 +72,7 @@ impl BackscatterTable {
                     backscatter,
                     axes,
                     error: average.error,
-                    bragg: Bicubic::through(average.lattice),
+                    interpolation: Bicubic::through(average.lattice),
                 };
             }
             spacing *= average.next_spacing(error);
@@ -81,7 +82,7 @@ impl BackscatterTable {
     /// Nodes along the two principal axes of the unresolved slopes.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
-        self.bragg.nodes()
+        self.interpolation.nodes()
     }
 
     /// Stated absolute error of the interpolated σ⁰ \[1\].
@@ -92,12 +93,14 @@ impl BackscatterTable {
 
     /// Bragg and specular cross-section of a facet of resolved slope (`s_x`, `s_y`); exact outside the table.
     #[must_use]
-    #[inline]
     pub fn lookup(&self, slope: [f64; 2]) -> [f64; 2] {
-        match self.bragg.at(self.axes.coordinates(slope)) {
-            Some(bragg) => [bragg, self.backscatter.specular.sigma0(slope)],
-            None => self.backscatter.parts(slope),
-        }
+        [self.bragg(slope), self.backscatter.specular.sigma0(slope)]
+    }
+
+    #[inline(always)]
+    fn bragg(&self, slope: [f64; 2]) -> f64 {
+        let interpolated = self.interpolation.at(self.axes.coordinates(slope));
+        interpolated.unwrap_or_else(|| self.backscatter.parts(slope)[0])
     }
 
     /// σ⁰ of every pixel, row by row in parallel.
@@ -108,17 +111,37 @@ impl BackscatterTable {
         values
             .par_chunks_mut(columns.max(1))
             .enumerate()
-            .for_each(|(row, out)| {
-                for (column, value) in out.iter_mut().enumerate() {
-                    let n = row * columns + column;
-                    *value = fields.combine(n, self.lookup(fields.slope(n)));
-                }
-            });
+            .for_each_init(
+                || vec![0.0; columns],
+                |bragg, (row, out)| self.sigma0_row(fields, row * columns, bragg, out),
+            );
         Field {
             rows,
             columns,
             values,
         }
+    }
+
+    /// σ⁰ of the pixels from `first` on: a loop that looks up, then one that the compiler can vectorise.
+    fn sigma0_row(
+        &self,
+        fields: &FacetFields<'_>,
+        first: usize,
+        bragg: &mut [f64],
+        out: &mut [f32],
+    ) {
+        vectorized(
+            #[inline(always)]
+            || {
+                for (n, bragg) in (first..).zip(&mut *bragg) {
+                    *bragg = self.bragg(fields.slope(n));
+                }
+                for ((n, &mut bragg), value) in (first..).zip(bragg).zip(out) {
+                    let specular = self.backscatter.specular.sigma0(fields.slope(n));
+                    *value = fields.combine(n, [bragg, specular]);
+                }
+            },
+        );
     }
 }
 

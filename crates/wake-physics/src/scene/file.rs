@@ -12,7 +12,7 @@ impl Scene {
     /// [`Error::Parse`] with line and key, or what [`Scene::validate`] finds.
     pub fn from_toml(text: &str) -> Result<Self> {
         let scene: Self = toml::from_str(text).map_err(|e| Error::Parse {
-            message: e.to_string().trim().to_owned(),
+            message: with_line(text, &e),
         })?;
         scene.validate()?;
         Ok(scene)
@@ -22,14 +22,21 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`Error::File`] if the file cannot be read, else as [`Scene::from_toml`].
+    /// [`Error::File`] if the file cannot be read or is no scene, else what [`Scene::validate`] finds.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::File {
             action: "read",
             path: path.to_owned(),
             message: e.to_string(),
         })?;
-        Self::from_toml(&text)
+        Self::from_toml(&text).map_err(|error| match error {
+            Error::Parse { message } => Error::File {
+                action: "read",
+                path: path.to_owned(),
+                message,
+            },
+            other => other,
+        })
     }
 
     /// The scene as the text of a scene file.
@@ -86,6 +93,18 @@ impl Scene {
         root.try_into()
             .map_err(|e: toml::de::Error| fail(e.message().trim().to_owned()))
     }
+}
+
+/// The message of an error of TOML on one line, with the number of the line it is about.
+fn with_line(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().trim().replace('\n', ", ");
+    let Some(span) = error.span() else {
+        return message;
+    };
+    let before = text.get(..span.start).unwrap_or(text);
+    let number = before.matches('\n').count();
+    let line = text.lines().nth(number).unwrap_or_default().trim();
+    format!("line {}, '{line}': {message}", number + 1)
 }
 
 /// Parses a TOML value; what is no TOML value is a string; nothing is `None`.

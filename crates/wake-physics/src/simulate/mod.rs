@@ -4,6 +4,7 @@
 
 use crate::error::Result;
 use crate::labels::Labels;
+use crate::memory;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
@@ -81,6 +82,7 @@ pub fn simulate(scene: &Scene) -> Result<Simulation> {
 /// As [`simulate`].
 pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
     scene.validate()?;
+    memory::keep_large_blocks();
     let mut clock = Clock::start();
     let mut seconds = Seconds::default();
     let setup = Setup::new(scene);
@@ -110,8 +112,8 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
         velocity_x,
         velocity_y,
         velocity_z,
-    ] = fields.outputs.map(|field| run.crop(&field));
-    let (radial_velocity, sigma0) = (run.crop(&radial_velocity), run.crop(&sigma0));
+    ] = fields.outputs.map(|field| run.crop(field));
+    let (radial_velocity, sigma0) = (run.crop(radial_velocity), run.crop(sigma0));
     seconds.labels = clock.lap();
     seconds.total = clock.total();
     Ok(Simulation {

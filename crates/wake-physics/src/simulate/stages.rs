@@ -21,10 +21,13 @@ use rayon::prelude::*;
 
 /// Share of the tolerance for the fields: their largest error is some five times its root mean square, and
 /// bunching turns an error of the velocity into a larger one of the image.
-const SHARE_OF_FIELDS: f64 = 0.1;
+const SHARE_OF_FIELDS: f64 = 0.3;
 
-/// Share of the tolerance for the table of σ⁰, and as much for the kernels of the imaging.
-const SHARE_OF_IMAGE: f64 = 0.2;
+/// Share of the tolerance for the table of σ⁰, whose error is bounded pixel by pixel.
+const SHARE_OF_TABLE: f64 = 0.5;
+
+/// Share of the tolerance for the kernels of the imaging.
+const SHARE_OF_KERNELS: f64 = 0.4;
 
 /// The fields that are always made, for they are results.
 const OUTPUTS: [Quantity; 6] = [
@@ -120,23 +123,20 @@ impl<'a> Run<'a> {
         let waves = wake.waves(&plan.wake);
         let transfer = &self.setup.transfer;
         let (quantities, raster) = (&self.quantities, &self.raster);
-        let wake_fields = match self.method {
-            Method::Fast => {
-                nufft::synthesize(&waves, transfer, quantities, raster, self.field_tolerance())
-            }
-            Method::Direct => harmonic_fields(&waves, transfer, quantities, raster),
-        };
         let fade = kelvin::fade_field(&wake.track, wake.hull.length(), raster);
-        for (field, wake) in fields.all().zip(&wake_fields) {
-            let parts = field.values.par_chunks_mut(1 << 14);
-            let parts = parts.zip(wake.values.par_chunks(1 << 14));
-            parts
-                .zip(fade.values.par_chunks(1 << 14))
-                .for_each(|((field, wake), fade)| {
-                    for ((f, w), a) in field.iter_mut().zip(wake).zip(fade) {
-                        *f += w * a;
-                    }
-                });
+        let mut fields: Vec<&mut Field> = fields.all().collect();
+        let mut add = |q: usize, wake: &mut Field| fields[q].add_product(wake, &fade);
+        match self.method {
+            Method::Fast => {
+                let tolerance = self.field_tolerance();
+                nufft::synthesize_each(&waves, transfer, quantities, raster, tolerance, add);
+            }
+            Method::Direct => {
+                let wake_fields = harmonic_fields(&waves, transfer, quantities, raster);
+                for (q, mut field) in wake_fields.into_iter().enumerate() {
+                    add(q, &mut field);
+                }
+            }
         }
     }
 
@@ -148,9 +148,11 @@ impl<'a> Run<'a> {
             .as_ref()
             .filter(|_| plan.uses(Term::Turbulent))?;
         let mut field = turbulent_wake(wake).damping_field(&self.raster);
-        for damping in &mut field.values {
-            *damping = 1.0 - *damping;
-        }
+        field
+            .values
+            .par_iter_mut()
+            .with_min_len(1 << 14)
+            .for_each(|damping| *damping = 1.0 - *damping);
         Some(field)
     }
 
@@ -173,7 +175,7 @@ impl<'a> Run<'a> {
         if self.method == Method::Direct {
             return (backscatter.sigma0_field(&facets), [0, 0]);
         }
-        let error = SHARE_OF_IMAGE * self.scene.model.tolerance * plan.mean_sigma0;
+        let error = SHARE_OF_TABLE * self.scene.model.tolerance * plan.mean_sigma0;
         let table = BackscatterTable::covering(backscatter, facets.slope_x, facets.slope_y, error);
         (table.sigma0_field(&facets), table.size())
     }
@@ -204,7 +206,7 @@ impl<'a> Run<'a> {
             },
         };
         let image = &self.setup.image;
-        let tolerance = SHARE_OF_IMAGE * self.scene.model.tolerance;
+        let tolerance = SHARE_OF_KERNELS * self.scene.model.tolerance;
         let mut intensity = match self.method {
             Method::Fast => imaging.image(&sources, image, tolerance),
             Method::Direct => DirectImage::new(&imaging, &sources, image).image(),
@@ -261,7 +263,7 @@ impl<'a> Run<'a> {
     }
 
     /// Cuts the image from the middle.
-    pub(super) fn crop(&self, field: &Field) -> Field {
+    pub(super) fn crop(&self, field: Field) -> Field {
         let rows = (self.raster.rows - self.setup.image.rows) / 2;
         let columns = (self.raster.columns - self.setup.image.columns) / 2;
         field.crop(rows, columns)
@@ -281,7 +283,7 @@ impl SurfaceFields {
     pub(super) fn radial_velocity(&self, incidence: f64) -> Field {
         let [vx, vz] = [&self.outputs[3], &self.outputs[5]];
         let (sin, cos) = (incidence.sin() as f32, incidence.cos() as f32);
-        let values = vx.values.iter().zip(&vz.values);
+        let values = vx.values.par_iter().zip(&vz.values).with_min_len(1 << 14);
         Field {
             rows: vx.rows,
             columns: vx.columns,

@@ -64,6 +64,7 @@ impl<'a> Amplitudes<'a> {
     }
 
     /// Amplitudes of the waves k and −k of a piece of a line.
+    #[inline(always)]
     pub(super) fn fill(&self, kx: f64, ky: &[f32], along: &mut [f32], against: &mut [f32]) {
         let x = kx as f32;
         for ((&y, along), against) in ky.iter().zip(&mut *along).zip(&mut *against) {

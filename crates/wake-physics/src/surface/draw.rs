@@ -6,6 +6,7 @@ use super::vector::{cos_sin, ln};
 use crate::dispersion::angular_frequency;
 use crate::random::line_generator;
 use crate::raster::Raster;
+use crate::vectorize::vectorized;
 use crate::wind_sea::DirectionalSpectrum;
 use num_complex::Complex32;
 use rand::Rng;
@@ -84,12 +85,18 @@ impl<'a> Draw<'a> {
             .enumerate()
             .map_init(
                 || Workspace::new(rows),
-                |work, (line, (even, odd))| self.line(line, work, even, odd),
+                |work, (line, (even, odd))| {
+                    vectorized(
+                        #[inline(always)]
+                        || self.line(line, work, even, odd),
+                    )
+                },
             )
             .collect();
         ([even, odd], variances.iter().sum())
     }
 
+    #[inline(always)]
     fn line(
         &self,
         line: usize,
@@ -125,6 +132,7 @@ impl<'a> Draw<'a> {
         variance
     }
 
+    #[inline(always)]
     fn levels(&self, line: usize, range: Range<usize>, work: &mut Workspace) {
         let [along, against] = &mut work.level;
         let ky = &self.ky[range.clone()];
@@ -150,6 +158,7 @@ impl<'a> Draw<'a> {
     }
 
     /// c = level · √E · exp(i phase) with E exponential and the phase uniform: Box and Muller (1958).
+    #[inline(always)]
     fn waves(&self, line: usize, range: Range<usize>, work: &mut Workspace) {
         let [by_index, by_line] = &self.place;
         for (side, sign) in [1u32, u32::MAX].into_iter().enumerate() {
@@ -195,6 +204,7 @@ impl Workspace {
     }
 
     /// Σ½ level² over both sides; on line 0 the second side is the first again.
+    #[inline(always)]
     fn variance(&self, line: usize, range: Range<usize>) -> f64 {
         let sides = if line == 0 { 1 } else { 2 };
         let squares = |level: &Vec<f32>| -> f64 {
@@ -215,6 +225,7 @@ impl Workspace {
     }
 }
 
+#[inline(always)]
 fn words(bits: u64) -> [u32; 2] {
     [(bits >> 32) as u32, bits as u32]
 }

@@ -47,6 +47,7 @@ impl<'a, T: Lane> Factors<'a, T> {
     }
 
     /// Frequencies of the waves of a line.
+    #[inline(always)]
     pub(super) fn waves(&self, line: usize) -> LineWaves<T> {
         let kx = T::constant(self.lattice.kx(line));
         let (mut omega, mut orbital) = (
@@ -74,6 +75,7 @@ impl<'a, T: Lane> Factors<'a, T> {
     }
 
     /// Writes a piece of the half spectrum of a quantity.
+    #[inline(always)]
     pub(super) fn fill(
         &self,
         quantity: Quantity,

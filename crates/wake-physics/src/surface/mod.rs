@@ -9,6 +9,7 @@ mod vector;
 use crate::dispersion::angular_frequency;
 use crate::fft::{Synthesis, signed_index};
 use crate::raster::{Field, Raster};
+use crate::vectorize::vectorized;
 use crate::waves::{PlaneWaves, Quantity, Transfer};
 use crate::wind_sea::DirectionalSpectrum;
 use draw::{Draw, Scatter};
@@ -232,7 +233,10 @@ impl Surface {
                 [self.raster.rows, self.raster.columns],
                 out,
                 |line, one, two| {
-                    self.half_spectra(&factors, line, quantities, [one, two]);
+                    vectorized(
+                        #[inline(always)]
+                        || self.half_spectra(&factors, line, quantities, [one, two]),
+                    );
                 },
             );
         }
@@ -240,6 +244,7 @@ impl Surface {
     }
 
     /// Writes line `line` of the half spectra of one or two quantities.
+    #[inline(always)]
     fn half_spectra<T: Lane>(
         &self,
         factors: &Factors<'_, T>,

@@ -151,6 +151,19 @@ fn threads_change_nothing() {
     }
 }
 
+/// 4096 × 4096 pixels: sound, with the variance of the sea and the wake where the small image has it.
+#[test]
+fn the_largest_common_grid_is_sound() {
+    let scene = small(4096, 4096, &[]);
+    let large = run(&scene);
+    assert_sound(&large, "4096 x 4096");
+    // Over (10 km)² the sea is its own mean: some 10⁴ independent patches of a 10 m wave, twenty of the swell's.
+    let sea = run(&open_sea(scene));
+    let share = sea.elevation.rms() / run(&open_sea(small(512, 512, &[]))).elevation.rms();
+    assert!((share - 1.0).abs() < 0.05, "{share}");
+    assert!(large.elevation.rms() > sea.elevation.rms());
+}
+
 #[test]
 fn a_grid_too_large_for_memory_is_refused_with_what_it_needs() {
     let scene = small(16384, 16384, &["sea.wind_speed=30"]);
