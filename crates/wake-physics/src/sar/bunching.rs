@@ -19,6 +19,7 @@
 
 use crate::raster::{Field, Raster};
 use crate::sar::AzimuthResolution;
+use crate::sar::places::{Places, split};
 use crate::sar::response::{Response, largest, reach};
 use crate::sar::spread::{LANES, Steps, gaussian};
 use crate::vectorize::vectorized;
@@ -289,50 +290,6 @@ impl<'a> SourceRow<'a> {
 #[inline(always)]
 fn value(row: Option<&[f32]>, column: usize) -> f32 {
     row.map_or(0.0, |row| row[column])
-}
-
-/// Largest integer not above x: [`f32::floor`] is a call without SSE 4.1.
-#[inline(always)]
-fn floor(x: f32) -> i32 {
-    let cut = x as i32;
-    cut - i32::from(x < cut as f32)
-}
-
-/// Where the sources of a row are imaged.
-#[derive(Default)]
-struct Places {
-    /// Step at or before each source, and how far beyond it the source is, 0 to 1.
-    steps: Vec<i32>,
-    fractions: Vec<f32>,
-    /// Columns that each source leans by, rounded down, and the share of the next column.
-    columns: Vec<i32>,
-    shares: Vec<f32>,
-}
-
-impl Places {
-    fn resize(&mut self, sources: usize) {
-        self.steps.resize(sources, 0);
-        self.fractions.resize(sources, 0.0);
-        self.columns.resize(sources, 0);
-        self.shares.resize(sources, 0.0);
-    }
-}
-
-/// Takes positions `start + factor·value` apart: largest integers not above them, and the rest.
-#[inline(always)]
-fn split(whole: &mut [i32], rest: &mut [f32], start: f32, (factor, values): (f32, Option<&[f32]>)) {
-    let apart = |at: f32| (floor(at), at - floor(at) as f32);
-    match values {
-        None => {
-            whole.fill(apart(start).0);
-            rest.fill(apart(start).1);
-        }
-        Some(values) => {
-            for ((whole, rest), &value) in whole.iter_mut().zip(rest).zip(values) {
-                (*whole, *rest) = apart(start + factor * value);
-            }
-        }
-    }
 }
 
 /// The taps of the last source, kept as long as the next has the same place between steps and the same width.

@@ -14,6 +14,7 @@ pub mod echo;
 pub mod geometry;
 pub mod speckle;
 
+mod places;
 mod response;
 mod spread;
 
