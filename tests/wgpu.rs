@@ -90,7 +90,9 @@ fn shortest_run() -> (PathBuf, String, Value) {
     let entries = std::fs::read_dir(folder()).expect("the folder of fixtures");
     let models = entries
         .map(|entry| entry.unwrap().path())
-        .find(|path| path.join("runs/manifest.json").is_file())
+        .find(|path| {
+            path.join("model_index.json").is_file() && path.join("runs/manifest.json").is_file()
+        })
         .expect("a pipeline with runs");
     let manifest = json(&models.join("runs/manifest.json"));
     let calls = |run: &Value| run["timesteps"].as_array().unwrap().len();

@@ -85,12 +85,13 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 
 /// A model in the layout of diffusers.
 fn diffusers(arguments: &Arguments, weights: &Path) -> Result<(), Box<dyn Error>> {
-    let (prompt, grid) = prompt(arguments)?;
+    let scene = arguments.scene.as_deref().map(Scene::read).transpose()?;
+    let prompt = prompt(arguments, scene.as_ref())?;
     let device = device(&arguments.device)?;
     let begin = Instant::now();
     let pipeline = Pipeline::load(weights, &device)?;
     let load = begin.elapsed().as_secs_f64();
-    check_grid(grid, pipeline.image_size())?;
+    check_grid(scene.as_ref(), pipeline.image_size())?;
     let request = request(arguments, &prompt, &pipeline)?;
     let (images, mut seconds) = generate(&pipeline, &request, arguments, &prompt)?;
     seconds["load"] = json!(load);
@@ -117,26 +118,21 @@ fn finish(arguments: &Arguments, report: &Value, files: &[String]) -> Result<(),
     Ok(())
 }
 
-/// The prompt as given, or a scene in words; and the rows and columns of a scene that was asked for.
-fn prompt(arguments: &Arguments) -> Result<(String, Option<[usize; 2]>), Box<dyn Error>> {
-    if let Some(prompt) = &arguments.prompt {
-        return Ok((prompt.clone(), None));
+/// The prompt as given, or a scene in words, by default the default scene.
+fn prompt(arguments: &Arguments, scene: Option<&Scene>) -> wake_text::Result<String> {
+    match &arguments.prompt {
+        Some(prompt) => Ok(prompt.clone()),
+        None => wake_text::prompt(scene.unwrap_or(&Scene::default())),
     }
-    let Some(path) = &arguments.scene else {
-        return Ok((wake_text::prompt(&Scene::default())?, None));
-    };
-    let scene = Scene::read(path)?;
-    let grid = [scene.grid.rows, scene.grid.columns];
-    Ok((wake_text::prompt(&scene)?, Some(grid)))
 }
 
 /// Refuses a scene whose image has another size than the model's.
-fn check_grid(grid: Option<[usize; 2]>, [rows, columns]: [usize; 2]) -> Result<(), String> {
-    match grid {
-        Some(grid) if grid != [rows, columns] => Err(format!(
+fn check_grid(scene: Option<&Scene>, [rows, columns]: [usize; 2]) -> Result<(), String> {
+    match scene.map(|scene| &scene.grid) {
+        Some(grid) if [grid.rows, grid.columns] != [rows, columns] => Err(format!(
             "the scene's grid is {} × {} pixels, but the model makes {rows} × {columns}; set grid.rows and \
              grid.columns to that",
-            grid[0], grid[1]
+            grid.rows, grid.columns
         )),
         _ => Ok(()),
     }

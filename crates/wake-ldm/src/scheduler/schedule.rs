@@ -45,7 +45,7 @@ impl NoiseSchedule {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] for fewer than 2 or more than 100,000 steps, for a first or last β
+    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for fewer than 2 or more than 100,000 steps, for a first or last β
     /// outside [1e-8, 0.9999], or for a β given one by one outside [0, 1] (excluding 0 first).
     pub fn new(curve: &BetaCurve, steps: usize, terminal: TerminalSnr) -> Result<Self> {
         check_range("num_train_timesteps", steps as f64, 2.0, 1e5)?;
