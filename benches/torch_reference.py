@@ -47,6 +47,37 @@ def blocks():
         )
 
 
+def training(name, model, inputs):
+    """Forward, and forward with gradients."""
+    measure(f"{name}, forward", lambda: model(*inputs), 7)
+    def step():
+        with torch.enable_grad():
+            out = model(*inputs)
+            (out if torch.is_tensor(out) else out.sample).square().mean().backward()
+    measure(f"{name}, with gradients", step, 7)
+
+
+class Block(torch.nn.Module):
+    def __init__(self, channels):
+        super().__init__()
+        self.norms = torch.nn.ModuleList(torch.nn.GroupNorm(16, channels) for _ in range(2))
+        self.convs = torch.nn.ModuleList(torch.nn.Conv2d(channels, channels, 3, padding=1) for _ in range(2))
+
+    def forward(self, x):
+        h = x
+        for norm, conv in zip(self.norms, self.convs):
+            h = conv(F.silu(norm(h)))
+        return x + h
+
+
+def trainings():
+    for batch, channels, size in [(16, 64, 32), (16, 128, 16), (16, 192, 8), (1, 64, 32)]:
+        blocks = torch.nn.Sequential(Block(channels), Block(channels))
+        training(f"training: b{batch} c{channels} s{size}", blocks, [torch.randn(batch, channels, size, size)])
+    inputs = [torch.randn(16, 16, 32, 32), 500, torch.randn(16, 77, 256)]
+    training("training: small U-Net, batch 16", UNet2DConditionModel(**SMALL), inputs)
+
+
 def unet(name, batch, size, runs, **config):
     model = UNet2DConditionModel(**config).eval()
     channels, width = config.get("in_channels", 4), config["cross_attention_dim"]
@@ -70,6 +101,7 @@ SMALL = {
 def main():
     torch.set_num_threads(os.cpu_count())
     print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")
+    trainings()
     blocks()
     for batch in (1, 2):
         unet(f"small U-Net 32x32, batch {batch}", batch, 32, 20, **SMALL)

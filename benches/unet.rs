@@ -91,6 +91,63 @@ fn small_unet(criterion: &mut Criterion) {
     }
 }
 
+/// Median of the seconds of some calls after one to warm up.
+#[cfg(feature = "train")]
+fn median_seconds(call: impl Fn()) -> f64 {
+    call();
+    let timed = |_| {
+        let begin = Instant::now();
+        call();
+        begin.elapsed().as_secs_f64()
+    };
+    let mut seconds: Vec<f64> = (0..7).map(timed).collect();
+    seconds.sort_by(f64::total_cmp);
+    seconds[3]
+}
+
+/// Forward, and forward with gradients: two residual blocks, and the small U-Net, at a batch of 16.
+#[cfg(feature = "train")]
+fn training() {
+    let (plain, tracking) = (Device::flex(), Device::flex().autodiff());
+    for (batch, channels, size) in [(16, 64, 32), (16, 128, 16), (16, 192, 8), (1, 64, 32)] {
+        let shape = ResnetShape {
+            channels_in: channels,
+            channels_out: channels,
+            time_channels: None,
+            groups: 16,
+            epsilon: 1e-5,
+        };
+        let call = |device: &Device| {
+            let blocks = [
+                ResnetBlock::new(shape, device),
+                ResnetBlock::new(shape, device),
+            ];
+            let x: Tensor<4> = random([batch, channels, size, size], device);
+            move || {
+                let forward = |x, block: &ResnetBlock| block.forward(x, None);
+                blocks.iter().fold(x.clone(), forward)
+            }
+        };
+        let (forward, tracked) = (call(&plain), call(&tracking));
+        let forward = median_seconds(|| drop(black_box(forward())));
+        let both = median_seconds(|| drop(black_box(tracked().square().mean().backward())));
+        println!(
+            "training: b{batch} c{channels} s{size}: forward {forward:.4} s, with gradients {both:.4} s"
+        );
+    }
+    let config = UNetConfig::small(16, 256, None);
+    let (unet, tracked) = (config.init(&plain), config.init(&tracking));
+    let (x, y) = (
+        input(&config, 16, 32, &plain),
+        input(&config, 16, 32, &tracking),
+    );
+    let forward = median_seconds(|| call(&unet, &x));
+    let both = median_seconds(|| {
+        black_box(tracked.forward(y.clone()).square().mean().backward());
+    });
+    println!("training: small U-Net, batch 16: forward {forward:.3} s, with gradients {both:.3} s");
+}
+
 /// Stable Diffusion v1.4's U-Net: one guided step is batch 2.
 fn stable_diffusion_unet() {
     let device = Device::flex();
@@ -127,8 +184,14 @@ fn main() {
         .skip(1)
         .filter(|arg| !arg.starts_with('-'))
         .collect();
-    let named = |filter: &String| "stable-diffusion".contains(filter.as_str());
-    if filters.is_empty() || filters.iter().any(named) {
+    let wanted = |name: &str| {
+        filters.is_empty() || filters.iter().any(|filter| name.contains(filter.as_str()))
+    };
+    #[cfg(feature = "train")]
+    if wanted("training") {
+        training();
+    }
+    if wanted("stable-diffusion") {
         stable_diffusion_unet();
     }
     Criterion::default().configure_from_args().final_summary();

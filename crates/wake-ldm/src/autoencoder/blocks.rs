@@ -6,7 +6,7 @@ use burn::tensor::{DType, Device, Tensor};
 
 use super::config::AutoencoderKlConfig;
 use crate::nn::attention::CrossAttention;
-use crate::nn::conv3x3;
+use crate::nn::conv::{conv3x3, convolve};
 use crate::nn::norm::GroupNorm;
 use crate::nn::resample::{Downsample, Upsample};
 use crate::nn::resnet::{ResnetBlock, ResnetShape};
@@ -79,7 +79,7 @@ impl Encoder {
     }
 
     pub(super) fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let mut x = self.conv_in.forward(x);
+        let mut x = convolve(&self.conv_in, x);
         for block in &self.down_blocks {
             x = block
                 .resnets
@@ -88,7 +88,7 @@ impl Encoder {
             x = block.downsamplers.iter().fold(x, |x, down| down.forward(x));
         }
         let x = self.mid_block.forward(x);
-        self.conv_out.forward(self.conv_norm_out.forward_silu(x))
+        convolve(&self.conv_out, self.conv_norm_out.forward_silu(x))
     }
 }
 
@@ -130,7 +130,7 @@ impl Decoder {
     }
 
     pub(super) fn forward(&self, z: Tensor<4>) -> Tensor<4> {
-        let mut x = self.mid_block.forward(self.conv_in.forward(z));
+        let mut x = self.mid_block.forward(convolve(&self.conv_in, z));
         for block in &self.up_blocks {
             x = block
                 .resnets
@@ -138,7 +138,7 @@ impl Decoder {
                 .fold(x, |x, resnet| resnet.forward(x, None));
             x = block.upsamplers.iter().fold(x, |x, up| up.forward(x, None));
         }
-        self.conv_out.forward(self.conv_norm_out.forward_silu(x))
+        convolve(&self.conv_out, self.conv_norm_out.forward_silu(x))
     }
 }
 

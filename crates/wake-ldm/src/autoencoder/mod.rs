@@ -10,7 +10,8 @@ use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
 
-use crate::nn::{cast_to, conv1x1};
+use crate::nn::cast_to;
+use crate::nn::conv::{conv1x1, convolve};
 use blocks::{Decoder, Encoder};
 use patch::{depth_to_space, space_to_depth};
 
@@ -114,7 +115,7 @@ impl AutoencoderKl {
             .encoder
             .forward(space_to_depth(image, self.config.patch_size));
         let moments = match &self.quant_conv {
-            Some(conv) => conv.forward(encoded),
+            Some(conv) => convolve(conv, encoded),
             None => encoded,
         };
         cast_to(moments, dtype)
@@ -130,7 +131,7 @@ impl AutoencoderKl {
         let dtype = z.dtype();
         let z = cast_to(z, self.decoder.dtype());
         let z = match &self.post_quant_conv {
-            Some(conv) => conv.forward(z),
+            Some(conv) => convolve(conv, z),
             None => z,
         };
         cast_to(

@@ -36,6 +36,10 @@ pub fn attention(
     heads: usize,
     causal: bool,
 ) -> Tensor<3> {
+    #[cfg(feature = "flex")]
+    if let Some(out) = native::attention([&query, &key, &value], heads, causal) {
+        return out;
+    }
     let dtype = query.dtype();
     if is_half(dtype) {
         let wide = |x| cast_to(x, DType::F32);
@@ -110,5 +114,56 @@ impl CrossAttention {
         let query = self.to_q.forward(x);
         self.to_out
             .forward(attention(query, key, value, self.heads, false))
+    }
+}
+
+/// The same a block of queries at a time on burn's CPU backend.
+#[cfg(feature = "flex")]
+mod native {
+    use super::*;
+    use crate::nn::kernels::attention::{self, Shape};
+    use crate::nn::operation::{Operation, apply};
+
+    /// `None` where the tensors are elsewhere.
+    pub(super) fn attention(
+        inputs: [&Tensor<3>; 3],
+        heads: usize,
+        causal: bool,
+    ) -> Option<Tensor<3>> {
+        let [batch, asking, channels] = inputs[0].dims();
+        let [_, seen, _] = inputs[1].dims();
+        let shape = Shape {
+            batch,
+            heads,
+            channels,
+            tokens: [asking, seen],
+            causal,
+        };
+        let seen_dims = [batch, seen, channels];
+        let same = inputs[1].dims() == seen_dims && inputs[2].dims() == seen_dims;
+        let plain = same && channels.is_multiple_of(heads) && batch * asking * seen > 0;
+        if !plain || (causal && asking != seen) {
+            return None;
+        }
+        let tensors = inputs.map(|x| x.clone().into_dispatch());
+        apply(shape, tensors, [batch, asking, channels])
+    }
+
+    impl Operation<3> for Shape {
+        type Saved = ();
+
+        fn forward(&self, [query, key, value]: [&[f32]; 3]) -> (Vec<f32>, ()) {
+            (attention::attend(query, key, value, self), ())
+        }
+
+        fn gradients(
+            &self,
+            inputs: [&[f32]; 3],
+            (): &(),
+            gradient: &[f32],
+            _: [bool; 3],
+        ) -> [Vec<f32>; 3] {
+            attention::gradients(inputs, gradient, self)
+        }
     }
 }

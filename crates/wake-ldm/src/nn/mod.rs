@@ -2,28 +2,19 @@
 
 pub mod activation;
 pub mod attention;
+pub(crate) mod conv;
 pub mod feed_forward;
+#[cfg(feature = "flex")]
+mod kernels;
 pub mod norm;
+#[cfg(feature = "flex")]
+mod operation;
 pub mod resample;
 pub mod resnet;
 pub mod timestep;
 pub mod transformer;
 
-use burn::nn::PaddingConfig2d;
-use burn::nn::conv::{Conv2d, Conv2dConfig};
-use burn::tensor::{DType, Device, FloatDType, Tensor};
-
-/// A convolution that keeps the size of its image: 3 × 3 with a border of one zero.
-pub(crate) fn conv3x3(channels_in: usize, channels_out: usize, device: &Device) -> Conv2d {
-    Conv2dConfig::new([channels_in, channels_out], [3, 3])
-        .with_padding(PaddingConfig2d::Explicit(1, 1, 1, 1))
-        .init(device)
-}
-
-/// A linear map of the channels of every pixel: a 1 × 1 convolution.
-pub(crate) fn conv1x1(channels_in: usize, channels_out: usize, device: &Device) -> Conv2d {
-    Conv2dConfig::new([channels_in, channels_out], [1, 1]).init(device)
-}
+use burn::tensor::{DType, FloatDType, Tensor};
 
 /// Whether sums of squares can overflow or lose their digits in this kind of number.
 pub(crate) fn is_half(dtype: DType) -> bool {

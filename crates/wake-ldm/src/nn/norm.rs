@@ -54,6 +54,10 @@ impl GroupNorm {
     ///
     /// `[batch, channels, rows, columns]`, in and out.
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        #[cfg(feature = "flex")]
+        if let Some(y) = native::normalize(self, &x, false) {
+            return y;
+        }
         let dtype = x.dtype();
         if is_half(dtype) {
             return cast_to(self.normalize(cast_to(x, DType::F32)), dtype);
@@ -67,6 +71,10 @@ impl GroupNorm {
     ///
     /// `[batch, channels, rows, columns]`, in and out.
     pub fn forward_silu(&self, x: Tensor<4>) -> Tensor<4> {
+        #[cfg(feature = "flex")]
+        if let Some(y) = native::normalize(self, &x, true) {
+            return y;
+        }
         silu(self.forward(x))
     }
 
@@ -87,5 +95,45 @@ impl GroupNorm {
         let parameter = parameter.val();
         let [channels] = parameter.dims();
         cast_to(parameter, DType::F32).reshape([1, channels, 1, 1])
+    }
+}
+
+/// The same in two passes over memory on burn's CPU backend.
+#[cfg(feature = "flex")]
+mod native {
+    use super::*;
+    use crate::nn::kernels::group_norm::{self, Moments, Shape};
+    use crate::nn::operation::{Operation, apply};
+
+    /// `None` where the tensors are elsewhere.
+    pub(super) fn normalize(layer: &GroupNorm, x: &Tensor<4>, silu: bool) -> Option<Tensor<4>> {
+        let [_, channels, rows, columns] = x.dims();
+        let shape = Shape {
+            channels,
+            groups: layer.groups,
+            pixels: rows * columns,
+            epsilon: layer.epsilon as f32,
+            silu,
+        };
+        let [weight, bias] = [&layer.weight, &layer.bias].map(|p| p.val().into_dispatch());
+        apply(shape, [x.clone().into_dispatch(), weight, bias], x.dims())
+    }
+
+    impl Operation<3> for Shape {
+        type Saved = Moments;
+
+        fn forward(&self, [x, weight, bias]: [&[f32]; 3]) -> (Vec<f32>, Moments) {
+            group_norm::normalize(x, [weight, bias], self)
+        }
+
+        fn gradients(
+            &self,
+            [x, weight, bias]: [&[f32]; 3],
+            moments: &Moments,
+            dy: &[f32],
+            _: [bool; 3],
+        ) -> [Vec<f32>; 3] {
+            group_norm::gradients(x, dy, [weight, bias], moments, self)
+        }
     }
 }

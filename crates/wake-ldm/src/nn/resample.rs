@@ -7,7 +7,7 @@ use burn::tensor::module::interpolate;
 use burn::tensor::ops::{InterpolateMode, InterpolateOptions};
 use burn::tensor::{Device, Tensor};
 
-use super::conv3x3;
+use super::conv::{conv3x3, convolve};
 
 /// Halves the size with a 3 × 3 convolution of stride 2.
 #[derive(Module, Debug)]
@@ -39,7 +39,7 @@ impl Downsample {
     ///
     /// `[batch, channels, rows, columns]` to about half of rows and columns.
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        self.conv.forward(x)
+        convolve(&self.conv, x)
     }
 }
 
@@ -64,8 +64,8 @@ impl Upsample {
     /// `[batch, channels, rows, columns]` to `[batch, channels, size[0], size[1]]`.
     pub fn forward(&self, x: Tensor<4>, size: Option<[usize; 2]>) -> Tensor<4> {
         let [_, _, rows, columns] = x.dims();
-        self.conv
-            .forward(nearest(x, size.unwrap_or([2 * rows, 2 * columns])))
+        let x = nearest(x, size.unwrap_or([2 * rows, 2 * columns]));
+        convolve(&self.conv, x)
     }
 }
 

@@ -5,8 +5,8 @@ use burn::nn::conv::Conv2d;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
+use super::conv::{conv1x1, conv3x3, convolve};
 use super::norm::GroupNorm;
-use super::{conv1x1, conv3x3};
 
 /// Widths and constants of a [`ResnetBlock`].
 #[derive(Debug, Clone, Copy)]
@@ -76,13 +76,13 @@ impl ResnetBlock {
     /// - `time`: `[batch, time_channels]`
     /// - result: `[batch, channels_out, rows, columns]`
     pub fn forward(&self, x: Tensor<4>, time: Option<Tensor<2>>) -> Tensor<4> {
-        let mut h = self.conv1.forward(self.norm1.forward_silu(x.clone()));
+        let mut h = convolve(&self.conv1, self.norm1.forward_silu(x.clone()));
         if let (Some(projection), Some(time)) = (&self.time_emb_proj, time) {
             h = h + projection.forward(time).unsqueeze_dims(&[2, 3]);
         }
-        let h = self.conv2.forward(self.norm2.forward_silu(h));
+        let h = convolve(&self.conv2, self.norm2.forward_silu(h));
         match &self.conv_shortcut {
-            Some(shortcut) => h + shortcut.forward(x),
+            Some(shortcut) => h + convolve(shortcut, x),
             None => h + x,
         }
     }

@@ -7,7 +7,7 @@ use burn::tensor::module::linear;
 use burn::tensor::{Device, Tensor};
 
 use super::attention::CrossAttention;
-use super::conv1x1;
+use super::conv::conv1x1;
 use super::feed_forward::FeedForward;
 use super::norm::GroupNorm;
 

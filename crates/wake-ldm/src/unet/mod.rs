@@ -8,9 +8,10 @@ use burn::nn::conv::Conv2d;
 use burn::tensor::activation::silu;
 use burn::tensor::{Device, Tensor};
 
+use crate::nn::cast_to;
+use crate::nn::conv::{conv3x3, convolve};
 use crate::nn::norm::GroupNorm;
 use crate::nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
-use crate::nn::{cast_to, conv3x3};
 use blocks::{DownBlock, Levels, MidBlock, UpBlock};
 
 pub use config::UNetConfig;
@@ -117,7 +118,7 @@ impl UNet {
             dtype,
         );
 
-        let mut x = self.conv_in.forward(cast_to(input.sample, dtype));
+        let mut x = convolve(&self.conv_in, cast_to(input.sample, dtype));
         let mut skips = vec![x.clone()];
         for block in &self.down_blocks {
             x = block.forward(x, &time, &context, &mut skips);
@@ -127,7 +128,7 @@ impl UNet {
             x = block.forward(x, &time, &context, &mut skips);
         }
         cast_to(
-            self.conv_out.forward(self.conv_norm_out.forward_silu(x)),
+            convolve(&self.conv_out, self.conv_norm_out.forward_silu(x)),
             sample_dtype,
         )
     }

@@ -1,0 +1,493 @@
+//! Attention of several heads, forward and backward, a block of queries at a time: the matrix of
+//! scores never exists as a whole.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::product::{Rows, Target, multiply};
+use super::silu::exp;
+use super::tile;
+
+/// Numbers of a block of scores that should stay in a core's second cache: 384 KiB.
+const NEAR: usize = 96 * 1024;
+
+/// Most queries of a block.
+const QUERIES: usize = 48;
+
+/// Sizes of an attention.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::nn) struct Shape {
+    /// Sequences.
+    pub(in crate::nn) batch: usize,
+    /// Heads; each has an equal share of the channels.
+    pub(in crate::nn) heads: usize,
+    /// Channels of all heads.
+    pub(in crate::nn) channels: usize,
+    /// Tokens that ask, and tokens that are seen.
+    pub(in crate::nn) tokens: [usize; 2],
+    /// Whether token i sees only tokens 0…i.
+    pub(in crate::nn) causal: bool,
+}
+
+impl Shape {
+    fn depth(&self) -> usize {
+        self.channels / self.heads
+    }
+
+    fn scale(&self) -> f32 {
+        1.0 / (self.depth() as f32).sqrt()
+    }
+
+    /// Queries of a block: as many as keep its scores near, a multiple of a tile's rows.
+    fn block(&self) -> usize {
+        let near = NEAR / self.tokens[1].max(1);
+        (near / tile::ROWS * tile::ROWS).clamp(tile::ROWS, QUERIES)
+    }
+
+    /// The tokens of one head in one sequence.
+    fn head<'a>(&self, x: &'a [f32], tokens: usize, sequence: usize, head: usize) -> Rows<'a> {
+        Rows {
+            values: &x[sequence * tokens * self.channels + head * self.depth()..],
+            step: self.channels,
+            count: tokens,
+        }
+    }
+
+    fn heads_of_batch(&self) -> impl IndexedParallelIterator<Item = [usize; 2]> {
+        let heads = self.heads;
+        (0..self.batch * heads)
+            .into_par_iter()
+            .map(move |i| [i / heads, i % heads])
+    }
+}
+
+/// Attends; see [`attention`](crate::nn::attention::attention).
+///
+/// # Shapes
+///
+/// - `query`: `[batch, tokens, channels]`; `key`, `value`: `[batch, tokens seen, channels]`
+/// - result: as `query`
+pub(in crate::nn) fn attend(query: &[f32], key: &[f32], value: &[f32], shape: &Shape) -> Vec<f32> {
+    let arch = Arch::new();
+    let width = arch.dispatch(tile::Width);
+    let [asking, seen] = shape.tokens;
+    let depth = shape.depth();
+    let packed: Vec<_> = shape
+        .heads_of_batch()
+        .map(|[n, head]| {
+            let key = shape.head(key, seen, n, head).pack_transposed(depth, width);
+            [key, shape.head(value, seen, n, head).pack(depth, width)]
+        })
+        .collect();
+    let mut out = vec![0.0; query.len()];
+    let block = shape.block();
+    out.par_chunks_mut(asking * shape.channels)
+        .enumerate()
+        .for_each(|(n, out)| {
+            out.par_chunks_mut(block * shape.channels)
+                .enumerate()
+                .for_each(|(i, out)| {
+                    for (head, [key, value]) in
+                        packed[n * shape.heads..][..shape.heads].iter().enumerate()
+                    {
+                        let query = shape.head(query, asking, n, head).from(i * block, block);
+                        let out = &mut out[head * depth..];
+                        arch.dispatch(Forward {
+                            scores: Scores {
+                                query,
+                                key,
+                                first: i * block,
+                                shape,
+                            },
+                            value,
+                            out,
+                        });
+                    }
+                });
+        });
+    out
+}
+
+/// What a block of queries gives to every token they see.
+struct Scores<'a> {
+    query: Rows<'a>,
+    key: &'a [f32],
+    /// Place of the first query in its sequence.
+    first: usize,
+    shape: &'a Shape,
+}
+
+impl Scores<'_> {
+    /// The softmax of the scores, `[queries, tokens seen]`.
+    #[inline(always)]
+    fn softmax<S: Simd>(&self, simd: S) -> Vec<f32> {
+        let seen = self.shape.tokens[1];
+        let mut scores = vec![0.0; self.query.count * seen];
+        let mut target = Target {
+            values: &mut scores,
+            step: seen,
+            columns: seen,
+            add: false,
+        };
+        multiply(simd, &self.query, self.shape.depth(), self.key, &mut target);
+        let scale = self.shape.scale();
+        for (i, scores) in scores.chunks_exact_mut(seen).enumerate() {
+            let visible = if self.shape.causal {
+                seen.min(self.first + i + 1)
+            } else {
+                seen
+            };
+            let (scores, hidden) = scores.split_at_mut(visible);
+            softmax(scores, scale);
+            hidden.fill(0.0);
+        }
+        scores
+    }
+}
+
+/// `e^(s x − m) / Σ e^(s x − m)` with m the largest s x.
+#[inline(always)]
+fn softmax(x: &mut [f32], scale: f32) {
+    let (chunks, rest) = x.as_chunks::<16>();
+    let mut parts = [f32::NEG_INFINITY; 16];
+    for chunk in chunks {
+        for i in 0..16 {
+            parts[i] = if chunk[i] > parts[i] {
+                chunk[i]
+            } else {
+                parts[i]
+            };
+        }
+    }
+    let max = rest
+        .iter()
+        .chain(&parts)
+        .fold(f32::NEG_INFINITY, |max, &v| max.max(v));
+    let mut parts = [0.0; 16];
+    let (chunks, rest) = x.as_chunks_mut::<16>();
+    for chunk in chunks {
+        for i in 0..16 {
+            chunk[i] = exp((chunk[i] - max) * scale);
+            parts[i] += chunk[i];
+        }
+    }
+    let mut sum: f32 = parts.iter().sum();
+    for v in rest {
+        *v = exp((*v - max) * scale);
+        sum += *v;
+    }
+    let inverse = 1.0 / sum;
+    for v in x {
+        *v *= inverse;
+    }
+}
+
+/// A block of queries of one head.
+struct Forward<'a> {
+    scores: Scores<'a>,
+    value: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let shape = self.scores.shape;
+        let weights = self.scores.softmax(simd);
+        let rows = Rows {
+            values: &weights,
+            step: shape.tokens[1],
+            count: self.scores.query.count,
+        };
+        let mut target = Target {
+            values: self.out,
+            step: shape.channels,
+            columns: shape.depth(),
+            add: false,
+        };
+        multiply(simd, &rows, shape.tokens[1], self.value, &mut target);
+    }
+}
+
+/// Gradients to query, key and value.
+///
+/// ```text
+/// P = softmax(s Q Kᵀ),   dV = Pᵀ dO,   dP = dO Vᵀ
+/// dS = s P ⊙ (dP − Σ_j P dP),   dQ = dS K,   dK = dSᵀ Q
+/// ```
+///
+/// # Shapes
+///
+/// As [`attend`]; `gradient` as its result.
+///
+/// # References
+///
+/// Dao et al. (2022), "FlashAttention", appendix B.2.
+pub(in crate::nn) fn gradients(
+    [query, key, value]: [&[f32]; 3],
+    gradient: &[f32],
+    shape: &Shape,
+) -> [Vec<f32>; 3] {
+    let arch = Arch::new();
+    let [asking, seen] = shape.tokens;
+    let heads: Vec<_> = shape
+        .heads_of_batch()
+        .map(|[n, head]| {
+            arch.dispatch(Backward {
+                query: shape.head(query, asking, n, head),
+                key: shape.head(key, seen, n, head),
+                value: shape.head(value, seen, n, head),
+                gradient: shape.head(gradient, asking, n, head),
+                shape,
+            })
+        })
+        .collect();
+    let join = |of: usize, tokens: usize| {
+        let depth = shape.depth();
+        let mut out = vec![0.0; shape.batch * tokens * shape.channels];
+        for (i, out) in out.chunks_exact_mut(shape.channels).enumerate() {
+            for (head, out) in out.chunks_exact_mut(depth).enumerate() {
+                let from = &heads[i / tokens * shape.heads + head][of];
+                out.copy_from_slice(&from[i % tokens * depth..][..depth]);
+            }
+        }
+        out
+    };
+    [join(0, asking), join(1, seen), join(2, seen)]
+}
+
+/// One head of one sequence, on the way back.
+struct Backward<'a> {
+    query: Rows<'a>,
+    key: Rows<'a>,
+    value: Rows<'a>,
+    gradient: Rows<'a>,
+    shape: &'a Shape,
+}
+
+impl WithSimd for Backward<'_> {
+    type Output = [Vec<f32>; 3];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [Vec<f32>; 3] {
+        let (width, depth) = (tile::width::<S>(), self.shape.depth());
+        let [asking, seen] = self.shape.tokens;
+        let key_transposed = self.key.pack_transposed(depth, width);
+        let value_transposed = self.value.pack_transposed(depth, width);
+        let key = self.key.pack(depth, width);
+        let mut out = [asking, seen, seen].map(|tokens| vec![0.0; tokens * depth]);
+        let block = self.shape.block();
+        for first in (0..asking).step_by(block) {
+            let query = self.query.from(first, block);
+            let gradient = self.gradient.from(first, block);
+            let scores = Scores {
+                query,
+                key: &key_transposed,
+                first,
+                shape: self.shape,
+            };
+            let weights = scores.softmax(simd);
+            let mut slopes = vec![0.0; weights.len()];
+            let mut target = rows_of(&mut slopes, seen, false);
+            multiply(simd, &gradient, depth, &value_transposed, &mut target);
+            through_softmax(&weights, &mut slopes, seen, self.shape.scale());
+
+            let [dquery, dkey, dvalue] = &mut out;
+            let rows = matrix(&slopes, seen);
+            let mut target = rows_of(&mut dquery[first * depth..], depth, false);
+            multiply(simd, &rows, seen, &key, &mut target);
+            for (left, right, out) in [(&slopes, query, dkey), (&weights, gradient, dvalue)] {
+                let left = transpose(left, seen);
+                let right = right.pack(depth, width);
+                let mut target = rows_of(out, depth, true);
+                multiply(
+                    simd,
+                    &matrix(&left, query.count),
+                    query.count,
+                    &right,
+                    &mut target,
+                );
+            }
+        }
+        out
+    }
+}
+
+fn matrix(values: &[f32], columns: usize) -> Rows<'_> {
+    Rows {
+        values,
+        step: columns,
+        count: values.len() / columns,
+    }
+}
+
+fn rows_of(values: &mut [f32], columns: usize, add: bool) -> Target<'_> {
+    Target {
+        values,
+        step: columns,
+        columns,
+        add,
+    }
+}
+
+/// From the gradient to the weights to the gradient to the scores before they were scaled.
+#[inline(always)]
+fn through_softmax(weights: &[f32], slopes: &mut [f32], seen: usize, scale: f32) {
+    let rows = weights
+        .chunks_exact(seen)
+        .zip(slopes.chunks_exact_mut(seen));
+    for (weights, slopes) in rows {
+        let mean = dot(weights, slopes);
+        for (slope, weight) in slopes.iter_mut().zip(weights) {
+            *slope = scale * weight * (*slope - mean);
+        }
+    }
+}
+
+/// Sum of products, in 16 parts.
+#[inline(always)]
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let ((a_chunks, a_rest), (b_chunks, b_rest)) = (a.as_chunks::<16>(), b.as_chunks::<16>());
+    let mut parts = [0.0_f32; 16];
+    for (a, b) in a_chunks.iter().zip(b_chunks) {
+        for i in 0..16 {
+            parts[i] += a[i] * b[i];
+        }
+    }
+    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    parts.iter().sum::<f32>() + rest
+}
+
+/// `[rows, columns]` to `[columns, rows]`.
+fn transpose(values: &[f32], columns: usize) -> Vec<f32> {
+    const SQUARE: usize = 8;
+    let rows = values.len() / columns;
+    let mut out = vec![0.0; values.len()];
+    for first in (0..columns).step_by(SQUARE) {
+        let end = columns.min(first + SQUARE);
+        for (i, row) in values.chunks_exact(columns).enumerate() {
+            for (j, value) in row[first..end].iter().enumerate() {
+                out[(first + j) * rows + i] = *value;
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nn::kernels::noise;
+
+    /// The formula in f64.
+    fn exact([q, k, v]: [&[f64]; 3], shape: &Shape) -> Vec<f64> {
+        let ([asking, seen], channels, depth) = (shape.tokens, shape.channels, shape.depth());
+        let mut out = vec![0.0; q.len()];
+        for n in 0..shape.batch {
+            for (i, head) in (0..asking).flat_map(|i| (0..shape.heads).map(move |h| (i, h))) {
+                let row = |x: &[f64], tokens: usize, i: usize| {
+                    x[(n * tokens + i) * channels + head * depth..][..depth].to_vec()
+                };
+                let query = row(q, asking, i);
+                let visible = if shape.causal { seen.min(i + 1) } else { seen };
+                let score = |j: usize| {
+                    let products = query.iter().zip(row(k, seen, j)).map(|(a, b)| a * b);
+                    products.sum::<f64>() / (depth as f64).sqrt()
+                };
+                let scores: Vec<f64> = (0..visible).map(score).collect();
+                let max = scores.iter().copied().fold(f64::MIN, f64::max);
+                let total: f64 = scores.iter().map(|s| (s - max).exp()).sum();
+                for (j, s) in scores.iter().enumerate() {
+                    let at = (n * asking + i) * channels + head * depth;
+                    for (out, v) in out[at..].iter_mut().zip(row(v, seen, j)) {
+                        *out += (s - max).exp() / total * v;
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    fn wide(values: &[f32]) -> Vec<f64> {
+        values.iter().map(|&v| f64::from(v)).collect()
+    }
+
+    fn inputs(shape: &Shape, size: f32) -> [Vec<f32>; 3] {
+        let [asking, seen] = shape.tokens.map(|t| shape.batch * t * shape.channels);
+        [(asking, 1), (seen, 2), (seen, 3)]
+            .map(|(count, seed)| noise(count, seed).iter().map(|v| size * v).collect())
+    }
+
+    const SHAPES: [(usize, usize, usize, [usize; 2], bool); 5] = [
+        (2, 3, 15, [7, 11], false),
+        (1, 2, 34, [65, 77], false),
+        (2, 1, 8, [9, 9], true),
+        (1, 4, 4, [1, 1], false),
+        (1, 1, 3, [13, 4100], false),
+    ];
+
+    fn shape(
+        (batch, heads, channels, tokens, causal): (usize, usize, usize, [usize; 2], bool),
+    ) -> Shape {
+        Shape {
+            batch,
+            heads,
+            channels,
+            tokens,
+            causal,
+        }
+    }
+
+    #[test]
+    fn values_are_those_of_the_formula() {
+        for shape in SHAPES.map(shape) {
+            let [q, k, v] = inputs(&shape, 4.0);
+            let ours = attend(&q, &k, &v, &shape);
+            let exact = exact([&wide(&q), &wide(&k), &wide(&v)], &shape);
+            for (ours, exact) in ours.iter().zip(exact) {
+                // Scores below 16 are off by 16 · 34 · 2⁻²⁴ at most, and so are the weights, relatively.
+                assert!(
+                    (f64::from(*ours) - exact).abs() < 2.0 * 16.0 * 34.0 * 6e-8,
+                    "{shape:?}"
+                );
+            }
+        }
+    }
+
+    /// Scores of ±10⁴: the largest wins, and nothing overflows.
+    #[test]
+    fn the_largest_score_wins() {
+        let shape = shape((1, 1, 1, [2, 2], false));
+        let ours = attend(&[100.0, -100.0], &[100.0, -100.0], &[3.0, 5.0], &shape);
+        assert!((ours[0] - 3.0).abs() < 1e-6 && (ours[1] - 5.0).abs() < 1e-6);
+    }
+
+    /// Gradients against central differences of the formula in f64.
+    #[test]
+    fn gradients_are_differences() {
+        for shape in SHAPES[..4].iter().copied().map(shape) {
+            let inputs = inputs(&shape, 2.0);
+            let dy = noise(inputs[0].len(), 4);
+            let ours = gradients(inputs.each_ref().map(Vec::as_slice), &dy, &shape);
+            for (input, ours) in ours.iter().enumerate() {
+                for i in (0..ours.len()).step_by(1 + ours.len() / 40) {
+                    let at = |step: f64| {
+                        let mut moved = inputs.each_ref().map(|v| wide(v));
+                        moved[input][i] += step;
+                        let y = exact(moved.each_ref().map(Vec::as_slice), &shape);
+                        y.iter()
+                            .zip(&dy)
+                            .map(|(y, dy)| y * f64::from(*dy))
+                            .sum::<f64>()
+                    };
+                    let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+                    // Of order 1, sums of some hundred terms in f32.
+                    let error = (f64::from(ours[i]) - slope).abs();
+                    assert!(error < 1e-5, "{shape:?} {input} {i}: {} {slope}", ours[i]);
+                }
+            }
+        }
+    }
+}

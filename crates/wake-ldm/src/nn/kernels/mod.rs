@@ -1,0 +1,22 @@
+//! Arithmetic on plain slices for burn's CPU backend: convolutions and normalisations, forward and backward.
+//!
+//! Images are `[batch, channels, rows, columns]` in row-major order, as in a contiguous tensor.
+//! All cores work; every sum has a fixed order, whatever their number.
+
+pub(super) mod attention;
+pub(super) mod conv;
+pub(super) mod group_norm;
+mod product;
+mod silu;
+mod tile;
+
+/// Reproducible numbers between −½ and ½.
+#[cfg(test)]
+fn noise(count: usize, seed: u32) -> Vec<f32> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 24) as f32 - 0.5
+    };
+    (0..count).map(|_| next()).collect()
+}

@@ -1,0 +1,110 @@
+//! Products of small matrices: rows as they lie in memory, with columns packed by tiles.
+
+use pulp::Simd;
+
+use super::tile::{self, ROWS};
+
+/// Rows that are `step` apart in memory.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rows<'a> {
+    pub(super) values: &'a [f32],
+    pub(super) step: usize,
+    pub(super) count: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// Row `i`, or the last, from its first to its `length`th number.
+    fn get(&self, i: usize, length: usize) -> &'a [f32] {
+        &self.values[i.min(self.count - 1) * self.step..][..length]
+    }
+
+    /// The same rows from the `first` on, `count` at most.
+    pub(super) fn from(&self, first: usize, count: usize) -> Self {
+        Self {
+            values: &self.values[first * self.step..],
+            count: count.min(self.count - first),
+            ..*self
+        }
+    }
+
+    /// Packs the first `columns` columns of all rows: `[tile of columns, row, column]`.
+    pub(super) fn pack(&self, columns: usize, width: usize) -> Vec<f32> {
+        let mut packed = vec![0.0; columns.div_ceil(width) * self.count * width];
+        for (tile, packed) in packed.chunks_exact_mut(self.count * width).enumerate() {
+            let from = tile * width;
+            let to = columns.min(from + width);
+            for (i, packed) in packed.chunks_exact_mut(width).enumerate() {
+                packed[..to - from].copy_from_slice(&self.get(i, columns)[from..to]);
+            }
+        }
+        packed
+    }
+
+    /// Packs the transposed matrix: `[tile of rows, column, row]`.
+    pub(super) fn pack_transposed(&self, columns: usize, width: usize) -> Vec<f32> {
+        let mut packed = vec![0.0; self.count.div_ceil(width) * columns * width];
+        for (tile, packed) in packed.chunks_exact_mut(columns * width).enumerate() {
+            for i in 0..width.min(self.count - tile * width) {
+                let row = self.get(tile * width + i, columns);
+                for (value, packed) in row.iter().zip(packed.chunks_exact_mut(width)) {
+                    packed[i] = *value;
+                }
+            }
+        }
+        packed
+    }
+}
+
+/// Where a product goes: rows `step` apart, as many columns as wanted, in place of what was there or
+/// added to it.
+#[derive(Debug)]
+pub(super) struct Target<'a> {
+    pub(super) values: &'a mut [f32],
+    pub(super) step: usize,
+    pub(super) columns: usize,
+    pub(super) add: bool,
+}
+
+/// Multiplies rows with packed columns.
+///
+/// # Shapes
+///
+/// - `left`: `[rows, depth]`
+/// - `right`: `[tile, depth, width]`
+/// - `target`: `[rows, columns]`
+#[inline(always)]
+pub(super) fn multiply<S: Simd>(
+    simd: S,
+    left: &Rows<'_>,
+    depth: usize,
+    right: &[f32],
+    target: &mut Target<'_>,
+) {
+    let width = tile::width::<S>();
+    for (tile, right) in right.chunks_exact(depth * width).enumerate() {
+        let columns = tile * width..target.columns.min((tile + 1) * width);
+        for first in (0..left.count).step_by(ROWS) {
+            let mut rows = [left.values; ROWS];
+            for (i, row) in rows.iter_mut().enumerate() {
+                *row = left.get(first + i, depth);
+            }
+            let count = ROWS.min(left.count - first);
+            let out = target.values[first * target.step..]
+                .chunks_mut(target.step)
+                .take(count);
+            let mut sums = tile::start(simd, [0.0; ROWS]);
+            if target.add {
+                for (sum, out) in sums.iter_mut().zip(out) {
+                    *sum = tile::load(simd, &out[columns.clone()]);
+                }
+            }
+            tile::multiply(simd, rows, 0, right, &mut sums);
+            let out = target.values[first * target.step..]
+                .chunks_mut(target.step)
+                .take(count);
+            for (sum, out) in sums.into_iter().zip(out) {
+                tile::store::<S>(sum, &mut out[columns.clone()]);
+            }
+        }
+    }
+}
