@@ -10,7 +10,8 @@ use super::config::WakeModelConfig;
 use super::input::{Known, ModelInput, Words};
 use crate::autoencoder::patch::{depth_to_space, space_to_depth};
 use crate::conditioning::{FEATURES, PATCH, PLACES, WAVES};
-use crate::nn::{cast_to, conv1x1, conv3x3};
+use crate::nn::cast_to;
+use crate::nn::conv::{conv1x1, conv3x3, convolve};
 use crate::text::ClipText;
 use crate::unet::{UNet, UNetInput};
 
@@ -105,8 +106,8 @@ impl WakeModel {
     pub fn encode(&self, known: Known, context: Tensor<3>, summary: Tensor<2>) -> Encoded {
         let dtype = self.map_in.weight.val().dtype();
         let maps = cast_to(Tensor::cat(vec![known.waves, known.places], 1), dtype);
-        let maps = space_to_depth(silu(self.map_in.forward(maps)), self.fold);
-        let maps = self.map_out.forward(maps);
+        let maps = space_to_depth(silu(convolve(&self.map_in, maps)), self.fold);
+        let maps = convolve(&self.map_out, maps);
         Encoded {
             context,
             condition: Tensor::cat(vec![cast_to(known.numbers, dtype), summary], 1),

@@ -8,7 +8,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use serde_json::{Value, json};
 
 use super::checkpoint::{Checkpoint, Tensors};
-use super::latents::LatentSet;
+use super::latents::{Example, LatentSet};
 use super::loss::FlowDraw;
 use super::tensors::names;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
@@ -19,8 +19,12 @@ use crate::small::{Known, ModelInput, WakeModel, WakeModelConfig, Words};
 
 /// Stream of the noise that images are mixed with.
 const NOISE_STREAM: u32 = 2002;
-/// Stream that the order of the examples and their wordings are drawn from.
+/// Stream that the order of the examples is drawn from.
 const ORDER_STREAM: u32 = 2003;
+/// Stream that the wordings of prompts are drawn from.
+const WORDING_STREAM: u32 = 2004;
+/// Stream that the prompts to read are drawn from.
+const READ_STREAM: u32 = 2005;
 /// Places of the map that says where the wedge is.
 const WEDGE: usize = 5;
 /// Groups of a checkpoint's tensors.
@@ -31,6 +35,8 @@ const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
 pub struct DiffusionOptions {
     /// Images of a batch.
     pub batch: usize,
+    /// Prompts that are read for each image, beside its own: words are cheap, and slow to learn.
+    pub prompts: usize,
     /// Seed of everything that is drawn.
     pub seed: u64,
     /// How much more an error inside the wake's wedge counts.
@@ -43,6 +49,7 @@ impl Default for DiffusionOptions {
     fn default() -> Self {
         Self {
             batch: 16,
+            prompts: 4,
             seed: 0,
             wedge_weight: 1.0,
             trainer: TrainerOptions::default(),
@@ -80,6 +87,8 @@ struct Part {
     weights: Tensor<4>,
     known: Known,
     words: Words,
+    /// Other prompts, and the numbers that they state.
+    read: Words,
     said: Tensor<2>,
     grey: Tensor<2>,
 }
@@ -274,24 +283,16 @@ impl BatchMaker<'_> {
             .collect();
         let prompts: Vec<Vec<u32>> = (examples.iter().zip(&draws).zip(&positions))
             .map(|((example, draw), &position)| {
-                let wording = random.uniform(ORDER_STREAM, (1 << 40) + position);
-                let count = example.prompts.len();
-                let chosen = example.prompts.get((wording * count as f64) as usize);
-                chosen
-                    .filter(|_| draw.words)
-                    .map_or_else(|| self.nothing.to_vec(), Clone::clone)
+                let chosen = wording(random, example, position).filter(|_| draw.words);
+                chosen.map_or_else(|| self.nothing.to_vec(), Clone::clone)
             })
             .collect();
-        let said: Vec<f32> = (all.iter().zip(&draws))
-            .flat_map(|(c, draw)| said(c, draw.words))
-            .collect();
         let row = |numbers: Vec<f32>, width: usize| -> Tensor<2> {
-            Tensor::from_data(TensorData::new(numbers, [draws.len(), width]), device)
+            let rows = numbers.len() / width;
+            Tensor::from_data(TensorData::new(numbers, [rows, width]), device)
         };
-        let sources: Vec<NoiseSource> = positions
-            .iter()
-            .map(|&p| noise_of(self.options.seed, p))
-            .collect();
+        let (read, said) = self.reading(set, &positions);
+        let sources: Vec<NoiseSource> = positions.iter().map(|&p| noise_of(self.options.seed, p)).collect();
         let known = Known::new(&all, grid, device);
         Part {
             latents: set.latents(&indices, device),
@@ -300,37 +301,41 @@ impl BatchMaker<'_> {
             weights: wedge_weights(known.places.clone(), self.options.wedge_weight),
             known: known.only(row(shown, 1)),
             words: Words::new(&prompts, self.vocabulary, device),
+            read: Words::new(&read, self.vocabulary, device),
             said: row(said, FEATURES),
             grey: row(examples.iter().map(|e| e.grey).collect(), 1),
         }
     }
+
+    /// Prompts of any examples, and the features of what they state.
+    fn reading(&self, set: &LatentSet, positions: &[u64]) -> (Vec<Vec<u32>>, Vec<f32>) {
+        let random = NoiseSource::new(self.options.seed);
+        let count = self.options.prompts as u64;
+        let (mut prompts, mut said) = (Vec::new(), Vec::new());
+        for draw in positions.iter().flat_map(|&p| p * count..(p + 1) * count) {
+            let at = random.uniform(READ_STREAM, draw) * set.len() as f64;
+            let example = set.example(at as usize % set.len());
+            if let Some(prompt) = wording(random, example, draw) {
+                prompts.push(prompt.clone());
+                said.extend(features(&Conditions {
+                    ship_position: None,
+                    ..example.conditions
+                }));
+            }
+        }
+        (prompts, said)
+    }
+}
+
+/// One of the wordings of an example.
+fn wording(random: NoiseSource, example: &Example, position: u64) -> Option<&Vec<u32>> {
+    let draw = random.uniform(WORDING_STREAM, position);
+    example.prompts.get((draw * example.prompts.len() as f64) as usize)
 }
 
 /// The noise of one image of a run.
 fn noise_of(seed: u64, position: u64) -> NoiseSource {
     NoiseSource::new(seed ^ position.wrapping_mul(0x9E37_79B9_7F4A_7C15))
-}
-
-/// Features of what words say: all but the place of the ship.
-fn said(conditions: &Conditions, words: bool) -> Vec<f32> {
-    let spoken = Conditions {
-        ship_position: None,
-        ..*conditions
-    };
-    features(if words { &spoken } else { &const { nothing() } })
-}
-
-const fn nothing() -> Conditions {
-    Conditions {
-        ship: None,
-        ship_speed: None,
-        ship_heading: None,
-        ship_position: None,
-        wind_speed: None,
-        wind_toward: None,
-        fetch: None,
-        incidence: None,
-    }
 }
 
 /// The example at a position: each round through the set is another stride through it.
@@ -360,7 +365,8 @@ fn wedge_weights(places: Tensor<4>, weight: f64) -> Tensor<4> {
 /// The loss of a part, and its terms.
 fn loss(model: &WakeModel, part: Part) -> (Tensor<1>, Losses) {
     let (context, summary) = model.read(&part.words);
-    let words = (model.numbers(summary.clone()) - part.said).square().mean();
+    let (_, read) = model.read(&part.read);
+    let words = (model.numbers(read) - part.said).square().mean();
     let encoded = model.encode(part.known, context, summary);
     let grey = ((model.mean_grey(&encoded) - part.grey) * 10.0)
         .square()
@@ -379,5 +385,5 @@ fn loss(model: &WakeModel, part: Part) -> (Tensor<1>, Losses) {
         grey: number(&grey),
         words: number(&words),
     };
-    (flow + grey * 0.1 + words * 0.3, losses)
+    (flow + grey * 0.1 + words, losses)
 }

@@ -71,7 +71,7 @@ pub struct FineTune {
 impl FineTune {
     /// A run that changes all weights of the U-Net, on an autodiff device.
     pub fn whole(unet: UNet, frozen: Frozen, options: FineTuneOptions, device: &Device) -> Self {
-        let trainer = Trainer::new(unet, options.trainer, vec![device.clone()]);
+        let trainer = Trainer::new(unet.train(), options.trainer, vec![device.clone()]);
         Self::new(Learning::Whole(trainer), frozen, options, device)
     }
 
@@ -87,7 +87,7 @@ impl FineTune {
         options: FineTuneOptions,
         device: &Device,
     ) -> Result<Self> {
-        let unet = unet.fork(device).no_grad();
+        let unet = unet.no_grad().train().fork(device);
         let changes = LowRank::of_attentions(&unet, Layout::Diffusers, rank)?;
         let trainer = Trainer::new(changes, options.trainer, vec![device.clone()]);
         let learning = Learning::Changes(trainer, Box::new(unet));

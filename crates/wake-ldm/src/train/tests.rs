@@ -60,6 +60,7 @@ fn set() -> LatentSet {
 fn options(accumulation: usize) -> DiffusionOptions {
     DiffusionOptions {
         batch: 4,
+        prompts: 2,
         seed: 5,
         trainer: TrainerOptions {
             rate: Rate {
