@@ -2,7 +2,7 @@
 
 use super::spectrum::{PowerSpectrum, window};
 use super::{Measured, arms, stationary};
-use crate::labels::KELVIN_HALF_ANGLE;
+use crate::kelvin::KELVIN_ANGLE;
 use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 use serde::Serialize;
@@ -133,7 +133,7 @@ fn sector(raster: &Raster, position: [f64; 2], towards: f64) -> Field {
 #[must_use]
 pub fn kelvin_wedge(raster: &Raster, ship: &ShipPlace, heading: f64) -> Vec<bool> {
     let [ax, ay] = direction(heading);
-    let slope = KELVIN_HALF_ANGLE.tan();
+    let slope = KELVIN_ANGLE.tan();
     (0..raster.len())
         .map(|n| {
             let dx = raster.x(n % raster.columns) - ship.position[0];
