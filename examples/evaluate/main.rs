@@ -47,7 +47,7 @@ struct Arguments {
     /// Held-out scenes
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
     count: u32,
-    /// AlexNet weights of torchvision as safetensors, for LPIPS; without them LPIPS is left out
+    /// Weights of torchvision's alexnet as safetensors, for LPIPS; without them LPIPS is left out
     #[arg(long, value_name = "FILE", requires = "lpips_linear")]
     lpips_backbone: Option<PathBuf>,
     /// Linear weights of the package lpips as safetensors

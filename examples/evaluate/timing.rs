@@ -52,11 +52,15 @@ pub(crate) fn timings(model: Option<&dyn ImageSource>) -> Result<Vec<TimingRow>>
         .map(|size| {
             let mut scene = held_out(0);
             (scene.grid.rows, scene.grid.columns) = (size, size);
-            let fast = median(|| Ok(drop(simulate(&scene)?)))?;
+            let fast = median(|| {
+                simulate(&scene)?;
+                Ok(())
+            })?;
             let model = match model.filter(|_| size == SIZE) {
                 None => None,
                 Some(model) => Some(median(|| {
-                    Ok(drop(model.draw(std::slice::from_ref(&scene), Told::Both)?))
+                    model.draw(std::slice::from_ref(&scene), Told::Both)?;
+                    Ok(())
                 })?),
             };
             Ok(TimingRow {

@@ -14,20 +14,20 @@ use crate::error::{Error, Mismatch, Misshapen, Result};
 /// The network whose features are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LpipsNetwork {
-    /// AlexNet, the one that most papers report.
+    /// `AlexNet`, the one that most papers report.
     Alex,
-    /// SqueezeNet 1.1.
+    /// `SqueezeNet` 1.1.
     Squeeze,
 }
 
 /// One step of a network; features are taken after steps with `Tap`.
 #[derive(Clone, Copy)]
 enum Step {
-    /// Convolution and ReLU: number in torchvision's `features`, channels in and out, kernel, stride, padding.
+    /// Convolution and `ReLU`: number in torchvision's `features`, channels in and out, kernel, stride, padding.
     Conv(usize, [usize; 2], [usize; 3]),
     /// Squeeze and two expansions: number, channels in, squeezed, and of each expansion.
     Fire(usize, [usize; 3]),
-    /// Maximum over 3 × 3, stride 2; SqueezeNet's keeps the rest at the border.
+    /// Maximum over 3 × 3, stride 2; that of `SqueezeNet` keeps the rest at the border.
     Pool(bool),
     /// Features are compared here.
     Tap(usize),
@@ -178,14 +178,11 @@ impl Lpips {
         let mut weights = BTreeMap::new();
         let mut biases = BTreeMap::new();
         for (name, data) in read {
-            match name.strip_suffix(".weight") {
-                Some(layer) => {
-                    drop(weights.insert(layer.to_owned(), Tensor::from_data(data, device)))
-                }
-                None => {
-                    let layer = name.trim_end_matches(".bias").to_owned();
-                    biases.insert(layer, Tensor::from_data(data, device));
-                }
+            if let Some(layer) = name.strip_suffix(".weight") {
+                weights.insert(layer.to_owned(), Tensor::from_data(data, device));
+            } else {
+                let layer = name.trim_end_matches(".bias").to_owned();
+                biases.insert(layer, Tensor::from_data(data, device));
             }
         }
         let prefixed = format!("{}.", network.name());
@@ -263,7 +260,7 @@ impl Lpips {
         taps
     }
 
-    /// Convolution and ReLU.
+    /// Convolution and `ReLU`.
     fn convolution(&self, x: Tensor<4>, name: &str, stride: usize, padding: usize) -> Tensor<4> {
         let options = ConvOptions::new([stride; 2], [padding; 2], [1; 2], 1);
         relu(conv2d(
