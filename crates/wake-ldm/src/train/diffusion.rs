@@ -292,7 +292,10 @@ impl BatchMaker<'_> {
             Tensor::from_data(TensorData::new(numbers, [rows, width]), device)
         };
         let (read, said) = self.reading(set, &positions);
-        let sources: Vec<NoiseSource> = positions.iter().map(|&p| noise_of(self.options.seed, p)).collect();
+        let sources: Vec<NoiseSource> = positions
+            .iter()
+            .map(|&p| noise_of(self.options.seed, p))
+            .collect();
         let known = Known::new(&all, grid, device);
         Part {
             latents: set.latents(&indices, device),
@@ -330,7 +333,9 @@ impl BatchMaker<'_> {
 /// One of the wordings of an example.
 fn wording(random: NoiseSource, example: &Example, position: u64) -> Option<&Vec<u32>> {
     let draw = random.uniform(WORDING_STREAM, position);
-    example.prompts.get((draw * example.prompts.len() as f64) as usize)
+    example
+        .prompts
+        .get((draw * example.prompts.len() as f64) as usize)
 }
 
 /// The noise of one image of a run.
