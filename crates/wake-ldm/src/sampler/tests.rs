@@ -1,5 +1,7 @@
 //! The model in the crate, as a user calls it.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use burn::tensor::Device;
 use wake_physics::Scene;
 

@@ -111,9 +111,10 @@ mod tests {
     use burn::optim::{AdamWConfig, Optimizer};
     use burn::tensor::Device;
 
-    /// burn's own AdamW, an independent implementation, makes the same steps.
+    /// The steps are those of burn's optimizer, an independent implementation.
     #[test]
-    fn steps_are_those_of_burns_adamw() {
+    #[allow(clippy::redundant_clone, reason = "both optimisers start there")]
+    fn steps_are_those_of_burn() {
         let device = Device::flex();
         let options = AdamOptions::default();
         let oracle = AdamWConfig::new()

@@ -44,8 +44,8 @@ pub struct Frozen {
 /// What learns.
 #[derive(Debug)]
 enum Learning {
-    Whole(Trainer<UNet>),
-    Changes(Trainer<LowRank>, Box<UNet>),
+    Whole(Box<Trainer<UNet>>),
+    Changes(Box<Trainer<LowRank>>, Box<UNet>),
 }
 
 /// A run that fits a latent diffusion model to other images.
@@ -72,7 +72,7 @@ impl FineTune {
     /// A run that changes all weights of the U-Net, on an autodiff device.
     pub fn whole(unet: UNet, frozen: Frozen, options: FineTuneOptions, device: &Device) -> Self {
         let trainer = Trainer::new(unet.train(), options.trainer, vec![device.clone()]);
-        Self::new(Learning::Whole(trainer), frozen, options, device)
+        Self::new(Learning::Whole(Box::new(trainer)), frozen, options, device)
     }
 
     /// A run that leaves the U-Net as it is and learns changes of rank `rank` of its attentions.
@@ -90,7 +90,7 @@ impl FineTune {
         let unet = unet.no_grad().train().fork(device);
         let changes = LowRank::of_attentions(&unet, Layout::Diffusers, rank)?;
         let trainer = Trainer::new(changes, options.trainer, vec![device.clone()]);
-        let learning = Learning::Changes(trainer, Box::new(unet));
+        let learning = Learning::Changes(Box::new(trainer), Box::new(unet));
         Ok(Self::new(learning, frozen, options, device))
     }
 

@@ -224,7 +224,7 @@ impl WithSimd for Forward<'_> {
 ///
 /// # References
 ///
-/// Dao et al. (2022), "FlashAttention", appendix B.2.
+/// Dao et al. (2022), "`FlashAttention`", appendix B.2.
 pub(in crate::nn) fn gradients(
     [query, key, value]: [&[f32]; 3],
     gradient: &[f32],
