@@ -52,7 +52,7 @@ enum Stage {
 
 #[derive(Parser)]
 struct Options {
-    /// Folder that make_dataset wrote; without it, pairs are simulated first
+    /// Folder that `make_dataset` wrote; without it, pairs are simulated first
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Pairs to simulate where there is no --data
