@@ -31,7 +31,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         sampler = sampler.with_steps(steps)?;
     }
     let load = begin.elapsed().as_secs_f64();
-    let images = sample(&sampler, arguments)?;
+    let scene = arguments.scene.as_deref().map(Scene::read).transpose()?;
+    let images = sample(&sampler, arguments, scene.as_ref())?;
     let seconds = images[0].seconds;
     let total = begin.elapsed().as_secs_f64();
     std::fs::create_dir_all(&arguments.out)?;
@@ -42,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         format!("{:#}\n", json!(labels)),
     )?;
     let report = json!({
-        "prompt": prompt(arguments)?.0, "seed": arguments.seed, "steps": sampler.steps(),
+        "prompt": prompt(arguments, scene.as_ref())?, "seed": arguments.seed, "steps": sampler.steps(),
         "count": images.len(), "device": arguments.device, "weights": arguments.weights, "files": files,
         "seconds": {
             "load": load, "text": seconds.text, "denoise": seconds.denoise, "decode": seconds.decode,
@@ -66,13 +67,17 @@ fn refuse_options(arguments: &Arguments) -> Result<(), String> {
 }
 
 /// All images as one batch.
-fn sample(sampler: &WakeSampler, arguments: &Arguments) -> Result<Vec<WakeImage>, Box<dyn Error>> {
-    let Some(path) = &arguments.scene else {
-        let (prompt, _) = prompt(arguments)?;
-        return Ok(sampler.sample_many(&vec![prompt.as_str(); arguments.count], arguments.seed)?);
-    };
-    let scene = Scene::read(path)?;
-    Ok(sampler.sample_scenes(&vec![scene; arguments.count], arguments.seed)?)
+fn sample(
+    sampler: &WakeSampler,
+    arguments: &Arguments,
+    scene: Option<&Scene>,
+) -> Result<Vec<WakeImage>, Box<dyn Error>> {
+    let (count, seed) = (arguments.count, arguments.seed);
+    if let Some(scene) = scene {
+        return Ok(sampler.sample_scenes(&vec![scene.clone(); count], seed)?);
+    }
+    let prompt = prompt(arguments, None)?;
+    Ok(sampler.sample_many(&vec![prompt.as_str(); count], seed)?)
 }
 
 /// Writes each image, and all of them as one, and returns their names.
