@@ -28,7 +28,7 @@ struct Arguments {
     /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), or a TOML file of ranges
     #[arg(long, value_name = "NAME|FILE", default_value = "ranges")]
     grid: String,
-    /// Change one value of the recipe, such as speckle=true or draw.ranges.open_sea=0; may be repeated
+    /// Change one value of the recipe, such as speckle=true; may be repeated; keys: see docs/dataset.md
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Number of images of the whole set [default: 100; 3456 for the paper's grid]
@@ -82,7 +82,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     if arguments.json {
         let report = json!({
             "folder": folder, "images": there, "made": made, "seconds": seconds,
-            "images_per_second": made as f64 / seconds, "dataset": manifest,
+            "images_per_second": made as f64 / seconds, "shard": manifest.shard, "dataset": manifest,
         });
         println!("{report:#}");
     } else {

@@ -162,6 +162,17 @@ fn a_set_with_awkward_numbers_continues() {
     let folder = TempDir::new().unwrap();
     assert_eq!(made(folder.path(), &manifest), 4);
     assert_eq!(made(folder.path(), &manifest), 0);
+    let shards = TempDir::new().unwrap();
+    for number in 0..2 {
+        let shard = Shard { number, of: 2 };
+        let part = Manifest {
+            shard: Some(shard),
+            ..manifest.clone()
+        };
+        made(&shard_folder(shards.path(), shard), &part);
+    }
+    merge(shards.path()).unwrap();
+    assert_eq!(tree(shards.path()), tree(folder.path()));
 }
 
 #[test]
@@ -181,45 +192,88 @@ fn lost_files_are_made_again() {
     assert_eq!(tree(folder.path()), whole);
 }
 
-/// A merge that was killed after any of its moves, or while it cleaned up, ends as if it had not been.
-#[test]
-fn a_killed_merge_continues() {
-    let (whole, shards) = (whole(), TempDir::new().unwrap());
+/// The files of two shards of the set.
+fn two_shards() -> Tree {
+    let folder = TempDir::new().unwrap();
     for number in 0..2 {
         let shard = shard(number, 2);
         write(
-            &shard_folder(shards.path(), shard.shard.unwrap()),
+            &shard_folder(folder.path(), shard.shard.unwrap()),
             &shard,
             2,
             |_| (),
         )
         .unwrap();
     }
-    let start = tree(shards.path());
+    tree(folder.path())
+}
+
+/// A merge that was killed after any of its moves, or while it removed the shards, ends as if it had not been.
+#[test]
+fn a_killed_merge_continues() {
+    let (whole, start) = (whole(), two_shards());
+    let check = |left: &Tree, state: &str| {
+        let folder = TempDir::new().unwrap();
+        plant(folder.path(), left);
+        merge(folder.path()).unwrap();
+        assert_eq!(tree(folder.path()), whole, "{state}");
+        let shard = shard_folder(folder.path(), Shard { number: 1, of: 2 });
+        assert!(!shard.exists(), "{state}");
+    };
     let movable: Vec<&PathBuf> = start
         .keys()
         .filter(|p| p.components().count() == 3)
         .collect();
     assert_eq!(movable.len(), 2 * COUNT as usize);
-    for moved in 0..=movable.len() {
-        let folder = TempDir::new().unwrap();
-        let mut left = start.clone();
-        left.insert(
-            "dataset.json".into(),
-            whole[Path::new("dataset.json")].clone(),
-        );
-        for name in &movable[..moved] {
-            let content = left.remove(*name).unwrap();
-            left.insert(name.iter().skip(1).collect(), content);
-        }
-        if moved == movable.len() {
-            left.extend(whole.clone());
-            left.remove(Path::new("shard-0/coco.json"));
-        }
-        plant(folder.path(), &left);
-        merge(folder.path()).unwrap();
-        assert_eq!(tree(folder.path()), whole, "{moved} files moved");
+    let mut left = start.clone();
+    left.insert(
+        "dataset.json".into(),
+        whole[Path::new("dataset.json")].clone(),
+    );
+    for name in movable {
+        check(&left, &format!("before {}", name.display()));
+        let content = left.remove(name).unwrap();
+        left.insert(name.iter().skip(1).collect(), content);
     }
+    for name in ["metadata.jsonl", "coco.json", "data.yaml"] {
+        check(&left, &format!("before {name}"));
+        left.insert(name.into(), whole[Path::new(name)].clone());
+    }
+    let leftovers: Vec<PathBuf> = left
+        .keys()
+        .filter(|p| p.starts_with("shard-0"))
+        .cloned()
+        .collect();
+    assert_eq!(leftovers.len(), 5);
+    for name in [
+        "coco.json",
+        "data.yaml",
+        "metadata.jsonl",
+        "shard.json",
+        "dataset.json",
+    ] {
+        check(&left, &format!("before removing {name}"));
+        left.remove(&Path::new("shard-0").join(name));
+    }
+    check(&left, "without shard 0");
+}
+
+/// What only looks like a shard stays.
+#[test]
+fn a_merge_removes_nothing_foreign() {
+    let folder = TempDir::new().unwrap();
+    plant(folder.path(), &two_shards());
+    let other = Manifest {
+        seed: 99,
+        ..shard(0, 2)
+    };
+    let path = folder.path().join("shard-7");
+    write(&path, &other, 1, |_| ()).unwrap();
+    let before = tree(&path);
+    merge(folder.path()).unwrap();
+    assert_eq!(tree(&path), before);
+    assert_eq!(merge(folder.path()).unwrap(), manifest());
+    assert_eq!(tree(&path), before);
 }
 
 /// The message of an error, which must name the folder.

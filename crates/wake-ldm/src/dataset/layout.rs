@@ -3,18 +3,16 @@
 use super::recipe::Recipe;
 use super::scenes::Simulated;
 use crate::error::{Error, Result};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wake_physics::grey::GreyScale;
-use wake_physics::output;
 
 /// Version of the layout; a reader refuses others.
 const FORMAT: u32 = 1;
 
-/// What a data set is: the content of its `dataset.json`.
-///
-/// Every other file follows from it.
+/// What a data set is: the content of its `dataset.json`, from which every other file follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -24,13 +22,13 @@ pub struct Manifest {
     pub seed: u64,
     /// Number of pairs of the whole set.
     pub count: u64,
-    /// Which share of it this folder holds, if not all.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shard: Option<Shard>,
     /// The mapping from σ⁰ to grey.
     pub grey: GreyScale,
     /// Which scenes.
     pub recipe: Recipe,
+    /// Which share of the set this folder holds, if not all: the content of `shard.json`.
+    #[serde(skip)]
+    pub shard: Option<Shard>,
 }
 
 /// Share `number` of `of` equal ones, counted from 0.
@@ -92,6 +90,13 @@ impl Manifest {
         end(number)..end(number + 1)
     }
 
+    /// The content of `dataset.json`, the same for a set and all its shards.
+    pub(super) fn text(&self) -> Result<String> {
+        let text = serde_json::to_string_pretty(self);
+        let text = text.map_err(|e| cannot("encode", Path::new("dataset.json"), e.into()))?;
+        Ok(text + "\n")
+    }
+
     /// Reads the manifest of a folder; `None` if it has none.
     ///
     /// # Errors
@@ -99,22 +104,26 @@ impl Manifest {
     /// [`Error::Dataset`] if it is not the manifest of this layout.
     pub(super) fn read(folder: &Path) -> Result<Option<Self>> {
         let path = Layout(folder).manifest();
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(cannot("read", &path, e)),
+        let Some(mut manifest) = read_json::<Self>(&path)? else {
+            return Ok(None);
         };
-        let manifest: Self =
-            serde_json::from_str(&text).map_err(|e| broken(&path, e.line(), e.to_string()))?;
         if manifest.format != FORMAT {
             let message = format!("format {} is not {FORMAT}", manifest.format);
             return Err(broken(&path, 1, message));
         }
+        manifest.shard = read_json(&Layout(folder).shard_note())?;
         Ok(Some(manifest))
     }
+}
 
-    pub(super) fn write(&self, folder: &Path) -> Result<()> {
-        Ok(output::write_json(&Layout(folder).manifest(), self)?)
+/// Reads a JSON file; `None` if there is none.
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => serde_json::from_str(&text)
+            .map(Some)
+            .map_err(|e| broken(path, e.line(), e.to_string())),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(cannot("read", path, e)),
     }
 }
 
@@ -125,6 +134,10 @@ pub(super) struct Layout<'a>(pub(super) &'a Path);
 impl Layout<'_> {
     pub(super) fn manifest(self) -> PathBuf {
         self.0.join("dataset.json")
+    }
+
+    pub(super) fn shard_note(self) -> PathBuf {
+        self.0.join("shard.json")
     }
 
     pub(super) fn metadata(self) -> PathBuf {

@@ -74,7 +74,7 @@ pub(super) fn echo(manifest: &Manifest) -> bool {
 }
 
 /// A row as its line.
-pub(super) fn line(row: &Row) -> Result<String> {
+fn line(row: &Row) -> Result<String> {
     let text = serde_json::to_string(row);
     let text = text.map_err(|e| cannot("encode", Path::new(&row.file_name), e.into()))?;
     Ok(text + "\n")

@@ -1,8 +1,8 @@
 //! Joins the shards of a data set into the set that one run would have made.
 
 use super::layout::{Layout, Manifest, Shard, broken, cannot};
-use super::log::{Rows, line, parse};
-use super::write::{claim, finish};
+use super::log::{Rows, parse};
+use super::write::{claim, finish, is_text};
 use crate::error::Result;
 use std::path::{Path, PathBuf};
 use wake_physics::output;
@@ -17,64 +17,87 @@ pub fn shard_folder(folder: &Path, shard: Shard) -> PathBuf {
 ///
 /// # Errors
 ///
-/// [`Error::Dataset`](crate::Error::Dataset) if a shard is missing, unfinished or of another set; nothing is changed then.
+/// [`Error::Dataset`](crate::Error::Dataset) if a shard is missing, unfinished or of another set; nothing is changed
+/// then.
 pub fn merge(folder: &Path) -> Result<Manifest> {
+    if let Some(whole) = merged_before(folder)? {
+        remove_shards(folder)?;
+        return Ok(whole);
+    }
     let shards = shards(folder)?;
+    let (mut lines, mut rows) = (Vec::new(), Rows::new());
+    for (path, manifest) in &shards {
+        let (text, its_rows) = finished_rows(folder, path, manifest)?;
+        lines.extend(text);
+        rows.extend(its_rows);
+    }
     let whole = Manifest {
         shard: None,
         ..shards[0].1.clone()
     };
-    let mut rows = Rows::new();
-    for (path, manifest) in &shards {
-        rows.extend(finished_rows(folder, path, manifest)?);
-    }
-    claim(folder, &whole)?;
+    claim(folder, &manifest_text(&shards[0].0)?, None)?;
     for (path, manifest) in &shards {
         move_files(folder, path, manifest)?;
     }
-    let lines: Result<String> = rows.iter().map(|(_, row)| line(row)).collect();
-    output::write_atomically(&Layout(folder).metadata(), lines?.as_bytes())?;
+    output::write_atomically(&Layout(folder).metadata(), &lines)?;
     finish(folder, &whole, &rows)?;
-    for (path, _) in &shards {
-        remove(path)?;
-    }
+    remove_shards(folder)?;
     Ok(whole)
+}
+
+/// The set that an earlier merge finished but for removing the shards.
+fn merged_before(folder: &Path) -> Result<Option<Manifest>> {
+    let Some(whole) = Manifest::read(folder)? else {
+        return Ok(None);
+    };
+    let last = Layout(folder).yolo();
+    let metadata = std::fs::read(Layout(folder).metadata()).unwrap_or_default();
+    let lines = metadata.iter().filter(|&&b| b == b'\n').count();
+    let finished = last.is_file() && lines as u64 == whole.count;
+    Ok((finished && whole.shard.is_none()).then_some(whole))
+}
+
+/// The content of a `dataset.json`.
+fn manifest_text(folder: &Path) -> Result<String> {
+    let path = Layout(folder).manifest();
+    std::fs::read_to_string(&path).map_err(|e| cannot("read", &path, e))
 }
 
 /// Folder and manifest of every shard, in order; at least one.
 fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>> {
-    let first = shard_at(folder, 0, None)?;
+    let first = shard_at(folder, 0)?;
     let of = first.1.shard.map_or(1, |shard| shard.of);
+    let text = manifest_text(&first.0)?;
     let mut shards = vec![first];
     for number in 1..of {
-        let next = shard_at(folder, number, Some(&shards[0].1))?;
-        shards.push(next);
+        let (path, manifest) = shard_at(folder, number)?;
+        if manifest.shard != Some(Shard { number, of })
+            || !is_text(&Layout(&path).manifest(), &text)
+        {
+            let message = format!("not shard {number} of the same set as shard-0");
+            return Err(broken(&Layout(&path).manifest(), 1, message));
+        }
+        shards.push((path, manifest));
     }
     Ok(shards)
 }
 
-/// Shard `number` of a folder, which must be of the same set as the first.
-fn shard_at(folder: &Path, number: u64, first: Option<&Manifest>) -> Result<(PathBuf, Manifest)> {
+fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
     let path = Layout(folder).shard(Shard { number, of: 0 });
-    let Some(manifest) = Manifest::read(&path)? else {
-        let message = format!("shard {number} is missing; make it with --shard {number}/n");
-        return Err(broken(&path, 0, message));
-    };
-    let of = manifest.shard.map_or(0, |shard| shard.of);
-    let expected = Manifest {
-        shard: Some(Shard { number, of }),
-        ..first.unwrap_or(&manifest).clone()
-    };
-    let same_of = first.is_none_or(|first| first.shard.is_some_and(|shard| shard.of == of));
-    if manifest != expected || !same_of {
-        let message = format!("not shard {number} of the same set as shard-0");
-        return Err(broken(&Layout(&path).manifest(), 1, message));
+    match Manifest::read(&path)? {
+        Some(manifest) if manifest.shard.is_some_and(|shard| shard.number == number) => {
+            Ok((path, manifest))
+        }
+        Some(_) => Err(broken(&path, 0, format!("not shard {number}"))),
+        None => {
+            let message = format!("shard {number} is missing; make it with --shard {number}/n");
+            Err(broken(&path, 0, message))
+        }
     }
-    Ok((path, manifest))
 }
 
-/// The rows of a shard, all of them, with every file here or already moved.
-fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<Rows> {
+/// The lines of a shard and their rows, all of them, with every file here or already moved.
+fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec<u8>, Rows)> {
     let metadata = Layout(path).metadata();
     let text = std::fs::read(&metadata).map_err(|e| cannot("read", &metadata, e))?;
     let rows = parse(&metadata, &text, manifest)?;
@@ -95,7 +118,7 @@ fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<Rows
             }
         }
     }
-    Ok(rows)
+    Ok((text, rows))
 }
 
 fn move_files(folder: &Path, path: &Path, manifest: &Manifest) -> Result<()> {
@@ -109,21 +132,40 @@ fn move_files(folder: &Path, path: &Path, manifest: &Manifest) -> Result<()> {
     Ok(())
 }
 
-/// Removes what is left of a merged shard: only files that a shard has.
+/// Removes what is left of the shards of a set, and nothing else.
+fn remove_shards(folder: &Path) -> Result<()> {
+    let text = manifest_text(folder)?;
+    for entry in std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))? {
+        let path = entry.map_err(|e| cannot("read", folder, e))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let number = name
+            .strip_prefix("shard-")
+            .and_then(|n| n.parse::<u64>().ok());
+        let manifest = Layout(&path).manifest();
+        if number.is_some() && (is_text(&manifest, &text) || !manifest.exists()) {
+            remove(&path)?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes a shard without images: only files that a shard has.
 fn remove(path: &Path) -> Result<()> {
     let layout = Layout(path);
     let gone = |result: std::io::Result<()>| match result {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(cannot("remove", path, e)),
         _ => Ok(()),
     };
-    for file in [layout.coco(), layout.yolo()] {
-        gone(std::fs::remove_file(file))?;
-    }
     for inner in [layout.images(), layout.labels()] {
         gone(std::fs::remove_dir(inner))?;
     }
-    // The last two say that the shard was finished: without them a merge cannot be started again.
-    for file in [layout.metadata(), layout.manifest()] {
+    for file in [
+        layout.coco(),
+        layout.yolo(),
+        layout.metadata(),
+        layout.shard_note(),
+        layout.manifest(),
+    ] {
         gone(std::fs::remove_file(file))?;
     }
     gone(std::fs::remove_dir(path))

@@ -1,7 +1,7 @@
 //! Makes a data set in a folder, or what is missing of it.
 
 use super::coco::Coco;
-use super::layout::{Layout, Manifest, broken, cannot};
+use super::layout::{Layout, Manifest, Shard, broken, cannot};
 use super::log::{Log, Rows, echo};
 use super::ordered::Ordered;
 use super::row::Row;
@@ -36,7 +36,7 @@ pub fn write(
     jobs: usize,
     mut watch: impl FnMut(Progress),
 ) -> Result<()> {
-    claim(folder, manifest)?;
+    claim(folder, &manifest.text()?, manifest.shard)?;
     let mut log = Log::open(folder, manifest)?;
     let missing = missing(folder, manifest, log.rows.len());
     let total = manifest.indices().end - manifest.indices().start;
@@ -59,17 +59,24 @@ pub fn write(
     finish(folder, manifest, &log.finish()?)
 }
 
-/// Takes a folder that is empty, or that an earlier run of the same manifest began.
-pub(super) fn claim(folder: &Path, manifest: &Manifest) -> Result<()> {
+/// Takes a folder that is empty, or that an earlier run began for the same `dataset.json` and shard.
+pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Result<()> {
     output::make_folder(folder)?;
     let layout = Layout(folder);
+    let path = layout.manifest();
     match Manifest::read(folder)? {
-        Some(found) if found == *manifest => {}
+        // Texts are compared: numbers that went through JSON may differ in their last bit.
+        Some(found) if found.shard == shard && is_text(&path, manifest) => {}
         Some(_) => {
             let message = "made with another recipe, seed, count or shard; choose another folder";
-            return Err(broken(&layout.manifest(), 1, message));
+            return Err(broken(&path, 1, message));
         }
-        None if is_empty(folder)? => manifest.write(folder)?,
+        None if is_free(folder, shard)? => {
+            if let Some(shard) = shard {
+                output::write_json(&layout.shard_note(), &shard)?;
+            }
+            output::write_atomically(&path, manifest.as_bytes())?;
+        }
         None => {
             let message = "no data set, but not empty either; choose another folder";
             return Err(broken(folder, 0, message));
@@ -83,14 +90,21 @@ pub(super) fn claim(folder: &Path, manifest: &Manifest) -> Result<()> {
         .try_for_each(sweep)
 }
 
-fn is_empty(folder: &Path) -> Result<bool> {
+/// Whether a file has exactly this content.
+pub(super) fn is_text(path: &Path, text: &str) -> bool {
+    std::fs::read(path).is_ok_and(|found| found == text.as_bytes())
+}
+
+/// Whether a folder holds nothing but what a run may have left before its `dataset.json`: shards, the note of its own
+/// shard, files half-written.
+fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
     let mut entries = std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))?;
-    // What `make_dataset` itself may have left: shards, and files half-written.
     Ok(entries.all(|entry| {
         entry.is_ok_and(|e| {
             let name = e.file_name();
             let name = name.to_string_lossy();
-            name.starts_with("shard-") || is_temporary(&name)
+            let own_note = shard.is_some() && name == "shard.json";
+            own_note || name.starts_with("shard-") || is_temporary(&name)
         })
     }))
 }

@@ -1,0 +1,54 @@
+"""Reads a folder of make_dataset with the libraries that it is made for.
+
+    pip install datasets pillow pycocotools
+    python tests/foreign/read_dataset.py out/make_dataset
+"""
+
+import json
+import pathlib
+import sys
+
+from datasets import load_dataset
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+folder = pathlib.Path(sys.argv[1])
+lines = [json.loads(line) for line in (folder / "metadata.jsonl").open()]
+grid = json.loads((folder / "dataset.json").read_text())["recipe"]["scene"]["grid"]
+
+data = load_dataset("imagefolder", data_dir=str(folder))["train"]
+assert len(data) == len(lines), (len(data), len(lines))
+for row, line in zip(data, lines):
+    assert row["text"] == line["text"]
+    assert row["image"].size == (grid["columns"], grid["rows"]), row["image"].size
+    assert row["image"].mode == "L"
+    for key in line.keys() - {"file_name", "objects"}:
+        assert row[key] == line[key], (key, row[key], line[key])
+    assert row["objects"]["bbox"] == line["objects"]["bbox"]
+print(len(data), "rows:", ", ".join(data.column_names))
+
+coco = COCO(str(folder / "coco.json"))
+boxes = [box for line in lines for box in line["objects"]["bbox"]]
+assert len(coco.imgs) == len(lines) and len(coco.anns) == len(boxes)
+for image in coco.imgs.values():
+    assert (folder / image["file_name"]).is_file()
+
+# The labels as detections must score 1.
+perfect = [dict(annotation, score=1.0) for annotation in coco.anns.values()]
+evaluation = COCOeval(coco, coco.loadRes(perfect), "bbox")
+evaluation.evaluate()
+evaluation.accumulate()
+evaluation.summarize()
+assert evaluation.stats[0] > 0.9999, evaluation.stats
+
+# The YOLO boxes are the same boxes.
+for index, line in enumerate(lines):
+    name = pathlib.Path(line["file_name"]).with_suffix(".txt").name
+    found = [[float(v) for v in text.split()] for text in (folder / "labels" / name).open()]
+    assert len(found) == len(line["objects"]["bbox"])
+    for (kind, x, y, w, h), box, category in zip(found, line["objects"]["bbox"], line["objects"]["categories"]):
+        assert kind == category
+        corner = [(x - w / 2) * grid["columns"], (y - h / 2) * grid["rows"]]
+        size = [w * grid["columns"], h * grid["rows"]]
+        assert all(abs(a - b) < 1e-3 for a, b in zip(corner + size, box)), (index, found, box)
+print("COCO and YOLO agree:", len(boxes), "boxes")
