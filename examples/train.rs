@@ -176,7 +176,10 @@ fn fit(
     let rows: Vec<_> = (1..=64)
         .map(|c| json!({"channels": c, "variance": shares.kept(c), "psnr_db": finite(shares.psnr(c))}))
         .collect();
-    std::fs::write(options.out.join("shares.json"), format!("{:#}\n", json!(rows)))?;
+    std::fs::write(
+        options.out.join("shares.json"),
+        format!("{:#}\n", json!(rows)),
+    )?;
     Ok((transform, shares))
 }
 
@@ -297,7 +300,11 @@ fn begin(
     };
     let autodiff = |device: &Device| {
         let device = device.clone().autodiff();
-        if options.checkpointing { device.gradient_checkpointing() } else { device }
+        if options.checkpointing {
+            device.gradient_checkpointing()
+        } else {
+            device
+        }
     };
     let devices = devices.iter().map(autodiff).collect();
     let run = Diffusion::new(config.clone(), constants, tokens(""), devices)?;
@@ -312,7 +319,9 @@ fn begin(
 
 /// Simulated images above, generated ones of the same prompts below.
 fn sheet(sampler: &WakeSampler, source: &Source, path: &Path) -> Result<(), Box<dyn Error>> {
-    let pairs: Vec<Pair> = (0..SHEET).map(|i| source.pair(i)).collect::<wake_ldm::Result<_>>()?;
+    let pairs: Vec<Pair> = (0..SHEET)
+        .map(|i| source.pair(i))
+        .collect::<wake_ldm::Result<_>>()?;
     let prompts: Vec<&str> = pairs.iter().map(|pair| pair.prompt.as_str()).collect();
     let drawn = sampler.sample_many(&prompts, 0)?;
     let size = pairs[0].image.rows as u32;

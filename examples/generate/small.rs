@@ -37,7 +37,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&arguments.out)?;
     let files = write_images(&images, &arguments.out)?;
     let labels: Vec<_> = images.iter().map(|image| &image.labels).collect();
-    std::fs::write(arguments.out.join("labels.json"), format!("{:#}\n", json!(labels)))?;
+    std::fs::write(
+        arguments.out.join("labels.json"),
+        format!("{:#}\n", json!(labels)),
+    )?;
     let report = json!({
         "prompt": prompt(arguments)?.0, "seed": arguments.seed, "steps": sampler.steps(),
         "count": images.len(), "device": arguments.device, "weights": arguments.weights, "files": files,
@@ -52,7 +55,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 /// The small model has one sampler and no guidance.
 fn refuse_options(arguments: &Arguments) -> Result<(), String> {
     if arguments.scheduler.is_some() || !arguments.negative.is_empty() {
-        return Err("--scheduler and --negative are for models in diffusers layout; give --weights".into());
+        return Err(
+            "--scheduler and --negative are for models in diffusers layout; give --weights".into(),
+        );
     }
     if !(1..=256).contains(&arguments.count) {
         return Err(format!("--count is {}, outside [1, 256]", arguments.count));
@@ -74,7 +79,13 @@ fn sample(sampler: &WakeSampler, arguments: &Arguments) -> Result<Vec<WakeImage>
 fn write_images(images: &[WakeImage], out: &Path) -> Result<Vec<String>, Box<dyn Error>> {
     let save = |name: &str, levels: &[u8], columns: usize| {
         let rows = levels.len() / columns;
-        image::save_buffer(out.join(name), levels, columns as u32, rows as u32, image::ColorType::L8)
+        image::save_buffer(
+            out.join(name),
+            levels,
+            columns as u32,
+            rows as u32,
+            image::ColorType::L8,
+        )
     };
     let size = images[0].grey.columns;
     if let [image] = images {

@@ -27,7 +27,7 @@ pub mod train;
 #[cfg(feature = "flex")]
 mod self_check;
 
-pub use sampler::WakeSampler;
 pub use error::{Error, Mismatch, Misshapen, Result};
+pub use sampler::WakeSampler;
 #[cfg(feature = "flex")]
 pub use self_check::self_check;

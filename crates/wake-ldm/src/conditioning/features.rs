@@ -27,7 +27,11 @@ pub const FEATURES: usize =
 pub fn features(conditions: &Conditions) -> Vec<f32> {
     let mut out = Vec::with_capacity(FEATURES);
     out.push(if conditions.ship.is_some() { 1.0 } else { 0.0 });
-    out.push(if conditions.ship == Some(true) { 1.0 } else { 0.0 });
+    out.push(if conditions.ship == Some(true) {
+        1.0
+    } else {
+        0.0
+    });
     push_number(&mut out, conditions.ship_speed, 0.0, 16.0);
     let place = conditions.ship_position;
     push_number(&mut out, place.map(|p| p[0]), -512.0, 512.0);
@@ -105,9 +109,14 @@ mod tests {
             ..full()
         };
         let (a, b) = (features(&full()), features(&louder));
-        let changed: Vec<usize> = (0..FEATURES).filter(|&i| (a[i] - b[i]).abs() > 1e-6).collect();
+        let changed: Vec<usize> = (0..FEATURES)
+            .filter(|&i| (a[i] - b[i]).abs() > 1e-6)
+            .collect();
         let start = 2 + 3 * (2 + 2 * WAVES_PER_NUMBER);
-        assert!(changed.iter().all(|&i| (start..start + 10).contains(&i)), "{changed:?}");
+        assert!(
+            changed.iter().all(|&i| (start..start + 10).contains(&i)),
+            "{changed:?}"
+        );
         assert!(changed.len() >= 8);
     }
 }

@@ -178,7 +178,10 @@ impl Frame {
         let from_stern = [along + 0.5 * SHIP_LENGTH, across];
         let waves = self.waves(from_stern, spacing);
         let k = |i: usize, axis: usize| {
-            let resolved = waves.as_ref().map(|waves| &waves[i]).filter(|wave| wave.envelope > 0.0);
+            let resolved = waves
+                .as_ref()
+                .map(|waves| &waves[i])
+                .filter(|wave| wave.envelope > 0.0);
             resolved.map_or(0.0, |wave| wave.wavenumber[axis] * 10.0)
         };
         let distance = along.hypot(across);

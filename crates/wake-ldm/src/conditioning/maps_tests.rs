@@ -35,7 +35,8 @@ fn elevation(speed: f64, heading: f64, position: [f64; 2]) -> Vec<f32> {
         },
         ..Scene::default()
     };
-    (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (GRID.size, GRID.size, GRID.spacing);
+    (scene.grid.rows, scene.grid.columns, scene.grid.spacing) =
+        (GRID.size, GRID.size, GRID.spacing);
     simulate(&scene).unwrap().elevation.values
 }
 
@@ -54,13 +55,24 @@ fn best_correlation(columns: &[Vec<f64>], field: &[f64]) -> f64 {
         .collect();
     for i in 0..n {
         let pivot = rows[i].clone();
-        for row in rows.iter_mut().enumerate().filter(|(k, _)| *k != i).map(|(_, row)| row) {
+        for row in rows
+            .iter_mut()
+            .enumerate()
+            .filter(|(k, _)| *k != i)
+            .map(|(_, row)| row)
+        {
             let factor = row[i] / pivot[i];
-            row.iter_mut().zip(&pivot).for_each(|(x, p)| *x -= factor * p);
+            row.iter_mut()
+                .zip(&pivot)
+                .for_each(|(x, p)| *x -= factor * p);
         }
     }
     let sum: Vec<f64> = (0..field.len())
-        .map(|p| (0..n).map(|i| rows[i][n] / rows[i][i] * columns[i][p]).sum())
+        .map(|p| {
+            (0..n)
+                .map(|i| rows[i][n] / rows[i][i] * columns[i][p])
+                .sum()
+        })
         .collect();
     dot(&sum, field) / (dot(&sum, &sum) * dot(field, field)).sqrt()
 }
@@ -93,19 +105,25 @@ fn a_sum_of_the_maps_is_nearly_the_simulators_wake() {
         let conditions = known(speed, heading, position);
         let pixels = wedge(&conditions);
         assert!(pixels.len() > 500, "{} pixels", pixels.len());
-        let chosen = |values: &[f32]| -> Vec<f64> {
-            pixels.iter().map(|&p| f64::from(values[p])).collect()
-        };
+        let chosen =
+            |values: &[f32]| -> Vec<f64> { pixels.iter().map(|&p| f64::from(values[p])).collect() };
         let field = chosen(&elevation(speed, heading, position));
         let columns = |conditions: &Conditions| -> Vec<Vec<f64>> {
             let maps = WakeMaps::new(conditions, GRID);
-            maps.waves.chunks(GRID.size * GRID.size).take(WAVES - 1).map(chosen).collect()
+            maps.waves
+                .chunks(GRID.size * GRID.size)
+                .take(WAVES - 1)
+                .map(chosen)
+                .collect()
         };
         // The wake of a hull is the sum of waves from bow and stern, each with an amplitude that varies slowly
         // over the wedge: a sum with constant factors misses little.
         assert!(field.iter().all(|x| x.is_finite()));
         let correlation = best_correlation(&columns(&conditions), &field);
-        assert!(correlation > 0.9, "{speed} m/s toward {heading}: {correlation}");
+        assert!(
+            correlation > 0.9,
+            "{speed} m/s toward {heading}: {correlation}"
+        );
         // Crests of another speed stand elsewhere.
         let other = best_correlation(&columns(&known(1.2 * speed, heading, position)), &field);
         assert!(other < 0.6, "{speed} m/s toward {heading}: {other}");
@@ -128,7 +146,12 @@ fn no_track_no_maps() {
     ];
     for conditions in unknown {
         let maps = WakeMaps::new(&conditions, GRID);
-        assert!(maps.waves.iter().chain(&maps.places).all(|x| x.abs() < f32::MIN_POSITIVE));
+        assert!(
+            maps.waves
+                .iter()
+                .chain(&maps.places)
+                .all(|x| x.abs() < f32::MIN_POSITIVE)
+        );
     }
 }
 

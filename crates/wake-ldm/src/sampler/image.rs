@@ -39,7 +39,11 @@ impl WakeImage {
     pub(super) fn new(grey: Field, scene: &Scene, seconds: SampleSeconds) -> Self {
         let scale = GreyScale::default();
         let intensity = Field {
-            values: grey.values.iter().map(|&g| scale.sigma0(f64::from(g)) as f32).collect(),
+            values: grey
+                .values
+                .iter()
+                .map(|&g| scale.sigma0(f64::from(g)) as f32)
+                .collect(),
             ..grey.clone()
         };
         let mut speckled = intensity.clone();
@@ -57,6 +61,10 @@ impl WakeImage {
     /// The speckled image as 8-bit levels of grey, row after row.
     pub fn levels(&self) -> Vec<u8> {
         let scale = GreyScale::default();
-        self.speckled.values.iter().map(|&v| scale.level(f64::from(v))).collect()
+        self.speckled
+            .values
+            .iter()
+            .map(|&v| scale.level(f64::from(v)))
+            .collect()
     }
 }

@@ -58,7 +58,11 @@ impl WakeSampler {
     /// # Errors
     ///
     /// As [`WakeModelConfig::validate`].
-    pub fn new(model: WakeModel, transform: PatchTransform, config: WakeModelConfig) -> Result<Self> {
+    pub fn new(
+        model: WakeModel,
+        transform: PatchTransform,
+        config: WakeModelConfig,
+    ) -> Result<Self> {
         config.validate()?;
         let device = model.devices().into_iter().next().unwrap_or_default();
         Ok(Self {
@@ -129,7 +133,11 @@ impl WakeSampler {
         }
         let seeds: Vec<u64> = scenes.iter().map(|scene| scene.seed).collect();
         let mut drawn = self.run(&inputs, &seeds, begin)?;
-        Ok(scenes.iter().enumerate().map(|(k, scene)| drawn.finish(k, scene)).collect())
+        Ok(scenes
+            .iter()
+            .enumerate()
+            .map(|(k, scene)| drawn.finish(k, scene))
+            .collect())
     }
 
     /// An image of each scene; image k has the seed `seed + k`.
@@ -166,7 +174,9 @@ impl WakeSampler {
         let begin = Instant::now();
         let inputs = scenes.iter().map(|scene| self.input(scene));
         let inputs: Vec<(Conditions, String)> = inputs.collect::<Result<_>>()?;
-        let seeds: Vec<u64> = (0..scenes.len() as u64).map(|k| seed.wrapping_add(k)).collect();
+        let seeds: Vec<u64> = (0..scenes.len() as u64)
+            .map(|k| seed.wrapping_add(k))
+            .collect();
         self.run(&inputs, &seeds, begin)
     }
 
@@ -174,11 +184,19 @@ impl WakeSampler {
     fn input(&self, scene: &Scene) -> Result<(Conditions, String)> {
         let grid = &scene.grid;
         let size = self.config.image_size;
-        if [grid.rows, grid.columns] != [size, size] || (grid.spacing - self.config.spacing).abs() > 1e-9 {
+        if [grid.rows, grid.columns] != [size, size]
+            || (grid.spacing - self.config.spacing).abs() > 1e-9
+        {
             return Err(Error::InvalidOption {
                 option: "grid".to_owned(),
-                value: format!("{} × {} pixels of {} m", grid.rows, grid.columns, grid.spacing),
-                expected: format!("{size} × {size} pixels of {} m, as the model draws them", self.config.spacing),
+                value: format!(
+                    "{} × {} pixels of {} m",
+                    grid.rows, grid.columns, grid.spacing
+                ),
+                expected: format!(
+                    "{size} × {size} pixels of {} m, as the model draws them",
+                    self.config.spacing
+                ),
             });
         }
         Ok((conditions_of(scene), Wording::Paper.prompt(scene)?))
@@ -193,7 +211,10 @@ impl WakeSampler {
         let latents = self.denoise(&encoded, seeds);
         wait_for(&latents);
         seconds.denoise = begin.elapsed().as_secs_f64() - seconds.text;
-        let grey = self.transform.decode(latents, self.model.mean_grey(&encoded)).clamp(0.0, 1.0);
+        let grey = self
+            .transform
+            .decode(latents, self.model.mean_grey(&encoded))
+            .clamp(0.0, 1.0);
         let pixels: Vec<f32> = grey.to_data().iter::<f32>().collect();
         seconds.total = begin.elapsed().as_secs_f64();
         seconds.decode = seconds.total - seconds.text - seconds.denoise;
@@ -210,7 +231,13 @@ impl WakeSampler {
         let tokens = |text: &str| Tokenizer::clip().encode(text).ids.to_vec();
         let conditions: Vec<Conditions> = inputs
             .iter()
-            .map(|(known, _)| if self.told == Told::Words { Conditions::default() } else { *known })
+            .map(|(known, _)| {
+                if self.told == Told::Words {
+                    Conditions::default()
+                } else {
+                    *known
+                }
+            })
             .collect();
         let prompts: Vec<Vec<u32>> = inputs
             .iter()
@@ -222,7 +249,11 @@ impl WakeSampler {
         };
         let words = Words::new(&prompts, &self.vocabulary, &self.device);
         let (context, summary) = self.model.read(&words);
-        self.model.encode(Known::new(&conditions, grid, &self.device), context, summary)
+        self.model.encode(
+            Known::new(&conditions, grid, &self.device),
+            context,
+            summary,
+        )
     }
 
     /// Euler's steps along the flow, equal in σ.

@@ -25,8 +25,18 @@ impl WakeSampler {
         let config = WakeModelConfig::from_json(config, Path::new(CONFIG))?;
         let patches = PatchTransform::zeros(config.latent_channels, device);
         let (model, layout) = (config.init(device), Layout::Diffusers);
-        let model = load_bytes(model, layout, MODEL, include_bytes!("../../assets/model.safetensors"))?;
-        let patches = load_bytes(patches, layout, PATCHES, include_bytes!("../../assets/patches.safetensors"))?;
+        let model = load_bytes(
+            model,
+            layout,
+            MODEL,
+            include_bytes!("../../assets/model.safetensors"),
+        )?;
+        let patches = load_bytes(
+            patches,
+            layout,
+            PATCHES,
+            include_bytes!("../../assets/patches.safetensors"),
+        )?;
         Self::new(model, patches, config)
     }
 

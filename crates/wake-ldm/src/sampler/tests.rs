@@ -32,8 +32,14 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     let variance = ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / ratios.len() as f64;
     // Speckle has mean 1 and variance 1/looks; 65,536 pixels give both to five standard errors.
-    assert!((mean - 1.0).abs() < 5.0 / (looks * 65536.0).sqrt(), "{mean}");
-    assert!((variance * looks - 1.0).abs() < 5.0 * (12.0f64 / 65536.0).sqrt(), "{variance}");
+    assert!(
+        (mean - 1.0).abs() < 5.0 / (looks * 65536.0).sqrt(),
+        "{mean}"
+    );
+    assert!(
+        (variance * looks - 1.0).abs() < 5.0 * (12.0f64 / 65536.0).sqrt(),
+        "{variance}"
+    );
     let seconds = image.seconds;
     assert!(seconds.total >= seconds.text.max(seconds.denoise).max(seconds.decode));
 }
@@ -57,12 +63,21 @@ fn an_image_is_the_same_alone_and_in_a_batch_and_differs_by_seed() {
 fn words_and_numbers_each_move_the_image() {
     let sampler = sampler();
     let grey = |told: Told, prompt: &str| {
-        sampler.clone().with_told(told).sample(prompt, 1).unwrap().grey.values
+        sampler
+            .clone()
+            .with_told(told)
+            .sample(prompt, 1)
+            .unwrap()
+            .grey
+            .values
     };
     let turned = PROMPT.replace("135", "315");
     for told in [Told::Both, Told::Words, Told::Numbers] {
         let (a, b) = (grey(told, PROMPT), grey(told, &turned));
-        assert!(a.iter().zip(&b).any(|(a, b)| (a - b).abs() > 1e-3), "{told:?}");
+        assert!(
+            a.iter().zip(&b).any(|(a, b)| (a - b).abs() > 1e-3),
+            "{told:?}"
+        );
     }
 }
 
@@ -70,7 +85,10 @@ fn words_and_numbers_each_move_the_image() {
 fn what_cannot_be_drawn_is_refused() {
     let sampler = sampler();
     assert!(sampler.clone().with_steps(0).is_err() && sampler.clone().with_steps(1001).is_err());
-    let message = sampler.sample_batch(&[Scene::default()], 0).unwrap_err().to_string();
+    let message = sampler
+        .sample_batch(&[Scene::default()], 0)
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("512 × 512 pixels of 2.5 m"), "{message}");
     assert!(sampler.sample("a ship at 900 m/s", 0).is_err());
     let nowhere = WakeSampler::from_folder("no/such/folder".as_ref(), &Device::flex());

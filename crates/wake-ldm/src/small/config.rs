@@ -78,7 +78,9 @@ impl WakeModelConfig {
     /// [`Error::OutOfRange`] or [`Error::InvalidOption`] with the option at fault.
     pub fn validate(&self) -> Result<()> {
         check_range("image_size", self.image_size as f64, 32.0, 4096.0)?;
-        if !self.image_size.is_multiple_of(32) || !self.latent_size().is_multiple_of(self.fold.max(1)) {
+        if !self.image_size.is_multiple_of(32)
+            || !self.latent_size().is_multiple_of(self.fold.max(1))
+        {
             return Err(Error::InvalidOption {
                 option: "image_size".to_owned(),
                 value: self.image_size.to_string(),
@@ -126,7 +128,12 @@ impl WakeModelConfig {
             .with_block_out_channels(self.widths.clone())
             .with_down_attention(self.attention.clone())
             .with_up_attention(upward)
-            .with_heads(self.widths.iter().map(|&width| (width / 32).max(1)).collect())
+            .with_heads(
+                self.widths
+                    .iter()
+                    .map(|&width| (width / 32).max(1))
+                    .collect(),
+            )
             .with_norm_groups(self.norm_groups)
             .with_sample_size(self.latent_size() / self.fold)
     }

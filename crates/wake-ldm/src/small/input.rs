@@ -40,11 +40,11 @@ impl Known {
         let (batch, coarse) = (conditions.len(), grid.size / PATCH);
         let numbers: Vec<f32> = conditions.iter().flat_map(features).collect();
         let mut waves = Vec::with_capacity(batch * WAVES * grid.size * grid.size);
-        maps.iter().for_each(|map| waves.extend(squares(&map.waves, grid.size)));
+        maps.iter()
+            .for_each(|map| waves.extend(squares(&map.waves, grid.size)));
         let places: Vec<f32> = maps.into_iter().flat_map(|map| map.places).collect();
-        let tensor = |numbers, shape: [usize; 4]| {
-            Tensor::from_data(TensorData::new(numbers, shape), device)
-        };
+        let tensor =
+            |numbers, shape: [usize; 4]| Tensor::from_data(TensorData::new(numbers, shape), device);
         Self {
             numbers: Tensor::from_data(TensorData::new(numbers, [batch, FEATURES]), device),
             waves: tensor(waves, [batch, WAVES * PATCH * PATCH, coarse, coarse]),

@@ -65,7 +65,11 @@ impl WakeModelConfig {
             text: self.text().init(device),
             reader: linear(self.text_width, FEATURES),
             map_in: conv1x1(WAVES * PATCH * PATCH + PLACES, self.map_channels, device),
-            map_out: conv3x3(self.map_channels * self.fold * self.fold, self.map_channels, device),
+            map_out: conv3x3(
+                self.map_channels * self.fold * self.fold,
+                self.map_channels,
+                device,
+            ),
             grey_in: linear(condition, 128),
             grey_out: linear(128, 1),
             unet: self.unet().init(device),

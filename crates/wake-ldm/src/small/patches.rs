@@ -165,7 +165,9 @@ fn symmetric_eigen(mut a: Vec<Vec<f64>>) -> (Vec<f64>, Vec<Vec<f64>>) {
         .collect();
     let scale: f64 = a.iter().flatten().map(|x| x * x).sum();
     for _ in 0..60 {
-        let off: f64 = (0..n).map(|i| a[i][..i].iter().map(|x| x * x).sum::<f64>()).sum();
+        let off: f64 = (0..n)
+            .map(|i| a[i][..i].iter().map(|x| x * x).sum::<f64>())
+            .sum();
         if off <= 1e-26 * scale {
             break;
         }
@@ -215,9 +217,7 @@ mod tests {
                 })
                 .collect()
         };
-        (0..8)
-            .map(|i| wave([0.7, 0.05], f64::from(i)))
-            .collect()
+        (0..8).map(|i| wave([0.7, 0.05], f64::from(i))).collect()
     }
 
     #[test]
@@ -244,10 +244,15 @@ mod tests {
             let data = TensorData::new(images.concat(), [8, 1, 64, 64]);
             let batch = Tensor::<4>::from_data(data, &device);
             let (latents, mean) = transform.encode(batch.clone());
-            let lost = (transform.decode(latents.clone(), mean) - batch).square().mean();
+            let lost = (transform.decode(latents.clone(), mean) - batch)
+                .square()
+                .mean();
             let psnr = -10.0 * f64::from(lost.into_scalar::<f32>()).log10();
             // Two components leave 60 dB and more, far above the rounding of f32 at 150 dB.
-            assert!((psnr - shares.psnr(channels)).abs() < 0.01, "{psnr} {shares:?}");
+            assert!(
+                (psnr - shares.psnr(channels)).abs() < 0.01,
+                "{psnr} {shares:?}"
+            );
             let variance = latents.square().mean().into_scalar::<f32>();
             assert!((variance - 1.0).abs() < 1e-3, "{variance}");
         }

@@ -126,7 +126,8 @@ mod tests {
         let (mut ours, mut theirs, mut state) = (vec![start.clone()], start.clone(), None);
         let mut adam = Adam::new(options, &ours);
         for step in 0..5 {
-            let gradient = Tensor::<1>::from_floats([0.3, -1e-3, 20.0, 0.0], &device) * f64::from(step - 2);
+            let gradient =
+                Tensor::<1>::from_floats([0.3, -1e-3, 20.0, 0.0], &device) * f64::from(step - 2);
             ours = adam.step(ours, vec![gradient.clone()], 1e-2, 1.0);
             (theirs, state) = oracle.step(1e-2, theirs, gradient, state);
         }

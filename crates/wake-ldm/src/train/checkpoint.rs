@@ -101,15 +101,16 @@ impl Checkpoint {
     pub fn read(path: &Path) -> Result<Self> {
         let file = path.join("state.json");
         let text = fs::read_to_string(&file).map_err(|source| io("read", &file, source))?;
-        let mut state: Value = serde_json::from_str(&text).map_err(|source| Error::Json {
-            path: file,
-            source,
-        })?;
+        let mut state: Value =
+            serde_json::from_str(&text).map_err(|source| Error::Json { path: file, source })?;
         let mut tensors = Tensors::new();
         let entries = fs::read_dir(path).map_err(|source| io("read", path, source))?;
         for entry in entries {
             let file = entry.map_err(|source| io("read", path, source))?.path();
-            if file.extension().is_some_and(|extension| extension == "safetensors") {
+            if file
+                .extension()
+                .is_some_and(|extension| extension == "safetensors")
+            {
                 read_part(&file, &mut tensors)?;
             }
         }
@@ -139,7 +140,10 @@ fn checkpoints(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
     for entry in entries {
         let path = entry.map_err(|source| io("read", folder, source))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if let Some(step) = name.strip_prefix("step-").and_then(|step| step.parse().ok()) {
+        if let Some(step) = name
+            .strip_prefix("step-")
+            .and_then(|step| step.parse().ok())
+        {
             found.push((step, path));
         }
     }
@@ -156,7 +160,8 @@ fn write_part(folder: &Path, number: usize, part: &Part<'_>) -> std::io::Result<
         .collect();
     let views = part.iter().zip(&bytes).map(|((name, shape, _), bytes)| {
         let view = TensorView::new(Dtype::F32, (*shape).clone(), bytes);
-        view.map(|view| (name.as_str(), view)).map_err(std::io::Error::other)
+        view.map(|view| (name.as_str(), view))
+            .map_err(std::io::Error::other)
     });
     let views: Vec<_> = views.collect::<std::io::Result<_>>()?;
     let path = folder.join(format!("tensors-{number:03}.safetensors"));
@@ -175,7 +180,10 @@ fn read_part(path: &Path, tensors: &mut Tensors) -> Result<()> {
             return Err(invalid(format!("{name} is no f32")));
         }
         let (chunks, _) = view.data().as_chunks::<4>();
-        let numbers = chunks.iter().map(|chunk| f32::from_le_bytes(*chunk)).collect();
+        let numbers = chunks
+            .iter()
+            .map(|chunk| f32::from_le_bytes(*chunk))
+            .collect();
         tensors.insert(name, (view.shape().to_vec(), numbers));
     }
     Ok(())
@@ -191,7 +199,10 @@ mod tests {
             step,
             state: serde_json::json!({"seed": 3}),
             tensors: BTreeMap::from([
-                ("a".to_owned(), (vec![2, 2], vec![1.0, -0.0, f32::MIN_POSITIVE, step as f32])),
+                (
+                    "a".to_owned(),
+                    (vec![2, 2], vec![1.0, -0.0, f32::MIN_POSITIVE, step as f32]),
+                ),
                 ("b".to_owned(), (vec![2_000_000], large.clone())),
                 ("c".to_owned(), (vec![2_000_000], large)),
             ]),
@@ -201,16 +212,32 @@ mod tests {
     #[test]
     fn the_newest_comes_back_and_two_are_kept_in_small_files() {
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(Checkpoint::newest(&folder.path().join("none")).unwrap(), None);
+        assert_eq!(
+            Checkpoint::newest(&folder.path().join("none")).unwrap(),
+            None
+        );
         for step in [5, 20, 100] {
             checkpoint(step).write(folder.path()).unwrap();
         }
-        assert_eq!(Checkpoint::newest(folder.path()).unwrap(), Some(checkpoint(100)));
+        assert_eq!(
+            Checkpoint::newest(folder.path()).unwrap(),
+            Some(checkpoint(100))
+        );
         let left = checkpoints(folder.path()).unwrap();
-        assert_eq!(left.iter().map(|(step, _)| *step).collect::<Vec<_>>(), [20, 100]);
-        let files: Vec<_> = fs::read_dir(&left[1].1).unwrap().map(Result::unwrap).collect();
+        assert_eq!(
+            left.iter().map(|(step, _)| *step).collect::<Vec<_>>(),
+            [20, 100]
+        );
+        let files: Vec<_> = fs::read_dir(&left[1].1)
+            .unwrap()
+            .map(Result::unwrap)
+            .collect();
         assert_eq!(files.len(), 3);
-        assert!(files.iter().all(|file| file.metadata().unwrap().len() <= 12_000_000));
+        assert!(
+            files
+                .iter()
+                .all(|file| file.metadata().unwrap().len() <= 12_000_000)
+        );
     }
 
     #[test]
@@ -219,7 +246,10 @@ mod tests {
         checkpoint(7).write(folder.path()).unwrap();
         // What a killed run leaves behind has another name.
         fs::create_dir(folder.path().join(".step-00000009.1.tmp")).unwrap();
-        assert_eq!(Checkpoint::newest(folder.path()).unwrap().map(|c| c.step), Some(7));
+        assert_eq!(
+            Checkpoint::newest(folder.path()).unwrap().map(|c| c.step),
+            Some(7)
+        );
         let file = folder.path().join("step-00000007/tensors-000.safetensors");
         fs::write(&file, b"short").unwrap();
         let refused = Checkpoint::newest(folder.path());

@@ -114,7 +114,9 @@ impl Diffusion {
             return Err(Error::InvalidOption {
                 option: "batch".to_owned(),
                 value: options.batch.to_string(),
-                expected: format!("a multiple of the {parts} parts that devices and accumulation make"),
+                expected: format!(
+                    "a multiple of the {parts} parts that devices and accumulation make"
+                ),
             });
         }
         let device = devices[0].clone();
@@ -155,7 +157,10 @@ impl Diffusion {
                     value: format!("without {name} {shape:?}"),
                     expected: "all tensors of the model".to_owned(),
                 })?;
-                Ok(Tensor::from_data(TensorData::new(numbers, [shape.iter().product::<usize>()]), &device))
+                Ok(Tensor::from_data(
+                    TensorData::new(numbers, [shape.iter().product::<usize>()]),
+                    &device,
+                ))
             };
             names.iter().map(take).collect()
         };
@@ -229,10 +234,13 @@ impl Diffusion {
         let report = self.trainer.step(|model, device, part| {
             let positions = (0..each).map(|i| first + (part * each + i) as u64);
             let (loss, losses) = loss(model, this.part(set, positions, device));
-            sums.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[part] = losses;
+            sums.lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)[part] = losses;
             loss
         });
-        let sums = sums.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let sums = sums
+            .into_inner()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         let mean = |value: fn(&Losses) -> f64| sums.iter().map(value).sum::<f64>() / parts as f64;
         let losses = Losses {
             flow: mean(|l| l.flow),
@@ -255,15 +263,24 @@ impl BatchMaker<'_> {
     fn part(&self, set: &LatentSet, positions: impl Iterator<Item = u64>, device: &Device) -> Part {
         let random = NoiseSource::new(self.options.seed);
         let positions: Vec<u64> = positions.collect();
-        let draws: Vec<FlowDraw> = positions.iter().map(|&p| FlowDraw::new(random, p)).collect();
-        let indices: Vec<usize> = positions.iter().map(|&p| shuffled(random, p, set.len())).collect();
+        let draws: Vec<FlowDraw> = positions
+            .iter()
+            .map(|&p| FlowDraw::new(random, p))
+            .collect();
+        let indices: Vec<usize> = positions
+            .iter()
+            .map(|&p| shuffled(random, p, set.len()))
+            .collect();
         let examples: Vec<_> = indices.iter().map(|&i| set.example(i)).collect();
         let grid = MapGrid {
             size: self.config.image_size,
             spacing: self.config.spacing,
         };
         let all: Vec<Conditions> = examples.iter().map(|e| e.conditions).collect();
-        let shown = draws.iter().map(|d| if d.numbers { 1.0 } else { 0.0 }).collect();
+        let shown = draws
+            .iter()
+            .map(|d| if d.numbers { 1.0 } else { 0.0 })
+            .collect();
         let prompts: Vec<Vec<u32>> = (examples.iter().zip(&draws).zip(&positions))
             .map(|((example, draw), &position)| {
                 let chosen = wording(random, example, position).filter(|_| draw.words);
@@ -275,7 +292,10 @@ impl BatchMaker<'_> {
             Tensor::from_data(TensorData::new(numbers, [rows, width]), device)
         };
         let (read, said) = self.reading(set, &positions);
-        let sources: Vec<NoiseSource> = positions.iter().map(|&p| noise_of(self.options.seed, p)).collect();
+        let sources: Vec<NoiseSource> = positions
+            .iter()
+            .map(|&p| noise_of(self.options.seed, p))
+            .collect();
         let known = Known::new(&all, grid, device);
         Part {
             latents: set.latents(&indices, device),
@@ -313,7 +333,9 @@ impl BatchMaker<'_> {
 /// One of the wordings of an example.
 fn wording(random: NoiseSource, example: &Example, position: u64) -> Option<&Vec<u32>> {
     let draw = random.uniform(WORDING_STREAM, position);
-    example.prompts.get((draw * example.prompts.len() as f64) as usize)
+    example
+        .prompts
+        .get((draw * example.prompts.len() as f64) as usize)
 }
 
 /// The noise of one image of a run.
@@ -351,7 +373,9 @@ fn loss(model: &WakeModel, part: Part) -> (Tensor<1>, Losses) {
     let (_, read) = model.read(&part.read);
     let words = (model.numbers(read) - part.said).square().mean();
     let encoded = model.encode(part.known, context, summary);
-    let grey = ((model.mean_grey(&encoded) - part.grey) * 10.0).square().mean();
+    let grey = ((model.mean_grey(&encoded) - part.grey) * 10.0)
+        .square()
+        .mean();
     let level = part.sigma.clone().reshape([-1, 1, 1, 1]);
     let noisy = part.latents.clone() * (level.clone().neg() + 1.0) + part.noise.clone() * level;
     let input = ModelInput {

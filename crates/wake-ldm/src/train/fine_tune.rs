@@ -142,7 +142,9 @@ impl FineTune {
             Learning::Changes(trainer, unet) => {
                 let unet = std::sync::Mutex::new(unet.clone());
                 trainer.step(|changes, _, _| {
-                    let unet = unet.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                    let unet = unet
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner);
                     task.loss(&changes.merged((**unet).clone()))
                 })
             }
@@ -172,9 +174,17 @@ impl FineTune {
         self.mixed(&steps, clean, noise, context)
     }
 
-    fn mixed(&self, steps: &[usize], clean: Tensor<4>, noise: Tensor<4>, context: Tensor<3>) -> Task {
-        let levels: Vec<NoiseLevel> =
-            steps.iter().map(|&t| self.frozen.schedule.noise_level(t)).collect();
+    fn mixed(
+        &self,
+        steps: &[usize],
+        clean: Tensor<4>,
+        noise: Tensor<4>,
+        context: Tensor<3>,
+    ) -> Task {
+        let levels: Vec<NoiseLevel> = steps
+            .iter()
+            .map(|&t| self.frozen.schedule.noise_level(t))
+            .collect();
         let device = clean.device();
         let each = |values: Vec<f64>| -> Tensor<4> {
             let data = TensorData::new(values.iter().map(|&x| x as f32).collect(), [steps.len()]);
@@ -189,7 +199,10 @@ impl FineTune {
             Prediction::Flow => noise - clean,
             Prediction::Epsilon => noise,
         };
-        let snr: Vec<f64> = levels.iter().map(|l| (l.signal / l.noise).powi(2)).collect();
+        let snr: Vec<f64> = levels
+            .iter()
+            .map(|l| (l.signal / l.noise).powi(2))
+            .collect();
         let weights = self.options.snr_gamma.map_or_else(
             || vec![1.0; steps.len()],
             |gamma| min_snr_weights(&snr, gamma, self.options.prediction),

@@ -82,7 +82,15 @@ fn noise_and_velocity_are_learnt() {
     let device = Device::flex();
     for prediction in [Prediction::Epsilon, Prediction::Velocity] {
         let options = options(prediction, 5e-3);
-        falls(FineTune::whole(unet(&device), frozen(&device), options, &device.clone().autodiff()), 30);
+        falls(
+            FineTune::whole(
+                unet(&device),
+                frozen(&device),
+                options,
+                &device.clone().autodiff(),
+            ),
+            30,
+        );
     }
 }
 
@@ -104,7 +112,11 @@ fn low_rank_changes_leave_the_model_as_it_is() {
         (a.clone() - b.clone()).abs().max().into_scalar::<f32>() > 0.0
     };
     let after = values(&run.unet());
-    let different = before.iter().zip(&after).filter(|(a, b)| differ(a, b)).count();
+    let different = before
+        .iter()
+        .zip(&after)
+        .filter(|(a, b)| differ(a, b))
+        .count();
     assert_eq!(different, changed.layers().len());
 }
 

@@ -79,7 +79,8 @@ impl LatentSet {
         }
         self.shape = shape;
         example.grey = grey.into_scalar::<f32>();
-        self.latents.extend(latents.into_data().iter::<f32>().map(f16::from_f32));
+        self.latents
+            .extend(latents.into_data().iter::<f32>().map(f16::from_f32));
         self.examples.push(example);
         Ok(())
     }

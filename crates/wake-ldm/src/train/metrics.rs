@@ -52,7 +52,13 @@ impl Metrics {
     /// # Errors
     ///
     /// [`Error::Io`] when it cannot be written.
-    pub fn write(&mut self, step: usize, of: usize, report: StepReport, more: &Value) -> Result<Value> {
+    pub fn write(
+        &mut self,
+        step: usize,
+        of: usize,
+        report: StepReport,
+        more: &Value,
+    ) -> Result<Value> {
         let seconds = self.begin.elapsed().as_secs_f64();
         let each = seconds / step.saturating_sub(self.first).max(1) as f64;
         let mut line = json!({
@@ -108,7 +114,9 @@ mod tests {
         };
         let mut metrics = Metrics::open(&path, 0).unwrap();
         for step in 1..=5 {
-            metrics.write(step, 8, report, &json!({"grey": 0.5})).unwrap();
+            metrics
+                .write(step, 8, report, &json!({"grey": 0.5}))
+                .unwrap();
         }
         // A killed run leaves half a line.
         metrics.file.write_all(b"{\"step\": 6, \"lo").unwrap();
@@ -117,7 +125,11 @@ mod tests {
         let text = fs::read_to_string(&path).unwrap();
         let steps: Vec<u64> = text
             .lines()
-            .map(|line| serde_json::from_str::<Value>(line).unwrap()["step"].as_u64().unwrap())
+            .map(|line| {
+                serde_json::from_str::<Value>(line).unwrap()["step"]
+                    .as_u64()
+                    .unwrap()
+            })
             .collect();
         assert_eq!(steps, [1, 2, 3, 4]);
     }

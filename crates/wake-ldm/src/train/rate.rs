@@ -43,8 +43,19 @@ mod tests {
             warmup: 4,
             steps: 104,
         };
-        for (step, expected) in [(0, 0.5), (3, 2.0), (4, 2.0), (54, 1.1), (104, 0.2), (9999, 0.2)] {
-            assert!((rate.at(step) - expected).abs() < 1e-12, "{step}: {}", rate.at(step));
+        for (step, expected) in [
+            (0, 0.5),
+            (3, 2.0),
+            (4, 2.0),
+            (54, 1.1),
+            (104, 0.2),
+            (9999, 0.2),
+        ] {
+            assert!(
+                (rate.at(step) - expected).abs() < 1e-12,
+                "{step}: {}",
+                rate.at(step)
+            );
         }
     }
 }

@@ -37,7 +37,10 @@ pub fn replaced<M: Module>(module: M, values: Vec<Tensor<1>>) -> M {
         values: values.into_iter(),
     };
     let module = module.map(&mut replacer);
-    assert!(replacer.values.next().is_none(), "more values than parameters");
+    assert!(
+        replacer.values.next().is_none(),
+        "more values than parameters"
+    );
     module
 }
 
@@ -62,7 +65,8 @@ impl ModuleVisitor for Names {
     }
 
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        self.found.push((self.path.join("."), param.lazy_shape().to_vec()));
+        self.found
+            .push((self.path.join("."), param.lazy_shape().to_vec()));
     }
 }
 
@@ -73,7 +77,11 @@ struct Values {
 impl ModuleVisitor for Values {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
         let value = param.val();
-        let value = if value.is_autodiff() { value.inner() } else { value };
+        let value = if value.is_autodiff() {
+            value.inner()
+        } else {
+            value
+        };
         self.found.push(flat(value));
     }
 }
@@ -87,7 +95,8 @@ impl ModuleVisitor for Differentials {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
         let value = param.val();
         let gradient = value.grad_remove(&mut self.gradients);
-        self.found.push(flat(gradient.unwrap_or_else(|| value.inner().zeros_like())));
+        self.found
+            .push(flat(gradient.unwrap_or_else(|| value.inner().zeros_like())));
     }
 }
 
@@ -104,7 +113,11 @@ impl ModuleMapper for Replacer {
                 return new;
             }
             let new = Tensor::from_inner(new);
-            if old.is_require_grad() { new.require_grad() } else { new }
+            if old.is_require_grad() {
+                new.require_grad()
+            } else {
+                new
+            }
         })
     }
 }

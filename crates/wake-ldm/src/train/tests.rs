@@ -31,7 +31,9 @@ fn set() -> LatentSet {
     let wave = |i: usize| -> Vec<f32> {
         let (sin, cos) = (i as f64).sin_cos();
         let at = |p: usize| ((p / SIZE) as f64 * sin + (p % SIZE) as f64 * cos) * 0.8;
-        (0..SIZE * SIZE).map(|p| (0.5 + 0.1 * at(p).sin()) as f32).collect()
+        (0..SIZE * SIZE)
+            .map(|p| (0.5 + 0.1 * at(p).sin()) as f32)
+            .collect()
     };
     let images: Vec<Vec<f32>> = (0..12).map(wave).collect();
     let (transform, _) = PatchTransform::fit(images.iter().map(Vec::as_slice), SIZE, 4, &device);
@@ -104,7 +106,9 @@ fn a_killed_run_gives_the_same_curve_to_the_bit() {
     let mut pieces = advance(&mut first, &set, 3);
     first.checkpoint(&folder.path().join("half")).unwrap();
     drop(first);
-    let half = Checkpoint::newest(&folder.path().join("half")).unwrap().unwrap();
+    let half = Checkpoint::newest(&folder.path().join("half"))
+        .unwrap()
+        .unwrap();
     let mut second = run(1, 1).resumed(half).unwrap();
     pieces.extend(advance(&mut second, &set, 3));
     assert_eq!(curve, pieces);
@@ -131,10 +135,16 @@ fn two_workers_and_two_parts_make_the_step_of_one() {
         }
         for (name, (_, numbers)) in one.iter().filter(|(name, _)| name.starts_with("first.")) {
             let largest = numbers.iter().fold(0f32, |m, x| m.max(x.abs()));
-            let differences = numbers.iter().zip(&other[name].1).map(|(a, b)| (a - b).abs());
+            let differences = numbers
+                .iter()
+                .zip(&other[name].1)
+                .map(|(a, b)| (a - b).abs());
             // Gradients are sums over batch and pixels with cancellation: a few thousand roundings.
             let allowed = 1e-3 * largest + 1e-7;
-            assert!(differences.fold(0f32, f32::max) <= allowed, "{name} {largest}");
+            assert!(
+                differences.fold(0f32, f32::max) <= allowed,
+                "{name} {largest}"
+            );
         }
     }
 }
@@ -168,7 +178,9 @@ fn a_checkpoint_of_another_model_is_refused() {
 #[test]
 fn long_gradients_are_shortened_to_the_largest_norm() {
     let device = Device::flex().autodiff();
-    let layer = burn::nn::LinearConfig::new(2, 1).with_bias(false).init(&device);
+    let layer = burn::nn::LinearConfig::new(2, 1)
+        .with_bias(false)
+        .init(&device);
     let options = TrainerOptions {
         rate: Rate {
             peak: 0.1,
@@ -192,7 +204,9 @@ fn long_gradients_are_shortened_to_the_largest_norm() {
     let before = trainer.model().clone();
     let broken = trainer.step(|layer, _, _| (layer.weight.val() * f32::NAN).sum());
     assert!(!broken.applied);
-    let same = (before.weight.val() - trainer.model().weight.val()).abs().sum();
+    let same = (before.weight.val() - trainer.model().weight.val())
+        .abs()
+        .sum();
     assert!(same.into_scalar::<f32>() < f32::MIN_POSITIVE);
     assert_eq!(trainer.model().num_params(), 2);
 }

@@ -86,7 +86,8 @@ impl LowRank {
                 let matrix = factor.val().transpose();
                 let (shape, start) = (matrix.dims(), data.len());
                 data.extend(matrix.into_data().iter::<f32>().flat_map(f32::to_le_bytes));
-                let entry = json!({"dtype": "F32", "shape": shape, "data_offsets": [start, data.len()]});
+                let entry =
+                    json!({"dtype": "F32", "shape": shape, "data_offsets": [start, data.len()]});
                 header.insert(format!("{prefix}.{layer}.{name}.weight"), entry);
             }
         }
@@ -106,8 +107,14 @@ impl LowRank {
 fn attention_layer(path: &ModulePath, rank: usize, layout: Layout) -> Option<String> {
     const ENDS: [&str; 4] = ["to_q", "to_k", "to_v", "to_out.0"];
     let name = path.file_name(layout);
-    let layer = name.strip_suffix(".weight").filter(|_| path.is_transposed(rank))?;
-    let last = |end: &str| layer.strip_suffix(end).is_some_and(|rest| rest.ends_with('.'));
+    let layer = name
+        .strip_suffix(".weight")
+        .filter(|_| path.is_transposed(rank))?;
+    let last = |end: &str| {
+        layer
+            .strip_suffix(end)
+            .is_some_and(|rest| rest.ends_with('.'))
+    };
     ENDS.into_iter().any(last).then(|| layer.to_owned())
 }
 
@@ -136,7 +143,9 @@ impl ModuleVisitor for Finder {
             mean: 0.0,
             std: 1.0 / self.rank as f64,
         };
-        let LowRank { down, up, layers, .. } = &mut self.found;
+        let LowRank {
+            down, up, layers, ..
+        } = &mut self.found;
         down.push(normal.init([shape[0], self.rank], &device));
         up.push(Initializer::Zeros.init([self.rank, shape[1]], &device));
         layers.push(layer);
@@ -192,8 +201,9 @@ mod tests {
             attn1: CrossAttention::new(6, 4, 2, false, &device),
         };
         let mut change = LowRank::of_attentions(&block, Layout::Diffusers, 2).unwrap();
-        let expected: Vec<String> =
-            ["to_q", "to_k", "to_v", "to_out.0"].map(|end| format!("attn1.{end}")).into();
+        let expected: Vec<String> = ["to_q", "to_k", "to_v", "to_out.0"]
+            .map(|end| format!("attn1.{end}"))
+            .into();
         assert_eq!(change.layers(), expected);
         let x = Tensor::<3>::from_floats([[[1.0, -0.5, 0.2, 0.0, 0.7, 0.1], [0.3; 6]]], &device);
         let context = Tensor::<3>::from_floats([[[0.5, -1.0, 0.25, 2.0], [0.1; 4]]], &device);
