@@ -40,7 +40,7 @@ fn oracle(x: &[f32], weight: &[f32], dy: &[f32], g: &Geometry) -> Oracle {
         };
         let at = ((n * channels_in + c) * rows + r) * columns + q;
         let w = (o * channels_in + c) * k * k + tap;
-        let mut add = |sum: &mut [f64; 2], a: f32, b: f32| {
+        let add = |sum: &mut [f64; 2], a: f32, b: f32| {
             let term = f64::from(a) * f64::from(b);
             sum[0] += term;
             sum[1] += term.abs();
