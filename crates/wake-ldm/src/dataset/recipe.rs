@@ -98,7 +98,9 @@ impl Recipe {
         Self::from_toml(&text)
     }
 
-    /// The recipe with assignments such as `scene.radar.looks = 1` made, in order, then checked.
+    /// The recipe with assignments such as `scene.radar.looks=1` made, in order, then checked.
+    ///
+    /// The value is TOML; a bare word is a string.
     ///
     /// # Errors
     ///
@@ -106,22 +108,27 @@ impl Recipe {
     pub fn with_assignments<S: AsRef<str>>(&self, assignments: &[S]) -> Result<Self> {
         let mut recipe = self.clone();
         for assignment in assignments {
-            recipe = recipe.merged(assignment.as_ref())?;
+            let text = assignment.as_ref();
+            let quoted = text
+                .split_once('=')
+                .map(|(key, word)| format!("{key}={:?}", word.trim()));
+            let quoted = quoted.filter(|quoted| {
+                toml::from_str::<toml::Table>(text).is_err()
+                    && toml::from_str::<toml::Table>(quoted).is_ok()
+            });
+            recipe = recipe.merged(quoted.as_deref().unwrap_or(text))?;
         }
-        recipe.validate()?;
         Ok(recipe)
     }
 
     fn merged(&self, text: &str) -> Result<Self> {
-        let fail = |message: String| Error::Recipe {
-            message: message.trim().to_owned(),
-        };
-        let changes: toml::Table = toml::from_str(text).map_err(|e| fail(e.to_string()))?;
+        let fail = |message: String| Error::Recipe { message };
+        let changes: toml::Table = toml::from_str(text).map_err(|e| fail(one_line(text, &e)))?;
         let mut table = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
         merge(&mut table, changes);
         let recipe: Self = table
             .try_into()
-            .map_err(|e: toml::de::Error| fail(e.to_string()))?;
+            .map_err(|e: toml::de::Error| fail(one_line(text, &e)))?;
         recipe.validate()?;
         Ok(recipe)
     }
@@ -137,6 +144,21 @@ impl Recipe {
             Draw::PaperGrid => Ok(()),
             Draw::Ranges(ranges) => ranges.validate(&self.scene),
         }
+    }
+}
+
+/// What is wrong with a text, and in which line or table of it.
+fn one_line(text: &str, error: &toml::de::Error) -> String {
+    match error.span() {
+        Some(span) => {
+            let line = 1 + text
+                .bytes()
+                .take(span.start)
+                .filter(|&b| b == b'\n')
+                .count();
+            format!("line {line}: {}", error.message())
+        }
+        None => error.to_string().trim().replace('\n', ", "),
     }
 }
 

@@ -208,6 +208,34 @@ fn a_recipe_file_changes_what_it_names() {
 }
 
 #[test]
+fn assignments_take_toml_values_and_bare_words() {
+    let changes = [
+        "speckle=true",
+        "draw.ranges.place = fixed",
+        "draw.ranges.fetch=[1e4, 2e4]",
+        "scene.ship.hull=full",
+    ];
+    let recipe = Recipe::default().with_assignments(&changes).unwrap();
+    let expected = Ranges {
+        place: Place::Fixed,
+        fetch: [1e4, 2e4],
+        ..Ranges::default()
+    };
+    assert_eq!(recipe.draw, Draw::Ranges(expected));
+    assert!(recipe.speckle);
+    assert_eq!(
+        Recipe::default()
+            .with_assignments(&["draw=paper-grid"])
+            .unwrap()
+            .draw,
+        Draw::PaperGrid
+    );
+    for bad in ["speckle", "=3", "speckle=maybe", "scene.sea"] {
+        assert!(Recipe::default().with_assignments(&[bad]).is_err(), "{bad}");
+    }
+}
+
+#[test]
 fn bad_recipes_are_refused_by_name() {
     for (text, word) in [
         ("speckles = true", "speckles"),
@@ -232,6 +260,7 @@ fn bad_recipes_are_refused_by_name() {
     ] {
         let message = Recipe::from_toml(text).unwrap_err().to_string();
         assert!(message.contains(word), "{text}: {message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
     }
     let message = Recipe::read(std::path::Path::new("no/such.toml")).unwrap_err();
     assert!(message.to_string().contains("no/such.toml"), "{message}");
