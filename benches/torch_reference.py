@@ -1,7 +1,7 @@
 """What the benches measure, in PyTorch: run it on the same machine, at the same time of day.
 
     pip install torch diffusers transformers
-    python benches/torch_reference.py [quick]
+    python benches/torch_reference.py [quick | training]
 
 f32, random weights, as many threads as cores; seconds, median of the runs after one to warm up. `quick` leaves
 out Stable Diffusion's U-Net and decoder.
@@ -23,13 +23,14 @@ from transformers import CLIPTextConfig, CLIPTextModel
 def measure(name, call, runs):
     with torch.no_grad():
         call()
-        seconds = []
+        seconds, busy = [], time.process_time()
         for _ in range(runs):
             begin = time.perf_counter()
             call()
             seconds.append(time.perf_counter() - begin)
+    work = (time.process_time() - busy) / runs
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-    print(f"{name:45} {statistics.median(seconds):10.4f} s   peak {peak} MiB", flush=True)
+    print(f"{name:45} {statistics.median(seconds):10.4f} s, {work:.4f} s of all cores   peak {peak} MiB", flush=True)
 
 
 def blocks():
@@ -102,6 +103,8 @@ def main():
     torch.set_num_threads(os.cpu_count())
     print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")
     trainings()
+    if "training" in sys.argv:
+        return
     blocks()
     for batch in (1, 2):
         unet(f"small U-Net 32x32, batch {batch}", batch, 32, 20, **SMALL)

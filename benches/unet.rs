@@ -91,10 +91,12 @@ fn small_unet(criterion: &mut Criterion) {
     }
 }
 
-/// Median of the seconds of some calls after one to warm up.
+/// Prints the median seconds of seven calls after one to warm up, and the mean of the seconds that all
+/// cores together worked on one, which a busy machine does not change.
 #[cfg(feature = "train")]
-fn median_seconds(call: impl Fn()) -> f64 {
+fn report(name: &str, call: impl Fn()) {
     call();
+    let busy = cpu_seconds();
     let timed = |_| {
         let begin = Instant::now();
         call();
@@ -102,7 +104,24 @@ fn median_seconds(call: impl Fn()) -> f64 {
     };
     let mut seconds: Vec<f64> = (0..7).map(timed).collect();
     seconds.sort_by(f64::total_cmp);
-    seconds[3]
+    let work = (cpu_seconds() - busy) / 7.0;
+    println!("{name:45} {:.4} s, {work:.4} s of all cores", seconds[3]);
+}
+
+/// Seconds that this process has worked, where the system tells (in hundredths).
+#[cfg(feature = "train")]
+fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat
+        .rsplit(')')
+        .next()
+        .unwrap_or_default()
+        .split_whitespace();
+    let ticks = fields
+        .skip(11)
+        .take(2)
+        .filter_map(|field| field.parse::<f64>().ok());
+    ticks.sum::<f64>() / 100.0
 }
 
 /// Forward, and forward with gradients: two residual blocks, and the small U-Net, at a batch of 16.
@@ -129,11 +148,11 @@ fn training() {
             }
         };
         let (forward, tracked) = (call(&plain), call(&tracking));
-        let forward = median_seconds(|| drop(black_box(forward())));
-        let both = median_seconds(|| drop(black_box(tracked().square().mean().backward())));
-        println!(
-            "training: b{batch} c{channels} s{size}: forward {forward:.4} s, with gradients {both:.4} s"
-        );
+        let name = format!("training: b{batch} c{channels} s{size}");
+        report(&format!("{name}, forward"), || drop(black_box(forward())));
+        report(&format!("{name}, with gradients"), || {
+            drop(black_box(tracked().square().mean().backward()));
+        });
     }
     let config = UNetConfig::small(16, 256, None);
     let (unet, tracked) = (config.init(&plain), config.init(&tracking));
@@ -141,11 +160,11 @@ fn training() {
         input(&config, 16, 32, &plain),
         input(&config, 16, 32, &tracking),
     );
-    let forward = median_seconds(|| call(&unet, &x));
-    let both = median_seconds(|| {
+    let name = "training: small U-Net, batch 16";
+    report(&format!("{name}, forward"), || call(&unet, &x));
+    report(&format!("{name}, with gradients"), || {
         black_box(tracked.forward(y.clone()).square().mean().backward());
     });
-    println!("training: small U-Net, batch 16: forward {forward:.3} s, with gradients {both:.3} s");
 }
 
 /// Stable Diffusion v1.4's U-Net: one guided step is batch 2.

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::product::{Rows, Target, multiply};
 use super::silu::exp;
+use super::sum::product_sum;
 use super::tile;
 
 /// Numbers of a block of scores that should stay in a core's second cache: 384 KiB.
@@ -118,9 +119,10 @@ struct Scores<'a> {
 }
 
 impl Scores<'_> {
-    /// The softmax of the scores, `[queries, tokens seen]`.
+    /// The softmax of the scores, `[queries, tokens seen]`, without its denominators, and the inverse
+    /// of those, `[queries]`.
     #[inline(always)]
-    fn softmax<S: Simd>(&self, simd: S) -> Vec<f32> {
+    fn softmax<S: Simd>(&self, simd: S) -> (Vec<f32>, Vec<f32>) {
         let seen = self.shape.tokens[1];
         let mut scores = vec![0.0; self.query.count * seen];
         let mut target = Target {
@@ -131,44 +133,32 @@ impl Scores<'_> {
         };
         multiply(simd, &self.query, self.shape.depth(), self.key, &mut target);
         let scale = self.shape.scale();
-        for (i, scores) in scores.chunks_exact_mut(seen).enumerate() {
+        let mut inverses = vec![0.0; self.query.count];
+        let rows = scores.chunks_exact_mut(seen).zip(&mut inverses);
+        for (i, (scores, inverse)) in rows.enumerate() {
             let visible = if self.shape.causal {
                 seen.min(self.first + i + 1)
             } else {
                 seen
             };
             let (scores, hidden) = scores.split_at_mut(visible);
-            softmax(scores, scale);
+            *inverse = exponentials(scores, scale);
             hidden.fill(0.0);
         }
-        scores
+        (scores, inverses)
     }
 }
 
-/// `e^(s x − m) / Σ e^(s x − m)` with m the largest s x.
+/// Replaces x by `e^(s x − m)`, m the largest s x, and gives `1 / Σ e^(s x − m)`.
 #[inline(always)]
-fn softmax(x: &mut [f32], scale: f32) {
-    let (chunks, rest) = x.as_chunks::<16>();
-    let mut parts = [f32::NEG_INFINITY; 16];
-    for chunk in chunks {
-        for i in 0..16 {
-            parts[i] = if chunk[i] > parts[i] {
-                chunk[i]
-            } else {
-                parts[i]
-            };
-        }
-    }
-    let max = rest
-        .iter()
-        .chain(&parts)
-        .fold(f32::NEG_INFINITY, |max, &v| max.max(v));
+fn exponentials(x: &mut [f32], scale: f32) -> f32 {
+    let max = largest(x);
     let mut parts = [0.0; 16];
     let (chunks, rest) = x.as_chunks_mut::<16>();
     for chunk in chunks {
-        for i in 0..16 {
-            chunk[i] = exp((chunk[i] - max) * scale);
-            parts[i] += chunk[i];
+        for (part, v) in parts.iter_mut().zip(chunk) {
+            *v = exp((*v - max) * scale);
+            *part += *v;
         }
     }
     let mut sum: f32 = parts.iter().sum();
@@ -176,10 +166,20 @@ fn softmax(x: &mut [f32], scale: f32) {
         *v = exp((*v - max) * scale);
         sum += *v;
     }
-    let inverse = 1.0 / sum;
-    for v in x {
-        *v *= inverse;
+    1.0 / sum
+}
+
+#[inline(always)]
+fn largest(x: &[f32]) -> f32 {
+    let (chunks, rest) = x.as_chunks::<16>();
+    let mut parts = [f32::NEG_INFINITY; 16];
+    for chunk in chunks {
+        for (part, &v) in parts.iter_mut().zip(chunk) {
+            *part = if v > *part { v } else { *part };
+        }
     }
+    let all = rest.iter().chain(&parts);
+    all.fold(f32::NEG_INFINITY, |max, &v| max.max(v))
 }
 
 /// A block of queries of one head.
@@ -195,7 +195,7 @@ impl WithSimd for Forward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let shape = self.scores.shape;
-        let weights = self.scores.softmax(simd);
+        let (weights, inverses) = self.scores.softmax(simd);
         let rows = Rows {
             values: &weights,
             step: shape.tokens[1],
@@ -208,6 +208,11 @@ impl WithSimd for Forward<'_> {
             add: false,
         };
         multiply(simd, &rows, shape.tokens[1], self.value, &mut target);
+        for (out, inverse) in target.values.chunks_mut(shape.channels).zip(inverses) {
+            for v in &mut out[..shape.depth()] {
+                *v *= inverse;
+            }
+        }
     }
 }
 
@@ -224,7 +229,7 @@ impl WithSimd for Forward<'_> {
 ///
 /// # References
 ///
-/// Dao et al. (2022), "`FlashAttention`", appendix B.2.
+/// Dao et al. (2022), "Fast and Memory-Efficient Exact Attention", appendix B.2.
 pub(in crate::nn) fn gradients(
     [query, key, value]: [&[f32]; 3],
     gradient: &[f32],
@@ -288,7 +293,12 @@ impl WithSimd for Backward<'_> {
                 first,
                 shape: self.shape,
             };
-            let weights = scores.softmax(simd);
+            let (mut weights, inverses) = scores.softmax(simd);
+            for (weights, inverse) in weights.chunks_exact_mut(seen).zip(inverses) {
+                for weight in weights {
+                    *weight *= inverse;
+                }
+            }
             let mut slopes = vec![0.0; weights.len()];
             let mut target = rows_of(&mut slopes, seen, false);
             multiply(simd, &gradient, depth, &value_transposed, &mut target);
@@ -339,25 +349,11 @@ fn through_softmax(weights: &[f32], slopes: &mut [f32], seen: usize, scale: f32)
         .chunks_exact(seen)
         .zip(slopes.chunks_exact_mut(seen));
     for (weights, slopes) in rows {
-        let mean = dot(weights, slopes);
+        let mean = product_sum(weights, slopes, |v| v);
         for (slope, weight) in slopes.iter_mut().zip(weights) {
             *slope = scale * weight * (*slope - mean);
         }
     }
-}
-
-/// Sum of products, in 16 parts.
-#[inline(always)]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let ((a_chunks, a_rest), (b_chunks, b_rest)) = (a.as_chunks::<16>(), b.as_chunks::<16>());
-    let mut parts = [0.0_f32; 16];
-    for (a, b) in a_chunks.iter().zip(b_chunks) {
-        for i in 0..16 {
-            parts[i] += a[i] * b[i];
-        }
-    }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    parts.iter().sum::<f32>() + rest
 }
 
 /// `[rows, columns]` to `[columns, rows]`.

@@ -4,6 +4,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::silu::sigmoid;
+use super::sum::{product_sum, sum};
 
 /// Sizes of a normalisation, and what it does.
 #[derive(Debug, Clone, Copy)]
@@ -99,19 +100,6 @@ impl WithSimd for Forward<'_> {
         }
         [mean, inverse]
     }
-}
-
-/// Sum of a function of the values, in 16 parts.
-#[inline(always)]
-fn sum(values: &[f32], of: impl Fn(f32) -> f32) -> f32 {
-    let (chunks, rest) = values.as_chunks::<16>();
-    let mut parts = [0.0; 16];
-    for chunk in chunks {
-        for (part, value) in parts.iter_mut().zip(chunk) {
-            *part += of(*value);
-        }
-    }
-    parts.iter().sum::<f32>() + rest.iter().map(|&v| of(v)).sum::<f32>()
 }
 
 /// Gradients to the image, the weight and the bias.
@@ -237,21 +225,6 @@ impl Backward<'_> {
             *sums = [product_sum(dz, x, |x| (x - mean) * inverse), sum(dz, |v| v)];
         }
     }
-}
-
-/// Sum of products of one list with a function of the other, in 16 parts.
-#[inline(always)]
-fn product_sum(a: &[f32], b: &[f32], of: impl Fn(f32) -> f32) -> f32 {
-    let (a_chunks, a_rest) = a.as_chunks::<16>();
-    let (b_chunks, b_rest) = b.as_chunks::<16>();
-    let mut parts = [0.0_f32; 16];
-    for (a, b) in a_chunks.iter().zip(b_chunks) {
-        for i in 0..16 {
-            parts[i] += a[i] * of(b[i]);
-        }
-    }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, &b)| a * of(b)).sum();
-    parts.iter().sum::<f32>() + rest
 }
 
 #[cfg(test)]

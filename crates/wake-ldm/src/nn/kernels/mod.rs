@@ -8,6 +8,7 @@ pub(super) mod conv;
 pub(super) mod group_norm;
 mod product;
 mod silu;
+mod sum;
 mod tile;
 
 /// Reproducible numbers between −½ and ½.
