@@ -45,7 +45,7 @@ impl WakeSampler {
     /// # Errors
     ///
     /// [`Error::Io`](crate::Error::Io), [`Error::Json`](crate::Error::Json) or what
-    /// [`load`](crate::weights::load) finds for files that are not there or do not fit.
+    /// [`load`] finds for files that are not there or do not fit.
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let file = folder.join(CONFIG);
         let config = WakeModelConfig::from_json(&read_text(&file)?, &file)?;

@@ -32,7 +32,7 @@ const AZIMUTH_BAND: [f64; 2] = [0.013, 0.64];
 
 /// Measures the sea in an image of intensity before speckle.
 ///
-/// - `ship`: midship (x, y) \[m\] and heading [deg] whose wake is left out; without a ship all counts
+/// - `ship`: midship (x, y) \[m\] and heading \[deg\] whose wake is left out; without a ship all counts
 /// - returns `None` for an image that is dark everywhere or holds a value that is no number
 #[must_use]
 pub fn open_sea(
