@@ -1,6 +1,7 @@
 //! Numbers as waves of several lengths, which a network tells apart more easily than one value.
 
 use super::conditions::Conditions;
+use super::range::{INCIDENCE, LOG_FETCH, PLACE, Range, SHIP_SPEED, WIND_SPEED};
 
 /// Waves per number on an open range: each has a sine and a cosine.
 const WAVES_PER_NUMBER: usize = 4;
@@ -32,24 +33,24 @@ pub fn features(conditions: &Conditions) -> Vec<f32> {
     } else {
         0.0
     });
-    push_number(&mut out, conditions.ship_speed, 0.0, 16.0);
+    push_number(&mut out, conditions.ship_speed, SHIP_SPEED);
     let place = conditions.ship_position;
-    push_number(&mut out, place.map(|p| p[0]), -512.0, 512.0);
-    push_number(&mut out, place.map(|p| p[1]), -512.0, 512.0);
-    push_number(&mut out, conditions.wind_speed, 0.0, 12.0);
-    push_number(&mut out, conditions.fetch.map(f64::log10), 3.0, 6.0);
-    push_number(&mut out, conditions.incidence, 10.0, 40.0);
+    push_number(&mut out, place.map(|p| p[0]), PLACE);
+    push_number(&mut out, place.map(|p| p[1]), PLACE);
+    push_number(&mut out, conditions.wind_speed, WIND_SPEED);
+    push_number(&mut out, conditions.fetch.map(f64::log10), LOG_FETCH);
+    push_number(&mut out, conditions.incidence, INCIDENCE);
     push_direction(&mut out, conditions.ship_heading);
     push_direction(&mut out, conditions.wind_toward);
     out
 }
 
-fn push_number(out: &mut Vec<f32>, value: Option<f64>, low: f64, high: f64) {
+fn push_number(out: &mut Vec<f32>, value: Option<f64>, range: Range) {
     let Some(value) = value else {
         out.resize(out.len() + 2 + 2 * WAVES_PER_NUMBER, 0.0);
         return;
     };
-    let u = 2.0 * (value - low) / (high - low) - 1.0;
+    let u = range.scaled(value);
     out.extend([1.0, u as f32]);
     for i in 0..WAVES_PER_NUMBER {
         let (sin, cos) = (std::f64::consts::FRAC_PI_2 * u * f64::from(1 << i)).sin_cos();

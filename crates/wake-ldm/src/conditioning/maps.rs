@@ -4,16 +4,21 @@
 //! draws crests in the wrong places. The phases follow from the numbers in closed form; how strong the waves
 //! are, how the radar sees them and what the sea does to them is left to learn.
 
+use super::airy::airy;
 use super::conditions::{Conditions, SHIP_LENGTH};
 
 /// Acceleration of gravity [m/s²].
 const GRAVITY: f64 = 9.81;
 /// Side of the squares of pixels that become one latent pixel.
 pub const PATCH: usize = 8;
-/// Maps at full size: cos and sin of four wave systems, and the turbulent wake.
-pub const WAVES: usize = 9;
+/// Maps at full size: cos and sin of three waves from each of two origins, and the turbulent wake.
+pub const WAVES: usize = 13;
 /// Maps at the size of the latents.
-pub const PLACES: usize = 12;
+pub const PLACES: usize = 18;
+/// Which of them says whether a place is in the wedge.
+pub const WEDGE: usize = 5;
+/// The first of those that hold the directions of transverse, divergent and cusp wave, cosine and sine of each.
+pub const DIRECTIONS: usize = 12;
 /// Nearer to their origin than this \[m\], waves are not shown stronger.
 const NEAREST: f64 = 50.0;
 
@@ -24,15 +29,6 @@ pub struct MapGrid {
     pub size: usize,
     /// Side of a pixel \[m\].
     pub spacing: f64,
-}
-
-/// The geometry of one wake.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WakeMaps {
-    /// `[WAVES, size, size]`
-    pub waves: Vec<f32>,
-    /// `[PLACES, size / PATCH, size / PATCH]`
-    pub places: Vec<f32>,
 }
 
 /// The ship's own axes.
@@ -52,80 +48,88 @@ struct Wave {
     envelope: f64,
 }
 
-impl WakeMaps {
-    /// The maps of a scene; all zero where the track of the ship is not known, or there is no ship.
-    ///
-    /// With (ξ, η) forward and to port of where the waves start, x = −ξ, and inside x² > 8η²:
-    ///
-    /// ```text
-    /// s = (x ∓ √(x² − 8η²))/(4|η|)           − transverse, + divergent waves
-    /// phase = ν √(1 + s²) (x − s|η|),  k = ν (1 + s²),  ν = g/U²
-    /// ```
-    ///
-    /// - from the bow and from the stern: cos and sin of both phases, falling as 1/√r and to 0 where the
-    ///   wavelength is two pixels
-    /// - the turbulent wake: a band of 40 m half-width behind the stern
-    /// - on the latent grid: places in the ship's frame, in the wedge or not, wavenumbers of both waves
-    ///
-    /// # References
-    ///
-    /// Kelvin (1887); Lighthill (1978), "Waves in Fluids", section 3.10.
-    pub fn new(conditions: &Conditions, grid: MapGrid) -> Self {
-        let coarse = grid.size / PATCH;
-        let mut maps = Self {
-            waves: vec![0.0; WAVES * grid.size * grid.size],
-            places: vec![0.0; PLACES * coarse * coarse],
-        };
-        let track = conditions.track().filter(|&(speed, ..)| speed > 0.0);
-        if let Some((speed, heading, position)) = track {
-            let (sin, cos) = heading.to_radians().sin_cos();
-            let frame = Frame {
-                forward: [sin, cos],
-                position,
-                wavenumber: GRAVITY / (speed * speed),
-            };
-            maps.draw_waves(&frame, grid);
-            maps.draw_places(&frame, grid);
-        }
-        maps
-    }
-
-    fn draw_waves(&mut self, frame: &Frame, grid: MapGrid) {
-        let pixels = grid.size * grid.size;
+/// Phases of the wake in some squares of pixels; all zero where the track of the ship is not known, or there is no ship.
+///
+/// With (ξ, η) forward and to port of where the waves start, x = −ξ, and inside x² > 8η²:
+///
+/// ```text
+/// s = (x ∓ √(x² − 8η²))/(4|η|)           − transverse, + divergent waves
+/// phase = ν √(1 + s²) (x − s|η|),  k = ν (1 + s²),  ν = g/U²
+/// ```
+///
+/// - from the bow and from the stern: cos and sin of both phases, falling as 1/√r and to 0 where the wavelength is
+///   two pixels; where both meet, at the cusp line, cos and sin of their mean phase times Ai(−ζ), ⅔ ζ^(3/2) being half
+///   their difference (outside the wedge: half the imaginary part of it, with ζ < 0)
+/// - the turbulent wake: a band of 40 m half-width behind the stern
+///
+/// `cells`: squares of [`PATCH`] × [`PATCH`] pixels, counted in rows.
+///
+/// # Shapes
+///
+/// `[WAVES, PATCH², cells]`
+///
+/// # References
+///
+/// Kelvin (1887); Lighthill (1978), "Waves in Fluids", section 3.10; Ursell (1960), "On Kelvin's Ship-Wave Pattern",
+/// section 4 (cusp line).
+pub fn wave_squares(conditions: &Conditions, grid: MapGrid, cells: &[usize]) -> Vec<f32> {
+    let (pixels, count) = (PATCH * PATCH, cells.len());
+    let mut maps = vec![0.0; WAVES * pixels * count];
+    let Some(frame) = Frame::of(conditions) else {
+        return maps;
+    };
+    for (n, &cell) in cells.iter().enumerate() {
         for pixel in 0..pixels {
-            let place = frame.seen_from_ship(grid.place(pixel / grid.size, pixel % grid.size, 0.0));
-            for (i, start) in [0.5, -0.5].into_iter().enumerate() {
-                let behind = [place[0] - start * SHIP_LENGTH, place[1]];
-                let Some(waves) = frame.waves(behind, grid.spacing) else {
-                    continue;
-                };
-                for (j, wave) in waves.into_iter().enumerate() {
-                    let (sin, cos) = wave.phase.sin_cos();
-                    let map = 4 * i + 2 * j;
-                    self.waves[map * pixels + pixel] = (wave.envelope * cos) as f32;
-                    self.waves[(map + 1) * pixels + pixel] = (wave.envelope * sin) as f32;
-                }
-            }
-            self.waves[(WAVES - 1) * pixels + pixel] = turbulent(place) as f32;
-        }
-    }
-
-    fn draw_places(&mut self, frame: &Frame, grid: MapGrid) {
-        let coarse = grid.size / PATCH;
-        let pixels = coarse * coarse;
-        for pixel in 0..pixels {
-            let (row, column) = (pixel / coarse * PATCH, pixel % coarse * PATCH);
-            // The middle of a square of PATCH pixels lies half a pixel before its pixel PATCH/2.
-            let middle = 0.5 * (PATCH as f64 - 1.0);
-            let place = frame.seen_from_ship(grid.place(row, column, middle));
-            for (map, value) in frame.places(place, grid.spacing).into_iter().enumerate() {
-                self.places[map * pixels + pixel] = value as f32;
+            let [row, column] = grid.corner(cell);
+            let place = grid.place(row + pixel / PATCH, column + pixel % PATCH, 0.0);
+            let values = frame.phases(frame.seen_from_ship(place), grid.spacing);
+            for (map, value) in values.into_iter().enumerate() {
+                maps[(map * pixels + pixel) * count + n] = value as f32;
             }
         }
     }
+    maps
+}
+
+/// Where some latent pixels lie in the ship's frame; all zero where [`wave_squares`] are.
+///
+/// Distances along and across the track, in the image's axes and from the ship, in the wedge or not, how far from its
+/// edge, in the turbulent wake or not, the wavenumbers of the transverse and the divergent wave from the stern, then
+/// the directions of both and of the wave at the cusp line.
+///
+/// # Shapes
+///
+/// `[PLACES, cells]`
+pub fn places(conditions: &Conditions, grid: MapGrid, cells: &[usize]) -> Vec<f32> {
+    let mut maps = vec![0.0; PLACES * cells.len()];
+    let Some(frame) = Frame::of(conditions) else {
+        return maps;
+    };
+    // The middle of a square of PATCH pixels lies half a pixel before its pixel PATCH/2.
+    let middle = 0.5 * (PATCH as f64 - 1.0);
+    for (n, &cell) in cells.iter().enumerate() {
+        let [row, column] = grid.corner(cell);
+        let place = frame.seen_from_ship(grid.place(row, column, middle));
+        for (map, value) in frame.places(place, grid.spacing).into_iter().enumerate() {
+            maps[map * cells.len() + n] = value as f32;
+        }
+    }
+    maps
 }
 
 impl MapGrid {
+    /// All squares of pixels, in rows.
+    pub fn cells(self) -> Vec<usize> {
+        let coarse = self.size / PATCH;
+        (0..coarse * coarse).collect()
+    }
+
+    /// Row and column of the first pixel of a square.
+    fn corner(self, cell: usize) -> [usize; 2] {
+        let coarse = self.size / PATCH;
+        [cell / coarse * PATCH, cell % coarse * PATCH]
+    }
+
     /// Place (x, y) \[m\] of a pixel, moved down and right by a part of a pixel.
     fn place(self, row: usize, column: usize, offset: f64) -> [f64; 2] {
         let origin = (self.size / 2) as f64;
@@ -137,6 +141,17 @@ impl MapGrid {
 }
 
 impl Frame {
+    /// The frame of a ship whose track is known and that moves.
+    fn of(conditions: &Conditions) -> Option<Self> {
+        let (speed, heading, position) = conditions.track()?;
+        let (sin, cos) = heading.to_radians().sin_cos();
+        (speed > 0.0).then(|| Self {
+            forward: [sin, cos],
+            position,
+            wavenumber: GRAVITY / (speed * speed),
+        })
+    }
+
     /// (ξ, η) \[m\]: forward of midship and to port.
     fn seen_from_ship(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (dx, dy) = (x - self.position[0], y - self.position[1]);
@@ -165,6 +180,69 @@ impl Frame {
         }))
     }
 
+    /// Phase and envelope of the wave along the cusp line, at (ξ, η) from its origin.
+    ///
+    /// With s = (x ∓ √(x² − 8η²))/(4|η|), complex outside the wedge, the phase is the mean of both waves', and half
+    /// their difference is ⅔ ζ^(3/2).
+    fn cusp_wave(&self, [along, across]: [f64; 2], spacing: f64) -> (f64, f64) {
+        let (x, off) = (-along, across.abs().max(1e-3));
+        if x <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let square = x * x - 8.0 * off * off;
+        let root = square.abs().sqrt();
+        let phase = |slope: [f64; 2]| self.complex_phase(x, off, slope);
+        let middle = x / (4.0 * off);
+        let (mean, zeta) = if square > 0.0 {
+            let [transverse, divergent] =
+                [-1.0, 1.0].map(|sign| phase([middle + sign * root / (4.0 * off), 0.0])[0]);
+            let half = 0.5 * (transverse - divergent).abs();
+            (0.5 * (transverse + divergent), (1.5 * half).powf(2.0 / 3.0))
+        } else {
+            let [mean, imaginary] = phase([middle, -root / (4.0 * off)]);
+            (mean, -(1.5 * imaginary.abs()).powf(2.0 / 3.0))
+        };
+        let k = 1.5 * self.wavenumber;
+        let resolved = (1.0 - k * spacing / std::f64::consts::PI).max(0.0);
+        let far = (NEAREST / x.hypot(off).max(NEAREST)).sqrt();
+        (mean, far * resolved.min(0.25) * 4.0 * airy(-zeta))
+    }
+
+    /// ν √(1 + s²) (x − s|η|) for a complex s.
+    fn complex_phase(&self, x: f64, off: f64, [re, im]: [f64; 2]) -> [f64; 2] {
+        // 1 + s², its root in the right half plane, and the rest of the product.
+        let (a, b) = (1.0 + re * re - im * im, 2.0 * re * im);
+        let length = a.hypot(b);
+        let root = [
+            (0.5 * (length + a)).max(0.0).sqrt(),
+            (0.5 * (length - a)).max(0.0).sqrt() * b.signum(),
+        ];
+        let rest = [x - re * off, -im * off];
+        [
+            self.wavenumber * (root[0] * rest[0] - root[1] * rest[1]),
+            self.wavenumber * (root[0] * rest[1] + root[1] * rest[0]),
+        ]
+    }
+
+    /// What the full grid shows of a place.
+    fn phases(&self, place: [f64; 2], spacing: f64) -> [f64; WAVES] {
+        let mut values = [0.0; WAVES];
+        for (i, start) in [0.5, -0.5].into_iter().enumerate() {
+            let behind = [place[0] - start * SHIP_LENGTH, place[1]];
+            for (j, wave) in self.waves(behind, spacing).iter().flatten().enumerate() {
+                let (sin, cos) = wave.phase.sin_cos();
+                values[6 * i + 2 * j] = wave.envelope * cos;
+                values[6 * i + 2 * j + 1] = wave.envelope * sin;
+            }
+            let (phase, envelope) = self.cusp_wave(behind, spacing);
+            let (sin, cos) = phase.sin_cos();
+            values[6 * i + 4] = envelope * cos;
+            values[6 * i + 5] = envelope * sin;
+        }
+        values[WAVES - 1] = turbulent(place);
+        values
+    }
+
     /// A vector (along the track, to port) in the directions (x, y).
     fn turned(&self, along: f64, across: f64) -> [f64; 2] {
         let [fx, fy] = self.forward;
@@ -184,7 +262,17 @@ impl Frame {
                 .filter(|wave| wave.envelope > 0.0);
             resolved.map_or(0.0, |wave| wave.wavenumber[axis] * 10.0)
         };
+        let direction = |i: usize, axis: usize| {
+            let length = k(i, 0).hypot(k(i, 1));
+            if length > 0.0 {
+                k(i, axis) / length
+            } else {
+                0.0
+            }
+        };
         let distance = along.hypot(across);
+        // s = 1/√2 at the cusp line.
+        let cusp = self.turned((2f64 / 3.0).sqrt(), (1f64 / 3.0).sqrt() * across.signum());
         [
             (along / 200.0).tanh(),
             (across / 100.0).tanh(),
@@ -198,6 +286,12 @@ impl Frame {
             k(0, 1),
             k(1, 0),
             k(1, 1),
+            direction(0, 0),
+            direction(0, 1),
+            direction(1, 0),
+            direction(1, 1),
+            cusp[0],
+            cusp[1],
         ]
     }
 }

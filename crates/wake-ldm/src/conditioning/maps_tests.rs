@@ -40,6 +40,21 @@ fn elevation(speed: f64, heading: f64, position: [f64; 2]) -> Vec<f32> {
     simulate(&scene).unwrap().elevation.values
 }
 
+/// The phase maps as images, `[WAVES, size, size]`.
+fn images(conditions: &Conditions) -> Vec<f32> {
+    let cells = GRID.cells();
+    let squares = wave_squares(conditions, GRID, &cells);
+    let (coarse, pixels) = (GRID.size / PATCH, PATCH * PATCH);
+    let at = |i: usize| {
+        let (map, p) = (i / (GRID.size * GRID.size), i % (GRID.size * GRID.size));
+        let (row, column) = (p / GRID.size, p % GRID.size);
+        let cell = row / PATCH * coarse + column / PATCH;
+        let pixel = row % PATCH * PATCH + column % PATCH;
+        squares[(map * pixels + pixel) * cells.len() + cell]
+    };
+    (0..WAVES * GRID.size * GRID.size).map(at).collect()
+}
+
 /// Correlation of a field with the best sum of columns, by the normal equations.
 fn best_correlation(columns: &[Vec<f64>], field: &[f64]) -> f64 {
     let n = columns.len();
@@ -109,8 +124,7 @@ fn a_sum_of_the_maps_is_nearly_the_simulators_wake() {
             |values: &[f32]| -> Vec<f64> { pixels.iter().map(|&p| f64::from(values[p])).collect() };
         let field = chosen(&elevation(speed, heading, position));
         let columns = |conditions: &Conditions| -> Vec<Vec<f64>> {
-            let maps = WakeMaps::new(conditions, GRID);
-            maps.waves
+            images(conditions)
                 .chunks(GRID.size * GRID.size)
                 .take(WAVES - 1)
                 .map(chosen)
@@ -145,35 +159,58 @@ fn no_track_no_maps() {
         },
     ];
     for conditions in unknown {
-        let maps = WakeMaps::new(&conditions, GRID);
-        assert!(
-            maps.waves
-                .iter()
-                .chain(&maps.places)
-                .all(|x| x.abs() < f32::MIN_POSITIVE)
-        );
+        let mut maps = images(&conditions);
+        maps.extend(places(&conditions, GRID, &GRID.cells()));
+        assert!(maps.iter().all(|x| x.abs() < f32::MIN_POSITIVE));
     }
 }
 
 #[test]
 fn maps_are_finite_and_move_with_the_ship() {
     let shift = [8.0 * GRID.spacing, -16.0 * GRID.spacing];
-    let (a, b) = (
-        WakeMaps::new(&known(9.0, 70.0, [0.0, 0.0]), GRID),
-        WakeMaps::new(&known(9.0, 70.0, shift), GRID),
-    );
+    let (here, there) = (known(9.0, 70.0, [0.0, 0.0]), known(9.0, 70.0, shift));
+    let [a, b] = [&here, &there].map(images);
+    let places = places(&here, GRID, &GRID.cells());
     // The largest numbers are ten times the largest wavenumber shown, one wave on two pixels.
     let largest = 10.0 * 2.0 * std::f64::consts::FRAC_PI_2 / GRID.spacing;
     let bounded = |x: &f32| f64::from(x.abs()) <= largest;
-    assert!(a.waves.iter().chain(&a.places).all(bounded));
+    assert!(a.iter().chain(&places).all(bounded));
     for map in 0..WAVES {
         for (row, column) in [(64, 40), (70, 50), (60, 20), (90, 10)] {
-            let at = |maps: &WakeMaps, row: usize, column: usize| {
-                maps.waves[(map * GRID.size + row) * GRID.size + column]
+            let at = |maps: &[f32], row: usize, column: usize| {
+                maps[(map * GRID.size + row) * GRID.size + column]
             };
             // Eight pixels away in range and sixteen toward smaller azimuth, so further down.
             let difference = at(&a, row, column) - at(&b, row + 16, column + 8);
             assert!(difference.abs() < 1e-4, "map {map}: {difference}");
         }
     }
+}
+
+#[test]
+fn the_cusp_wave_is_smooth_across_the_edge_of_the_wedge_and_fades_outside() {
+    let frame = Frame {
+        forward: [0.0, 1.0],
+        position: [0.0, 0.0],
+        wavenumber: 0.1,
+    };
+    let (x, edge) = (400.0, 400.0 / 8f64.sqrt());
+    let value = |across: f64| {
+        let (phase, envelope) = frame.cusp_wave([-x, across], 4.0);
+        envelope * phase.cos()
+    };
+    // Value and slope agree on both sides: differences over h on the left and on the right differ by O(h).
+    let h = 0.5;
+    let (left, right) = (value(edge) - value(edge - h), value(edge + h) - value(edge));
+    assert!(
+        (left - right).abs() < 0.1 * left.abs().max(right.abs()),
+        "{left} {right}"
+    );
+    let envelope = |across: f64| frame.cusp_wave([-x, across], 4.0).1.abs();
+    assert!(
+        envelope(edge + 60.0) < 0.1 * envelope(edge),
+        "{}",
+        envelope(edge + 60.0)
+    );
+    assert!(value(-edge) - value(edge) < 1e-12);
 }

@@ -1,24 +1,28 @@
 //! What the small wake model is told about a scene: numbers, the geometry of the wake, and words.
 //!
 //! ```text
-//! prompt ─► token ids ─► compact ids ──────────────┐
-//! numbers ─► Fourier features ─────────────────────┼─► model
-//! numbers ─► phases of the Kelvin wake at each pixel ┘
+//! prompt ─► token ids ─► compact ids ─► reader ─► numbers
+//! numbers ─► Fourier features ──────────────────────────┐
+//! numbers ─► phases of the Kelvin wake at each pixel ───┴─► model
 //! ```
 //!
 //! Whatever is not known is left out: a number that no prompt states has the flag 0 and no value, and without
 //! speed, heading and place of the ship the maps are empty.
 
+mod airy;
 mod conditions;
 mod features;
 mod maps;
+mod range;
+mod statement;
 mod vocabulary;
 
 use wake_text::Tokenizer;
 
 pub use conditions::Conditions;
 pub use features::{FEATURES, features};
-pub use maps::{MapGrid, PATCH, PLACES, WAVES, WakeMaps};
+pub use maps::{DIRECTIONS, MapGrid, PATCH, PLACES, WAVES, WEDGE, places, wave_squares};
+pub use statement::{QUANTITIES, statement};
 pub use vocabulary::Vocabulary;
 
 /// CLIP's ids of a prompt, with marks and padding.

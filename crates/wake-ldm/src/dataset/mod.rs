@@ -27,6 +27,7 @@ mod scenes;
 // Scene → pair → batch.
 mod ordered;
 mod pair;
+mod prompts;
 
 // Pairs ⇄ folder.
 mod boxes;
@@ -49,6 +50,7 @@ pub use layout::{Manifest, Shard};
 pub use merge::{merge, shard_folder};
 pub use pair::{Grey, Pair};
 pub use parameters::Parameters;
+pub use prompts::Prompts;
 pub use ranges::{Place, Ranges};
 pub use recipe::{Draw, Recipe};
 pub use scenes::Simulated;

@@ -10,12 +10,12 @@ use burn::tensor::{Device, Tensor};
 use wake_physics::Scene;
 use wake_physics::labels::Labels;
 use wake_physics::{Field, labels_of};
-use wake_text::{PartialScene, Tokenizer, Wording};
+use wake_text::{PartialScene, Wording};
 
 use crate::conditioning::{Conditions, MapGrid, Vocabulary};
 use crate::error::{Error, Result, check_range};
 use crate::noise::{INITIAL_STREAM, NoiseSource, normal_batch};
-use crate::small::{Encoded, Known, ModelInput, PatchTransform, WakeModel, WakeModelConfig, Words};
+use crate::small::{Expected, Known, WakeModel, WakeModelConfig};
 pub use image::{SampleSeconds, WakeImage};
 
 /// Steps from noise to image, unless others are asked for.
@@ -24,10 +24,10 @@ const STEPS: usize = 8;
 /// What the model is told about a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Told {
-    /// The words, and the numbers they state.
+    /// The numbers that [`wake_text`] reads from the words, and those that only the model reads.
     #[default]
     Both,
-    /// The words alone.
+    /// The words alone, as the model reads them.
     Words,
     /// The numbers alone.
     Numbers,
@@ -44,7 +44,6 @@ pub enum Told {
 #[derive(Debug, Clone)]
 pub struct WakeSampler {
     model: WakeModel,
-    transform: PatchTransform,
     config: WakeModelConfig,
     vocabulary: Vocabulary,
     device: Device,
@@ -58,18 +57,13 @@ impl WakeSampler {
     /// # Errors
     ///
     /// As [`WakeModelConfig::validate`].
-    pub fn new(
-        model: WakeModel,
-        transform: PatchTransform,
-        config: WakeModelConfig,
-    ) -> Result<Self> {
+    pub fn new(model: WakeModel, config: WakeModelConfig) -> Result<Self> {
         config.validate()?;
         let device = model.devices().into_iter().next().unwrap_or_default();
         Ok(Self {
             vocabulary: Vocabulary::new(config.vocabulary.iter().copied()),
             device,
             model,
-            transform,
             config,
             steps: STEPS,
             told: Told::default(),
@@ -205,16 +199,14 @@ impl WakeSampler {
     /// From noise to grey, all images at once.
     fn run(&self, inputs: &[(Conditions, String)], seeds: &[u64], begin: Instant) -> Result<Drawn> {
         let mut seconds = SampleSeconds::default();
-        let encoded = self.encode(inputs);
-        wait_for(&encoded.maps);
+        let conditions = self.told(inputs);
         seconds.text = begin.elapsed().as_secs_f64();
-        let latents = self.denoise(&encoded, seeds);
+        let known = Known::new(&conditions, self.grid(), &self.device);
+        let expected = self.model.expect(&conditions, &known, self.grid());
+        let latents = self.denoise(&known, &expected, seeds);
         wait_for(&latents);
         seconds.denoise = begin.elapsed().as_secs_f64() - seconds.text;
-        let grey = self
-            .transform
-            .decode(latents, self.model.mean_grey(&encoded))
-            .clamp(0.0, 1.0);
+        let grey = self.model.decode(latents, &expected);
         let pixels: Vec<f32> = grey.to_data().iter::<f32>().collect();
         seconds.total = begin.elapsed().as_secs_f64();
         seconds.decode = seconds.total - seconds.text - seconds.denoise;
@@ -226,51 +218,44 @@ impl WakeSampler {
         })
     }
 
-    /// What the model makes of numbers and words.
-    fn encode(&self, inputs: &[(Conditions, String)]) -> Encoded {
-        let tokens = |text: &str| Tokenizer::clip().encode(text).ids.to_vec();
-        let conditions: Vec<Conditions> = inputs
-            .iter()
-            .map(|(known, _)| {
-                if self.told == Told::Words {
-                    Conditions::default()
-                } else {
-                    *known
-                }
-            })
-            .collect();
-        let prompts: Vec<Vec<u32>> = inputs
-            .iter()
-            .map(|(_, text)| tokens(if self.told == Told::Numbers { "" } else { text }))
-            .collect();
-        let grid = MapGrid {
+    fn grid(&self) -> MapGrid {
+        MapGrid {
             size: self.config.image_size,
             spacing: self.config.spacing,
-        };
-        let words = Words::new(&prompts, &self.vocabulary, &self.device);
-        let (context, summary) = self.model.read(&words);
-        self.model.encode(
-            Known::new(&conditions, grid, &self.device),
-            context,
-            summary,
-        )
+        }
     }
 
-    /// Euler's steps along the flow, equal in σ.
-    fn denoise(&self, encoded: &Encoded, seeds: &[u64]) -> Tensor<4> {
+    /// The numbers that images are drawn from; what is told of none is that of the base scene.
+    fn told(&self, inputs: &[(Conditions, String)]) -> Vec<Conditions> {
+        let base = conditions_of(&self.base_scene());
+        if self.told == Told::Numbers {
+            return inputs.iter().map(|(known, _)| known.or(base)).collect();
+        }
+        let prompts: Vec<&str> = inputs.iter().map(|(_, text)| text.as_str()).collect();
+        let read = self.model.read(&prompts, &self.vocabulary, &self.device);
+        let pairs = inputs.iter().zip(read);
+        pairs
+            .map(|((known, _), read)| match self.told {
+                Told::Words => read.or(base),
+                _ => known.or(read).or(base),
+            })
+            .collect()
+    }
+
+    /// Euler's steps along the flow, equal in σ, from noise to latents.
+    fn denoise(&self, known: &Known, expected: &Expected, seeds: &[u64]) -> Tensor<4> {
         let size = self.config.latent_size();
         let sources: Vec<NoiseSource> = seeds.iter().map(|&seed| NoiseSource::new(seed)).collect();
         let shape = [self.config.latent_channels, size, size];
         let mut x = normal_batch(&sources, INITIAL_STREAM, shape, &self.device);
+        let told = self.model.flow.told(known);
         for i in 0..self.steps {
             let sigma = 1.0 - i as f64 / self.steps as f64;
-            let input = ModelInput {
-                latents: x.clone(),
-                sigma: Tensor::full([seeds.len()], sigma, &self.device),
-            };
-            x = x - self.model.velocity(input, encoded) / self.steps as f64;
+            let sigma = Tensor::full([seeds.len()], sigma, &self.device);
+            let velocity = self.model.flow.velocity(x.clone(), sigma, &told);
+            x = x - velocity / self.steps as f64;
         }
-        x
+        expected.latents(x)
     }
 }
 

@@ -6,13 +6,22 @@ use burn::tensor::Device;
 
 use super::WakeSampler;
 use crate::error::Result;
-use crate::small::{PatchTransform, WakeModelConfig};
+use crate::small::{WakeModel, WakeModelConfig};
 use crate::weights::{Layout, load, load_bytes, read_text};
 
 /// Files of a small model.
 const CONFIG: &str = "config.json";
-const MODEL: &str = "model.safetensors";
 const PATCHES: &str = "patches.safetensors";
+const READER: &str = "reader.safetensors";
+const PRIOR: &str = "prior.safetensors";
+const FLOW: &str = "flow.safetensors";
+
+/// Bytes of a file of the model in this crate.
+macro_rules! asset {
+    ($name:literal) => {
+        include_bytes!(concat!("../../assets/", $name))
+    };
+}
 
 impl WakeSampler {
     /// The model that lies in this crate.
@@ -23,21 +32,19 @@ impl WakeSampler {
     pub fn pretrained(device: &Device) -> Result<Self> {
         let config = include_str!("../../assets/config.json");
         let config = WakeModelConfig::from_json(config, Path::new(CONFIG))?;
-        let patches = PatchTransform::zeros(config.latent_channels, device);
         let (model, layout) = (config.init(device), Layout::Diffusers);
-        let model = load_bytes(
-            model,
-            layout,
-            MODEL,
-            include_bytes!("../../assets/model.safetensors"),
-        )?;
-        let patches = load_bytes(
-            patches,
-            layout,
-            PATCHES,
-            include_bytes!("../../assets/patches.safetensors"),
-        )?;
-        Self::new(model, patches, config)
+        let model = WakeModel {
+            patches: load_bytes(
+                model.patches,
+                layout,
+                PATCHES,
+                asset!("patches.safetensors"),
+            )?,
+            reader: load_bytes(model.reader, layout, READER, asset!("reader.safetensors"))?,
+            prior: load_bytes(model.prior, layout, PRIOR, asset!("prior.safetensors"))?,
+            flow: load_bytes(model.flow, layout, FLOW, asset!("flow.safetensors"))?,
+        };
+        Self::new(model, config)
     }
 
     /// A model that training wrote into a folder.
@@ -49,9 +56,13 @@ impl WakeSampler {
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let file = folder.join(CONFIG);
         let config = WakeModelConfig::from_json(&read_text(&file)?, &file)?;
-        let patches = PatchTransform::zeros(config.latent_channels, device);
-        let model = load(config.init(device), Layout::Diffusers, &folder.join(MODEL))?;
-        let patches = load(patches, Layout::Diffusers, &folder.join(PATCHES))?;
-        Self::new(model, patches, config)
+        let (model, layout) = (config.init(device), Layout::Diffusers);
+        let model = WakeModel {
+            patches: load(model.patches, layout, &folder.join(PATCHES))?,
+            reader: load(model.reader, layout, &folder.join(READER))?,
+            prior: load(model.prior, layout, &folder.join(PRIOR))?,
+            flow: load(model.flow, layout, &folder.join(FLOW))?,
+        };
+        Self::new(model, config)
     }
 }

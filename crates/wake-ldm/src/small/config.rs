@@ -6,8 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::{FEATURES, Vocabulary};
 use crate::error::{Error, Result, check_range};
-use crate::nn::activation::Activation;
-use crate::text::ClipTextConfig;
 use crate::unet::UNetConfig;
 
 /// Widths of a [`WakeModel`](super::WakeModel), its image, and the tokens it knows.
@@ -24,17 +22,17 @@ pub struct WakeModelConfig {
     pub fold: usize,
     /// Width of each level of the U-Net; each but the last halves the image.
     pub widths: Vec<usize>,
-    /// Whether a level attends to words and to itself.
+    /// Whether a level attends to itself and to the numbers.
     pub attention: Vec<bool>,
-    /// Channels of a token.
+    /// Channels of a token in the reader.
     pub text_width: usize,
-    /// Layers of the text transformer.
-    pub text_layers: usize,
-    /// Channels of the maps before they join the latents.
+    /// Channels of the network of mean and spread.
+    pub prior_width: usize,
+    /// Channels of the maps that join the noisy latents.
     pub map_channels: usize,
     /// Groups of every group normalisation.
     pub norm_groups: usize,
-    /// CLIP's ids that the text transformer knows.
+    /// CLIP's ids that the reader knows.
     pub vocabulary: Vec<u32>,
 }
 
@@ -49,7 +47,7 @@ impl WakeModelConfig {
             widths: vec![64, 96],
             attention: vec![false, true],
             text_width: 64,
-            text_layers: 2,
+            prior_width: 128,
             map_channels: 32,
             norm_groups: 16,
             vocabulary: vocabulary.known().to_vec(),
@@ -91,7 +89,16 @@ impl WakeModelConfig {
         check_range("spacing", self.spacing, 0.1, 100.0)?;
         check_range("latent_channels", self.latent_channels as f64, 1.0, 64.0)?;
         check_range("map_channels", self.map_channels as f64, 1.0, 4096.0)?;
-        self.text().validate()?;
+        check_range("text_width", self.text_width as f64, 2.0, 4096.0)?;
+        check_range("prior_width", self.prior_width as f64, 1.0, 4096.0)?;
+        check_range("vocabulary", self.vocabulary.len() as f64, 1.0, 65536.0)?;
+        if !self.text_width.is_multiple_of(2) {
+            return Err(Error::InvalidOption {
+                option: "text_width".to_owned(),
+                value: self.text_width.to_string(),
+                expected: "an even number".to_owned(),
+            });
+        }
         self.unet().validate()
     }
 
@@ -100,30 +107,11 @@ impl WakeModelConfig {
         self.image_size / crate::conditioning::PATCH
     }
 
-    /// The text transformer.
-    pub(super) fn text(&self) -> ClipTextConfig {
-        ClipTextConfig::new()
-            .with_vocab_size(self.vocabulary.len() + 1)
-            .with_hidden_size(self.text_width)
-            .with_intermediate_size(4 * self.text_width)
-            .with_layers(self.text_layers)
-            .with_heads((self.text_width / 32).max(1))
-            .with_activation(Activation::Gelu)
-            .with_end_token(self.end_token())
-    }
-
-    /// The compact id of CLIP's end mark.
-    fn end_token(&self) -> i64 {
-        const END: u32 = 49407;
-        Vocabulary::new(self.vocabulary.iter().copied()).compact(END) as i64
-    }
-
     /// The U-Net, which also sees the maps.
     pub(super) fn unet(&self) -> UNetConfig {
-        let condition = FEATURES + self.text_width;
         let folded = self.latent_channels * self.fold * self.fold;
         let upward = self.attention.iter().rev().copied().collect();
-        UNetConfig::small(folded, self.text_width, Some(condition))
+        UNetConfig::small(folded, FEATURES, Some(FEATURES))
             .with_in_channels(folded + self.map_channels)
             .with_block_out_channels(self.widths.clone())
             .with_down_attention(self.attention.clone())

@@ -1,11 +1,17 @@
-//! The small wake model: a linear patch transform, a text transformer, and a conditional U-Net.
+//! The small wake model: a linear patch transform, a reader of prompts, mean and spread of the latents, and a flow.
 
 mod config;
+mod flow;
 mod input;
 mod model;
 mod patches;
+mod prior;
+mod reader;
 
 pub use config::WakeModelConfig;
-pub use input::{Known, ModelInput, Words};
-pub use model::{Encoded, WakeModel};
+pub use flow::{Flow, Told};
+pub use input::{Known, phases};
+pub use model::WakeModel;
 pub use patches::{PatchTransform, Shares};
+pub use prior::{Expected, Prior};
+pub use reader::{Reader, windows};

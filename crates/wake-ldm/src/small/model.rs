@@ -1,141 +1,113 @@
-//! From noisy latents, numbers and words to the velocity of the flow.
+//! The parts of the small wake model.
 
 use burn::module::Module;
-use burn::nn::conv::Conv2d;
-use burn::nn::{Linear, LinearConfig};
-use burn::tensor::activation::silu;
 use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
-use super::input::{Known, ModelInput, Words};
-use crate::autoencoder::patch::{depth_to_space, space_to_depth};
-use crate::conditioning::{FEATURES, PATCH, PLACES, WAVES};
-use crate::nn::cast_to;
-use crate::nn::conv::{conv1x1, conv3x3, convolve};
-use crate::text::ClipText;
-use crate::unet::{UNet, UNetInput};
-
-/// The steps that σ = 1 stands for in the embedding of the step.
-const STEPS: f64 = 1000.0;
+use super::flow::Flow;
+use super::input::Known;
+use super::patches::PatchTransform;
+use super::prior::{Expected, Prior};
+use super::reader::{Reader, windows};
+use crate::conditioning::{Conditions, MapGrid, QUANTITIES, Vocabulary, tokens};
 
 /// A latent diffusion model of radar images of wakes.
 ///
 /// ```text
-/// words ─► transformer ─► tokens, summary ─┐
-/// numbers ─────────────────────────────────┼─► U-Net ─► velocity n − x₀
-/// phase maps ─► two convolutions ──────────┤     │
-/// noisy latents ───────────────────────────┘     numbers, summary ─► mean grey
+/// words ─► reader ─► numbers ─┬─► prior ─► mean μ, spread s, mean grey ─┐
+///                             └─► flow: noise ─► residual r ────────────┴─► z = μ + s r ─► patches ─► image
 /// ```
 #[derive(Module, Debug)]
 pub struct WakeModel {
-    text: ClipText,
-    reader: Linear,
-    map_in: Conv2d,
-    map_out: Conv2d,
-    grey_in: Linear,
-    grey_out: Linear,
-    unet: UNet,
-    fold: usize,
-}
-
-/// What a model has made of the conditions: the same for every step.
-#[derive(Debug, Clone)]
-pub struct Encoded {
-    /// Tokens `[batch, tokens, text_width]`.
-    pub context: Tensor<3>,
-    /// Numbers and summary of the words, `[batch, FEATURES + text_width]`.
-    pub condition: Tensor<2>,
-    /// `[batch, map_channels, rows, columns]` of what the U-Net sees.
-    pub maps: Tensor<4>,
+    /// Squares of pixels as latents.
+    pub patches: PatchTransform,
+    /// Words to numbers.
+    pub reader: Reader,
+    /// Numbers to mean and spread.
+    pub prior: Prior,
+    /// Noise to residual.
+    pub flow: Flow,
 }
 
 impl WakeModelConfig {
-    /// A model with random weights; they are drawn when they are first used.
+    /// A model with random weights, and patches that still have to be fitted or loaded.
     ///
     /// # Panics
     ///
     /// When [`validate`](Self::validate) fails.
     pub fn init(&self, device: &Device) -> WakeModel {
+        WakeModel {
+            patches: PatchTransform::zeros(self.latent_channels, device),
+            reader: self.init_reader(device),
+            prior: self.init_prior(device),
+            flow: self.init_flow(device),
+        }
+    }
+
+    /// A reader with random weights.
+    ///
+    /// # Panics
+    ///
+    /// When [`validate`](Self::validate) fails.
+    pub fn init_reader(&self, device: &Device) -> Reader {
+        self.assert_valid();
+        Reader::new(self, device)
+    }
+
+    /// A prior with random weights.
+    ///
+    /// # Panics
+    ///
+    /// When [`validate`](Self::validate) fails.
+    pub fn init_prior(&self, device: &Device) -> Prior {
+        self.assert_valid();
+        Prior::new(self, device)
+    }
+
+    /// A flow with random weights.
+    ///
+    /// # Panics
+    ///
+    /// When [`validate`](Self::validate) fails.
+    pub fn init_flow(&self, device: &Device) -> Flow {
+        self.assert_valid();
+        Flow::new(self, device)
+    }
+
+    fn assert_valid(&self) {
         if let Err(error) = self.validate() {
             panic!("{error}");
-        }
-        let linear = |from, to| LinearConfig::new(from, to).init(device);
-        let condition = FEATURES + self.text_width;
-        WakeModel {
-            text: self.text().init(device),
-            reader: linear(self.text_width, FEATURES),
-            map_in: conv1x1(WAVES * PATCH * PATCH + PLACES, self.map_channels, device),
-            map_out: conv3x3(
-                self.map_channels * self.fold * self.fold,
-                self.map_channels,
-                device,
-            ),
-            grey_in: linear(condition, 128),
-            grey_out: linear(128, 1),
-            unet: self.unet().init(device),
-            fold: self.fold,
         }
     }
 }
 
 impl WakeModel {
-    /// Tokens and summary of prompts.
-    ///
-    /// # Shapes
-    ///
-    /// `[batch, tokens, text_width]` and `[batch, text_width]`.
-    pub fn read(&self, words: &Words) -> (Tensor<3>, Tensor<2>) {
-        let out = self.text.forward(words.ids.clone());
-        (out.last_hidden_state, out.pooled)
+    /// The numbers that prompts state, as far as the reader finds them.
+    pub fn read(
+        &self,
+        prompts: &[&str],
+        vocabulary: &Vocabulary,
+        device: &Device,
+    ) -> Vec<Conditions> {
+        let ids: Vec<Vec<u32>> = prompts.iter().map(|prompt| tokens(prompt)).collect();
+        let (windows, tokens) = windows(&ids, vocabulary, device);
+        let read = self.reader.forward(windows, tokens).into_data();
+        let numbers: Vec<f32> = read.iter::<f32>().collect();
+        numbers
+            .chunks(3 * QUANTITIES)
+            .map(Conditions::of_statement)
+            .collect()
     }
 
-    /// The numbers that a summary of words speaks of, as [`features`](crate::conditioning::features).
-    ///
-    /// # Shapes
-    ///
-    /// `[batch, text_width]` to `[batch, FEATURES]`.
-    pub fn numbers(&self, summary: Tensor<2>) -> Tensor<2> {
-        self.reader.forward(summary)
+    /// Mean and spread of the latents of some scenes.
+    pub fn expect(&self, conditions: &[Conditions], known: &Known, grid: MapGrid) -> Expected {
+        self.prior.expect(conditions, known, &self.patches, grid)
     }
 
-    /// Puts numbers, words and maps in the form that every step uses.
-    ///
-    /// # Shapes
-    ///
-    /// `context`, `summary`: as [`read`](Self::read) gives them.
-    pub fn encode(&self, known: Known, context: Tensor<3>, summary: Tensor<2>) -> Encoded {
-        let dtype = self.map_in.weight.val().dtype();
-        let maps = cast_to(Tensor::cat(vec![known.waves, known.places], 1), dtype);
-        let maps = space_to_depth(silu(convolve(&self.map_in, maps)), self.fold);
-        let maps = convolve(&self.map_out, maps);
-        Encoded {
-            context,
-            condition: Tensor::cat(vec![cast_to(known.numbers, dtype), summary], 1),
-            maps: silu(maps),
-        }
-    }
-
-    /// Mean grey of the image, `[batch, 1]`.
-    pub fn mean_grey(&self, encoded: &Encoded) -> Tensor<2> {
-        let hidden = silu(self.grey_in.forward(encoded.condition.clone()));
-        self.grey_out.forward(hidden)
-    }
-
-    /// The velocity n − x₀ of the flow at x = (1 − σ) x₀ + σ n.
-    ///
-    /// # Shapes
-    ///
-    /// `[batch, latent_channels, rows, columns]`, as the latents.
-    pub fn velocity(&self, input: ModelInput, encoded: &Encoded) -> Tensor<4> {
-        let dtype = input.latents.dtype();
-        let maps = cast_to(encoded.maps.clone(), dtype);
-        let folded = space_to_depth(input.latents, self.fold);
-        let velocity = self.unet.forward(UNetInput {
-            sample: Tensor::cat(vec![folded, maps], 1),
-            timesteps: input.sigma * STEPS,
-            context: encoded.context.clone(),
-            condition: Some(encoded.condition.clone()),
-        });
-        depth_to_space(velocity, self.fold)
+    /// The image of latents, grey 0…1, `[batch, 1, rows, columns]`.
+    pub fn decode(&self, latents: Tensor<4>, expected: &Expected) -> Tensor<4> {
+        self.patches
+            .decode(latents, expected.grey.clone())
+            .clamp(0.0, 1.0)
     }
 }

@@ -4,24 +4,25 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use half::f16;
 
-use crate::conditioning::{Conditions, tokens};
+use crate::conditioning::{Conditions, MapGrid};
 use crate::dataset::Pair;
 use crate::error::{Error, Result};
-use crate::small::PatchTransform;
+use crate::small::{Known, PatchTransform, Prior};
+
+/// Examples whose residuals are computed at once.
+const RESIDUALS: usize = 16;
 
 /// One example beside its latents.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Example {
-    /// What is known of the scene.
+    /// The scene's numbers.
     pub conditions: Conditions,
-    /// Its prompts in several wordings, as CLIP's ids.
-    pub prompts: Vec<Vec<u32>>,
     /// Mean grey of the image.
     pub grey: f32,
 }
 
 impl Example {
-    /// Numbers and words of a pair; its mean grey follows from its image.
+    /// The numbers of a pair; its mean grey follows from its image.
     pub fn of(pair: &Pair) -> Self {
         let values = &pair.parameters;
         let conditions = Conditions {
@@ -36,7 +37,6 @@ impl Example {
         };
         Self {
             conditions,
-            prompts: vec![tokens(&pair.prompt)],
             grey: 0.0,
         }
     }
@@ -85,6 +85,34 @@ impl LatentSet {
         Ok(())
     }
 
+    /// The residuals of the latents about the mean and spread that a prior expects.
+    ///
+    /// - `patches`: what the latents were encoded with
+    /// - `done`: called with the number of examples after each batch
+    pub fn residuals(
+        self,
+        prior: &Prior,
+        patches: &PatchTransform,
+        grid: MapGrid,
+        mut done: impl FnMut(usize),
+    ) -> Self {
+        let device = patches.devices().into_iter().next().unwrap_or_default();
+        let mut latents = Vec::with_capacity(self.latents.len());
+        let all: Vec<usize> = (0..self.len()).collect();
+        for indices in all.chunks(RESIDUALS) {
+            let conditions: Vec<Conditions> = indices
+                .iter()
+                .map(|&i| self.examples[i].conditions)
+                .collect();
+            let known = Known::new(&conditions, grid, &device);
+            let expected = prior.expect(&conditions, &known, patches, grid);
+            let residual = expected.residual(self.latents(indices, &device));
+            latents.extend(residual.into_data().iter::<f32>().map(f16::from_f32));
+            done(indices.len());
+        }
+        Self { latents, ..self }
+    }
+
     /// Number of examples.
     pub fn len(&self) -> usize {
         self.examples.len()
@@ -103,6 +131,20 @@ impl LatentSet {
     /// One example.
     pub fn example(&self, index: usize) -> &Example {
         &self.examples[index]
+    }
+
+    /// Some latent pixels of one example, `[channels, cells]`.
+    pub fn pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
+        let [channels, rows, columns] = self.shape;
+        let image = &self.latents[index * channels * rows * columns..];
+        (0..channels)
+            .flat_map(|channel| {
+                cells
+                    .iter()
+                    .map(move |cell| channel * rows * columns + cell)
+            })
+            .map(|i| image[i].to_f32())
+            .collect()
     }
 
     /// Latents of some examples, `[indices, channels, rows, columns]`.

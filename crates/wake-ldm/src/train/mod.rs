@@ -10,26 +10,33 @@
 mod adam;
 mod average;
 mod checkpoint;
-mod diffusion;
+mod expectation;
 mod fine_tune;
+mod flow;
 mod latents;
 mod loss;
 mod metrics;
+mod order;
 mod rate;
+mod run;
 mod tensors;
 mod trainer;
+mod words;
 
 pub use adam::{Adam, AdamOptions};
 pub use average::Average;
 pub use checkpoint::{Checkpoint, Tensors};
-pub use diffusion::{Diffusion, DiffusionOptions, Losses};
+pub use expectation::PriorTask;
 pub use fine_tune::{FineTune, FineTuneOptions, Frozen};
+pub use flow::FlowTask;
 pub use latents::{Example, LatentSet};
-pub use loss::{FlowDraw, min_snr_weights};
+pub use loss::{min_snr_weights, noise_level};
 pub use metrics::Metrics;
 pub use rate::Rate;
+pub use run::{Run, RunOptions, Task, Terms};
 pub use tensors::{gradients, names, replaced, values};
 pub use trainer::{StepReport, Trainer, TrainerOptions};
+pub use words::WordsTask;
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;

@@ -8,10 +8,10 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
 use super::*;
-use crate::conditioning::{Conditions, Vocabulary};
-use crate::small::{PatchTransform, WakeModelConfig};
+use crate::conditioning::{Conditions, MapGrid, Vocabulary};
+use crate::dataset::{Prompts, Recipe, Simulated};
+use crate::small::{Flow, PatchTransform, WakeModelConfig};
 
-const END: u32 = 49407;
 const SIZE: usize = 32;
 
 fn config() -> WakeModelConfig {
@@ -19,16 +19,23 @@ fn config() -> WakeModelConfig {
         image_size: SIZE,
         latent_channels: 4,
         widths: vec![16, 32],
-        text_width: 32,
-        text_layers: 1,
+        text_width: 16,
+        prior_width: 16,
         map_channels: 8,
         norm_groups: 8,
-        ..WakeModelConfig::standard(&Vocabulary::new([1, 2, END]))
+        ..WakeModelConfig::standard(&Vocabulary::new([1, 2]))
     }
 }
 
-/// Waves whose direction the conditions tell.
-fn set() -> LatentSet {
+fn grid() -> MapGrid {
+    MapGrid {
+        size: SIZE,
+        spacing: 4.0,
+    }
+}
+
+/// Waves whose direction the conditions tell, and the patches that encode them.
+fn set() -> (LatentSet, PatchTransform) {
     let device = Device::flex();
     let wave = |i: usize| -> Vec<f32> {
         let (sin, cos) = (i as f64).sin_cos();
@@ -41,8 +48,6 @@ fn set() -> LatentSet {
     let (transform, _) = PatchTransform::fit(images.iter().map(Vec::as_slice), SIZE, 4, &device);
     let mut set = LatentSet::default();
     for (i, image) in images.into_iter().enumerate() {
-        let mut prompt = vec![END; 8];
-        (prompt[0], prompt[1]) = (1, 2);
         let example = Example {
             conditions: Conditions {
                 ship: Some(true),
@@ -51,18 +56,16 @@ fn set() -> LatentSet {
                 ship_position: Some([0.0, 0.0]),
                 ..Conditions::default()
             },
-            prompts: vec![prompt],
             grey: 0.0,
         };
         set.push(&transform, image, SIZE, example).unwrap();
     }
-    set
+    (set, transform)
 }
 
-fn options(accumulation: usize) -> DiffusionOptions {
-    DiffusionOptions {
+fn options(accumulation: usize) -> RunOptions {
+    RunOptions {
         batch: 4,
-        prompts: 2,
         seed: 5,
         trainer: TrainerOptions {
             rate: Rate {
@@ -73,23 +76,35 @@ fn options(accumulation: usize) -> DiffusionOptions {
             accumulation,
             ..TrainerOptions::default()
         },
-        ..DiffusionOptions::default()
     }
 }
 
-fn run(workers: usize, accumulation: usize) -> Diffusion {
+fn run(workers: usize, accumulation: usize) -> Run<Flow> {
     let devices = vec![Device::flex().autodiff(); workers];
-    Diffusion::new(config(), options(accumulation), vec![END; 8], devices).unwrap()
+    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+    Run::new("flow", &config(), init, options(accumulation), devices).unwrap()
+}
+
+/// A run that goes on from a checkpoint.
+fn resumed(workers: usize, accumulation: usize, checkpoint: &Checkpoint) -> Run<Flow> {
+    let mut run = run(workers, accumulation);
+    run.resume(checkpoint.clone()).unwrap();
+    run
 }
 
 /// The weights after a checkpoint, as numbers.
-fn weights(run: &Diffusion, folder: &Path) -> Tensors {
+fn weights(run: &Run<Flow>, folder: &Path) -> Tensors {
     run.checkpoint(folder).unwrap();
     Checkpoint::newest(folder).unwrap().unwrap().tensors
 }
 
-fn advance(run: &mut Diffusion, set: &LatentSet, steps: usize) -> Vec<f64> {
-    (0..steps).map(|_| run.step(set).0.loss).collect()
+fn advance(run: &mut Run<Flow>, set: &LatentSet, steps: usize) -> Vec<f64> {
+    let task = FlowTask {
+        set,
+        grid: grid(),
+        seed: 5,
+    };
+    (0..steps).map(|_| run.step(&task).0.loss).collect()
 }
 
 /// The same start for several runs: random initialisation draws from a generator that other tests share.
@@ -100,18 +115,18 @@ fn start(folder: &Path) -> Checkpoint {
 
 #[test]
 fn a_killed_run_gives_the_same_curve_to_the_bit() {
-    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let (set, folder) = (set().0, tempfile::tempdir().unwrap());
     let start = start(&folder.path().join("start"));
-    let mut whole = run(1, 1).resumed(start.clone()).unwrap();
+    let mut whole = resumed(1, 1, &start);
     let curve = advance(&mut whole, &set, 6);
-    let mut first = run(1, 1).resumed(start).unwrap();
+    let mut first = resumed(1, 1, &start);
     let mut pieces = advance(&mut first, &set, 3);
     first.checkpoint(&folder.path().join("half")).unwrap();
     drop(first);
     let half = Checkpoint::newest(&folder.path().join("half"))
         .unwrap()
         .unwrap();
-    let mut second = run(1, 1).resumed(half).unwrap();
+    let mut second = resumed(1, 1, &half);
     pieces.extend(advance(&mut second, &set, 3));
     assert_eq!(curve, pieces);
     let (a, b) = (folder.path().join("a"), folder.path().join("b"));
@@ -120,10 +135,10 @@ fn a_killed_run_gives_the_same_curve_to_the_bit() {
 
 #[test]
 fn two_workers_and_two_parts_make_the_step_of_one() {
-    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let (set, folder) = (set().0, tempfile::tempdir().unwrap());
     let start = start(&folder.path().join("start"));
     let after = |workers: usize, accumulation: usize| {
-        let mut run = run(workers, accumulation).resumed(start.clone()).unwrap();
+        let mut run = resumed(workers, accumulation, &start);
         let losses = advance(&mut run, &set, 2);
         let name = format!("{workers}-{accumulation}");
         (losses, weights(&run, &folder.path().join(name)))
@@ -151,14 +166,72 @@ fn two_workers_and_two_parts_make_the_step_of_one() {
     }
 }
 
-#[test]
-fn the_loss_falls() {
-    let (set, mut run) = (set(), run(1, 1));
-    let losses = advance(&mut run, &set, 30);
+/// Means of the first and the last five losses.
+fn early_and_late(losses: &[f64]) -> [f64; 2] {
+    assert!(losses.iter().all(|loss| loss.is_finite()), "{losses:?}");
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-    assert!(losses.iter().all(|loss| loss.is_finite()));
-    let (early, late) = (mean(&losses[..5]), mean(&losses[25..]));
+    [mean(&losses[..5]), mean(&losses[losses.len() - 5..])]
+}
+
+#[test]
+fn the_loss_of_the_flow_falls() {
+    let losses = advance(&mut run(1, 1), &set().0, 30);
+    let [early, late] = early_and_late(&losses);
     assert!(late < 0.8 * early, "{early} {late}");
+}
+
+#[test]
+fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
+    let (set, patches) = set();
+    let device = Device::flex();
+    let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
+    let mut run = Run::new(
+        "prior",
+        &config(),
+        init,
+        options(1),
+        vec![device.autodiff()],
+    )
+    .unwrap();
+    let task = PriorTask {
+        set: &set,
+        patches: &patches,
+        grid: grid(),
+        seed: 5,
+    };
+    let steps: Vec<(StepReport, Terms)> = (0..150).map(|_| run.step(&task)).collect();
+    let [early, late] = early_and_late(&steps.iter().map(|(r, _)| r.loss).collect::<Vec<_>>());
+    // Latents have variance 1; what is expected without knowing anything has a surprise of ½.
+    assert!(late < early && late < 0.45, "{early} {late}");
+    let count = set.len();
+    let mut done = 0;
+    let residuals = set.residuals(&run.averaged(), &patches, grid(), |n| done += n);
+    assert_eq!(done, count);
+    let all: Vec<usize> = (0..count).collect();
+    let squares = residuals.latents(&all, &Device::flex()).square().mean();
+    let variance = squares.into_scalar::<f32>();
+    assert!((0.3..3.0).contains(&variance), "{variance}");
+}
+
+#[test]
+fn a_reader_learns_to_tell_prompts_apart() {
+    let prompts = Prompts::new(Simulated::new(Recipe::default(), 3).unwrap());
+    let ids = (0..8).flat_map(|i| crate::conditioning::tokens(&prompts.prompt(i).unwrap().0));
+    let vocabulary = Vocabulary::new(ids);
+    let config = WakeModelConfig {
+        vocabulary: vocabulary.known().to_vec(),
+        ..config()
+    };
+    let init = |config: &WakeModelConfig, device: &Device| config.init_reader(device);
+    let devices = vec![Device::flex().autodiff()];
+    let mut run = Run::new("words", &config, init, options(1), devices).unwrap();
+    let task = WordsTask {
+        prompts: &prompts,
+        vocabulary: &vocabulary,
+    };
+    let losses: Vec<f64> = (0..60).map(|_| run.step(&task).0.loss).collect();
+    let [early, late] = early_and_late(&losses);
+    assert!(late < 0.6 * early, "{early} {late}");
 }
 
 #[test]
@@ -169,12 +242,15 @@ fn a_checkpoint_of_another_model_is_refused() {
         map_channels: 16,
         ..config()
     };
-    let device = Device::flex().autodiff();
-    let other = Diffusion::new(other, options(1), vec![END; 8], vec![device]).unwrap();
-    assert!(other.resumed(start.clone()).is_err());
+    let devices = vec![Device::flex().autodiff()];
+    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+    let mut other = Run::new("flow", &other, init, options(1), devices.clone()).unwrap();
+    assert!(other.resume(start.clone()).is_err());
+    let mut renamed = Run::new("other", &config(), init, options(1), devices).unwrap();
+    assert!(renamed.resume(start.clone()).is_err());
     let mut broken = start;
     broken.tensors.pop_last();
-    assert!(run(1, 1).resumed(broken).is_err());
+    assert!(run(1, 1).resume(broken).is_err());
 }
 
 #[test]

@@ -85,17 +85,12 @@ impl<M: Module> Trainer<M> {
         }
     }
 
-    /// The same trainer as it was after `step` steps; the lists are those of [`state`](Self::state).
-    pub fn resumed(
-        mut self,
-        [weights, average, first, second]: [Vec<Tensor<1>>; 4],
-        step: usize,
-    ) -> Self {
-        self.model = replaced(self.model, weights);
+    /// Goes back to what it was after `step` steps; the lists are those of [`state`](Self::state).
+    pub fn resume(&mut self, [weights, average, first, second]: [Vec<Tensor<1>>; 4], step: usize) {
+        self.model = replaced(self.model.clone(), weights);
         self.average = Average::new(average, self.options.average_decay);
         self.adam = Adam::resumed(self.options.adam, [first, second], step);
         self.step = step;
-        self
     }
 
     /// Weights, averaged weights, and both averages of the optimizer.

@@ -1,0 +1,107 @@
+//! The prior learns mean and spread of the latents.
+
+use std::ops::Range;
+
+use burn::tensor::{Device, Tensor, TensorData};
+
+use super::latents::LatentSet;
+use super::order::examples;
+use super::run::{Task, Terms, number};
+use crate::conditioning::{Conditions, MapGrid, WEDGE, places};
+use crate::noise::NoiseSource;
+use crate::small::{Known, PatchTransform, Prior, phases};
+
+/// Stream that latent pixels are drawn from.
+const CELL_STREAM: u32 = 2001;
+/// Latent pixels of an image that a step looks at.
+const CELLS: usize = 64;
+
+/// Learning mean and spread by the likelihood of the latents, and the mean grey by its squared error.
+///
+/// ```text
+/// loss = mean[⌊s⌋ (½ ((z − μ)/s)² + ln s)] + ½ (10 (grey − found))²
+/// ```
+///
+/// Many scenes, few pixels of each: the network sees one latent pixel at a time. ⌊s⌋ counts as a constant. Without it a wake not yet learnt would first be taken for a rough sea, and hardly be
+/// learnt any more.
+///
+/// # References
+///
+/// Nix & Weigend (1994), "Estimating the Mean and Variance of the Target Probability Distribution", Eq. 4; Seitzer et
+/// al. (2022), "On the Pitfalls of Heteroscedastic Uncertainty Estimation with Probabilistic Neural Networks", Eq. 5,
+/// β = ½.
+#[derive(Debug)]
+pub struct PriorTask<'a> {
+    /// The latents.
+    pub set: &'a LatentSet,
+    /// What they were encoded with, outside autodiff.
+    pub patches: &'a PatchTransform,
+    /// Pixels of the images.
+    pub grid: MapGrid,
+    /// Seed of the order.
+    pub seed: u64,
+}
+
+impl PriorTask<'_> {
+    /// Latent pixels to learn from: half of them anywhere, half inside the wedge, if there is one.
+    fn cells(&self, conditions: &Conditions, position: u64) -> Vec<usize> {
+        let random = NoiseSource::new(self.seed);
+        let all = self.grid.cells();
+        let places = places(conditions, self.grid, &all);
+        let inside = &places[WEDGE * all.len()..][..all.len()];
+        let wedge: Vec<usize> = all.iter().copied().filter(|&c| inside[c] > 0.5).collect();
+        let draw = |i: usize| {
+            let from = if i % 2 == 0 && !wedge.is_empty() {
+                &wedge
+            } else {
+                &all
+            };
+            let at = random.uniform(CELL_STREAM, position * CELLS as u64 + i as u64);
+            from[(at * from.len() as f64) as usize]
+        };
+        (0..CELLS).map(draw).collect()
+    }
+}
+
+impl Task<Prior> for PriorTask<'_> {
+    fn loss(&self, model: &Prior, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+        let indices = examples(self.seed, positions.clone(), self.set.len());
+        let conditions: Vec<Conditions> = indices
+            .iter()
+            .map(|&i| self.set.example(i).conditions)
+            .collect();
+        let cells: Vec<Vec<usize>> = conditions
+            .iter()
+            .zip(positions)
+            .map(|(conditions, position)| self.cells(conditions, position))
+            .collect();
+        let shape = [CELLS, 1];
+        let inner = device.clone().inner();
+        let phases = phases(&conditions, self.grid, &cells, shape, &inner);
+        let waves = Tensor::from_inner(self.patches.encode_squares(phases));
+        let known = Known::of_cells(&conditions, self.grid, &cells, shape, device);
+        let expected = model.forward(&known, waves);
+        let latents: Vec<f32> = indices
+            .iter()
+            .zip(&cells)
+            .flat_map(|(&i, cells)| self.set.pixels(i, cells))
+            .collect();
+        let shape = [indices.len(), self.set.shape()[0], CELLS, 1];
+        let latents: Tensor<4> = Tensor::from_data(TensorData::new(latents, shape), device);
+        let error = (latents.clone() - expected.mean.clone()).square().mean();
+        let surprise = expected.residual(latents).square() * 0.5 + expected.log_spread.clone();
+        let weight = expected.log_spread.clone().detach().exp();
+        let likelihood = (surprise.clone() * weight).mean();
+        let surprise = surprise.mean();
+        let greys: Vec<f32> = indices.iter().map(|&i| self.set.example(i).grey).collect();
+        let count = greys.len();
+        let greys: Tensor<2> = Tensor::from_data(TensorData::new(greys, [count, 1]), device);
+        let grey = (expected.grey - greys).square().mean();
+        let terms = vec![
+            ("surprise", number(&surprise)),
+            ("error", number(&error)),
+            ("grey", number(&grey)),
+        ];
+        (likelihood + grey * 50.0, terms)
+    }
+}

@@ -1,0 +1,194 @@
+//! A run: one part of a model learns one task, step by step, and can be stopped and continued.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, TensorData};
+use serde_json::{Value, json};
+
+use super::checkpoint::{Checkpoint, Tensors};
+use super::tensors::names;
+use super::trainer::{StepReport, Trainer, TrainerOptions};
+use crate::error::{Error, Result};
+use crate::small::WakeModelConfig;
+
+/// Groups of a checkpoint's tensors.
+const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
+
+/// Parts of a loss by name.
+pub type Terms = Vec<(&'static str, f64)>;
+
+/// What a part of a model learns.
+///
+/// A step of batch b takes the positions b · batch … (b + 1) · batch − 1, whatever the number of devices: what is
+/// drawn for a position follows from the position.
+pub trait Task<M>: Sync {
+    /// The mean loss over some positions, and its terms.
+    fn loss(&self, model: &M, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms);
+}
+
+/// Constants of a [`Run`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunOptions {
+    /// Examples of a batch.
+    pub batch: usize,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+    /// The loop.
+    pub trainer: TrainerOptions,
+}
+
+/// A run that trains one part of a [`WakeModel`](crate::small::WakeModel).
+#[derive(Debug)]
+pub struct Run<M> {
+    trainer: Trainer<M>,
+    options: RunOptions,
+    state: Value,
+}
+
+impl<M: Module> Run<M> {
+    /// A run from random weights.
+    ///
+    /// - `part`: which part of the model learns; a checkpoint of another part is refused
+    /// - `init`: draws its weights
+    /// - `devices`: autodiff devices, at least one; each takes its share of every batch
+    ///
+    /// # Errors
+    ///
+    /// As [`WakeModelConfig::validate`], and [`Error::InvalidOption`] for a batch that cannot be cut evenly.
+    pub fn new(
+        part: &str,
+        config: &WakeModelConfig,
+        init: impl FnOnce(&WakeModelConfig, &Device) -> M,
+        options: RunOptions,
+        devices: Vec<Device>,
+    ) -> Result<Self> {
+        config.validate()?;
+        let parts = devices.len() * options.trainer.accumulation;
+        if parts == 0 || !options.batch.is_multiple_of(parts) || options.batch == 0 {
+            return Err(Error::InvalidOption {
+                option: "batch".to_owned(),
+                value: options.batch.to_string(),
+                expected: format!(
+                    "a multiple of the {parts} parts that devices and accumulation make"
+                ),
+            });
+        }
+        devices[0].seed(options.seed);
+        let model = init(config, &devices[0]);
+        Ok(Self {
+            trainer: Trainer::new(model, options.trainer, devices),
+            state: json!({
+                "part": part, "model": config, "seed": options.seed, "batch": options.batch,
+            }),
+            options,
+        })
+    }
+
+    /// Goes on where a checkpoint left off.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidOption`] for a checkpoint of another part or model, or another seed or batch.
+    pub fn resume(&mut self, checkpoint: Checkpoint) -> Result<()> {
+        if checkpoint.state != self.state {
+            return Err(Error::InvalidOption {
+                option: "checkpoint".to_owned(),
+                value: checkpoint.state.to_string(),
+                expected: self.state.to_string(),
+            });
+        }
+        let mut tensors = checkpoint.tensors;
+        let device = self.device().inner();
+        let names = names(self.trainer.model());
+        let mut group = |group: &str| -> Result<Vec<Tensor<1>>> {
+            let take = |(name, shape): &(String, Vec<usize>)| {
+                let name = format!("{group}.{name}");
+                let found = tensors.remove(&name).filter(|(found, _)| found == shape);
+                let (_, numbers) = found.ok_or_else(|| Error::InvalidOption {
+                    option: "checkpoint".to_owned(),
+                    value: format!("without {name} {shape:?}"),
+                    expected: "all tensors of the model".to_owned(),
+                })?;
+                let length = numbers.len();
+                Ok(Tensor::from_data(
+                    TensorData::new(numbers, [length]),
+                    &device,
+                ))
+            };
+            names.iter().map(take).collect()
+        };
+        let [a, b, c, d] = GROUPS;
+        let state = [group(a)?, group(b)?, group(c)?, group(d)?];
+        self.trainer.resume(state, checkpoint.step);
+        Ok(())
+    }
+
+    /// Writes a checkpoint.
+    ///
+    /// # Errors
+    ///
+    /// As [`Checkpoint::write`].
+    pub fn checkpoint(&self, folder: &Path) -> Result<PathBuf> {
+        let names = names(self.trainer.model());
+        let mut tensors = Tensors::new();
+        for (group, values) in GROUPS.iter().zip(self.trainer.state()) {
+            for ((name, shape), value) in names.iter().zip(values) {
+                let numbers = value.into_data().iter::<f32>().collect();
+                tensors.insert(format!("{group}.{name}"), (shape.clone(), numbers));
+            }
+        }
+        let checkpoint = Checkpoint {
+            step: self.steps(),
+            state: self.state.clone(),
+            tensors,
+        };
+        checkpoint.write(folder)
+    }
+
+    /// Steps made so far.
+    pub fn steps(&self) -> usize {
+        self.trainer.steps()
+    }
+
+    /// The part with averaged weights, outside autodiff.
+    pub fn averaged(&self) -> M {
+        self.trainer.averaged()
+    }
+
+    /// The device of the model.
+    fn device(&self) -> Device {
+        let devices = self.trainer.model().devices();
+        devices.into_iter().next().unwrap_or_default()
+    }
+
+    /// One step on the next batch; the terms are means over the batch.
+    pub fn step(&mut self, task: &impl Task<M>) -> (StepReport, Terms) {
+        let parts = self.trainer.parts();
+        let each = (self.options.batch / parts) as u64;
+        let first = (self.trainer.steps() * self.options.batch) as u64;
+        let terms = Mutex::new(vec![Terms::new(); parts]);
+        let report = self.trainer.step(|model, device, part| {
+            let begin = first + part as u64 * each;
+            let (loss, found) = task.loss(model, device, begin..begin + each);
+            terms.lock().unwrap_or_else(PoisonError::into_inner)[part] = found;
+            loss
+        });
+        let terms = terms.into_inner().unwrap_or_else(PoisonError::into_inner);
+        (report, mean_terms(&terms))
+    }
+}
+
+/// Means over the parts of a batch.
+fn mean_terms(parts: &[Terms]) -> Terms {
+    let names = parts.first().into_iter().flatten().map(|&(name, _)| name);
+    let mean = |i: usize| parts.iter().map(|terms| terms[i].1).sum::<f64>() / parts.len() as f64;
+    names.enumerate().map(|(i, name)| (name, mean(i))).collect()
+}
+
+/// A loss as a number.
+pub(super) fn number(loss: &Tensor<1>) -> f64 {
+    f64::from(loss.clone().inner().into_scalar::<f32>())
+}

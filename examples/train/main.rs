@@ -1,0 +1,57 @@
+//! Trains the small wake model on simulated pairs.
+//!
+//! ```text
+//! cargo run --release --example train -- diffusion --data out/make_dataset
+//! cargo run --release --example train -- diffusion --data out/make_dataset --resume
+//! ```
+//!
+//! Four stages, each with its own subcommand: `autoencoder` fits the patch transform in closed form, `words` trains the
+//! reader of prompts, `mean` the mean and spread of the latents, and `diffusion` the flow that draws the rest. A stage
+//! runs the earlier ones first where their weights are not in `--out` yet. Writes there: `config.json`,
+//! `patches.safetensors`, `reader.safetensors`, `prior.safetensors`, `flow.safetensors` (averaged weights, 16 bits),
+//! `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and `checkpoints/`. A run that was killed goes on
+//! from its last checkpoint with `--resume`.
+
+mod options;
+mod source;
+mod stages;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use options::Options;
+
+/// Train the small wake model.
+#[derive(Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    stage: Stage,
+}
+
+#[derive(Subcommand)]
+enum Stage {
+    /// Fit the patch transform, in closed form.
+    Autoencoder(Options),
+    /// Train the reader of prompts.
+    Words(Options),
+    /// Train mean and spread of the latents.
+    Mean(Options),
+    /// Train the flow that draws the sea.
+    Diffusion(Options),
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().stage {
+        Stage::Autoencoder(options) => stages::autoencoder(&options),
+        Stage::Words(options) => stages::words(&options),
+        Stage::Mean(options) => stages::mean(&options),
+        Stage::Diffusion(options) => stages::diffusion(&options),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}

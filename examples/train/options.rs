@@ -1,0 +1,121 @@
+//! What a stage is told on the command line.
+
+use std::path::PathBuf;
+
+use burn::tensor::Device;
+use clap::Args;
+use wake_ldm::train::{Rate, RunOptions, TrainerOptions};
+
+#[derive(Args, Clone)]
+pub(crate) struct Options {
+    /// Folder that `make_dataset` wrote; without it, pairs are simulated first
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// Pairs to simulate where there is no --data
+    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(8..))]
+    pub(crate) count: u64,
+    /// JSON file with the widths of the model [default: those of the model that ships]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Go on from the newest checkpoint in --out
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Steps of the whole stage [default: words 4000, mean 6000, diffusion 20000]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) steps: Option<u32>,
+    /// Examples of a batch [default: words 128, mean 128, diffusion 16]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) batch: Option<u16>,
+    /// Parts of a batch that are computed one after the other, to save memory
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) accumulation: u16,
+    /// Largest step of the optimizer
+    #[arg(long, default_value_t = 1e-3)]
+    pub(crate) rate: f64,
+    /// Steps between checkpoints and sheets
+    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) every: u32,
+    /// Seed of the run, and of simulated pairs
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Keep less for the way back through the model, and compute it again; slower
+    #[arg(long)]
+    pub(crate) checkpointing: bool,
+    /// flex, ndarray, wgpu or cuda, where compiled in; a comma between several
+    #[arg(long, default_value = "flex")]
+    pub(crate) device: String,
+    /// Folder of the results, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/train")]
+    pub(crate) out: PathBuf,
+}
+
+impl Options {
+    /// The same for a stage that runs because a later one needs it.
+    pub(crate) fn before(&self) -> Self {
+        Self {
+            steps: None,
+            batch: None,
+            ..self.clone()
+        }
+    }
+
+    /// Steps of a stage.
+    pub(crate) fn steps(&self, default: u32) -> usize {
+        self.steps.unwrap_or(default) as usize
+    }
+
+    /// Constants of a run.
+    pub(crate) fn run(&self, steps: usize, batch: u16) -> RunOptions {
+        RunOptions {
+            batch: usize::from(self.batch.unwrap_or(batch)),
+            seed: self.seed,
+            trainer: TrainerOptions {
+                rate: Rate {
+                    peak: self.rate,
+                    warmup: 100,
+                    steps,
+                },
+                accumulation: usize::from(self.accumulation),
+                ..TrainerOptions::default()
+            },
+        }
+    }
+
+    /// The devices, outside autodiff.
+    pub(crate) fn devices(&self) -> Result<Vec<Device>, String> {
+        self.device.split(',').map(device).collect()
+    }
+
+    /// The devices that a model learns on.
+    pub(crate) fn learning_devices(&self) -> Result<Vec<Device>, String> {
+        let autodiff = |device: Device| {
+            let device = device.autodiff();
+            match self.checkpointing {
+                true => device.gradient_checkpointing(),
+                false => device,
+            }
+        };
+        Ok(self.devices()?.into_iter().map(autodiff).collect())
+    }
+}
+
+fn device(name: &str) -> Result<Device, String> {
+    let (kind, index) = name.split_once(':').unwrap_or((name, "0"));
+    let index: usize = index
+        .parse()
+        .map_err(|_| format!("--device {name}: no number after ':'"))?;
+    match kind {
+        #[cfg(feature = "flex")]
+        "flex" if index == 0 => Ok(Device::flex()),
+        #[cfg(feature = "ndarray")]
+        #[allow(deprecated, reason = "kept until burn drops it")]
+        "ndarray" if index == 0 => Ok(Device::ndarray()),
+        #[cfg(feature = "wgpu")]
+        "wgpu" if index == 0 => Ok(Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)),
+        #[cfg(feature = "cuda")]
+        "cuda" => Ok(Device::cuda(index)),
+        _ => Err(format!(
+            "--device {name} is none of this build's: use flex, or build with --features ndarray, wgpu or cuda"
+        )),
+    }
+}

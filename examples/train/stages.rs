@@ -1,0 +1,378 @@
+//! The stages of training: patches, words, mean, diffusion.
+
+use std::error::Error;
+use std::path::Path;
+
+use burn::module::Module;
+use burn::tensor::Device;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+use wake_ldm::WakeSampler;
+use wake_ldm::conditioning::{Conditions, MapGrid, Vocabulary, tokens};
+use wake_ldm::dataset::{Pair, Prompts, Recipe, Simulated};
+use wake_ldm::small::{
+    Flow, Known, PatchTransform, Prior, Reader, Shares, WakeModel, WakeModelConfig,
+};
+use wake_ldm::train::{
+    Checkpoint, Example, FlowTask, LatentSet, Metrics, PriorTask, Run, Task, WordsTask,
+};
+use wake_ldm::weights::{Layout, Precision, load, save_as};
+use wake_physics::Scene;
+use wake_text::Wording;
+
+use super::options::Options;
+use super::source::Source;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Images that the patch transform is fitted to.
+const FITTED: u64 = 400;
+/// Images read or simulated at the same time.
+const AT_ONCE: usize = 64;
+/// Images in a row of a sheet.
+const SHEET: u64 = 8;
+/// Ranges that prompts to read are drawn from, beyond those of images.
+const PROMPT_RANGES: [&str; 4] = [
+    "draw.ranges.ship_speed = [1.0, 15.0]",
+    "draw.ranges.wind_speed = [1.0, 12.0]",
+    "draw.ranges.fetch = [1e3, 1e6]",
+    "draw.ranges.incidence = [10.0, 40.0]",
+];
+
+pub(crate) fn autoencoder(options: &Options) -> Outcome<()> {
+    let (config, source) = (config(options)?, Source::new(options)?);
+    let shares = fit(options, &source, &config)?;
+    for channels in [4, 8, 16] {
+        println!(
+            "{channels:2} channels: {:.2} % of the variance, {:.2} dB",
+            100.0 * shares.kept(channels),
+            shares.psnr(channels)
+        );
+    }
+    Ok(())
+}
+
+pub(crate) fn words(options: &Options) -> Outcome<()> {
+    let config = config(options)?;
+    let recipe = Recipe::default().with_assignments(&PROMPT_RANGES)?;
+    let prompts = Prompts::new(Simulated::new(recipe, options.seed)?);
+    let vocabulary = Vocabulary::new(config.vocabulary.iter().copied());
+    let steps = options.steps(4000);
+    let devices = options.learning_devices()?;
+    let init = |config: &WakeModelConfig, device: &Device| config.init_reader(device);
+    let mut run = Run::new("words", &config, init, options.run(steps, 128), devices)?;
+    let task = WordsTask {
+        prompts: &prompts,
+        vocabulary: &vocabulary,
+    };
+    let file = options.out.join("reader.safetensors");
+    train(
+        "words",
+        options,
+        &mut run,
+        steps,
+        &task,
+        |run: &Run<Reader>| {
+            Ok(save_as(
+                &run.averaged(),
+                Layout::Diffusers,
+                &file,
+                Precision::F16,
+            )?)
+        },
+    )
+}
+
+pub(crate) fn mean(options: &Options) -> Outcome<()> {
+    let (config, source) = (config(options)?, Source::new(options)?);
+    let patches = patches(options, &source, &config)?;
+    let set = latents(&source, &patches, &config)?;
+    let steps = options.steps(6000);
+    let devices = options.learning_devices()?;
+    let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
+    let mut run = Run::new("mean", &config, init, options.run(steps, 128), devices)?;
+    let task = PriorTask {
+        set: &set,
+        patches: &patches,
+        grid: grid(&config),
+        seed: options.seed,
+    };
+    let examples = sheet_examples(&source)?;
+    train(
+        "mean",
+        options,
+        &mut run,
+        steps,
+        &task,
+        |run: &Run<Prior>| {
+            let prior = run.averaged();
+            save_as(
+                &prior,
+                Layout::Diffusers,
+                &options.out.join("prior.safetensors"),
+                Precision::F16,
+            )?;
+            let means = expected_images(&prior, &patches, &config, &examples);
+            sheet(&examples, &means, &options.out.join("sheet.png"))
+        },
+    )
+}
+
+pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
+    let missing = |name: &str| !options.out.join(name).exists();
+    if missing("reader.safetensors") {
+        words(&options.before())?;
+    }
+    if missing("prior.safetensors") {
+        mean(&options.before())?;
+    }
+    let (config, source) = (config(options)?, Source::new(options)?);
+    let device = options.devices()?.remove(0);
+    let model = WakeModel {
+        patches: patches(options, &source, &config)?,
+        reader: part(config.init_reader(&device), options, "reader.safetensors")?,
+        prior: part(config.init_prior(&device), options, "prior.safetensors")?,
+        flow: config.init_flow(&device),
+    };
+    let set = latents(&source, &model.patches, &config)?;
+    let bar = progress_bar(set.len() as u64, "residuals");
+    let set = set.residuals(&model.prior, &model.patches, grid(&config), |n| {
+        bar.inc(n as u64)
+    });
+    bar.finish_and_clear();
+    let steps = options.steps(20_000);
+    let devices = options.learning_devices()?;
+    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+    let mut run = Run::new("diffusion", &config, init, options.run(steps, 16), devices)?;
+    let task = FlowTask {
+        set: &set,
+        grid: grid(&config),
+        seed: options.seed,
+    };
+    let examples = sheet_examples(&source)?;
+    train(
+        "diffusion",
+        options,
+        &mut run,
+        steps,
+        &task,
+        |run: &Run<Flow>| {
+            let flow = run.averaged();
+            save_as(
+                &flow,
+                Layout::Diffusers,
+                &options.out.join("flow.safetensors"),
+                Precision::F16,
+            )?;
+            let sampler = WakeSampler::new(
+                WakeModel {
+                    flow,
+                    ..model.clone()
+                },
+                config.clone(),
+            )?;
+            let prompts: Vec<&str> = examples.iter().map(|pair| pair.prompt.as_str()).collect();
+            let drawn = sampler.sample_many(&prompts, 0)?;
+            let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
+            sheet(&examples, &drawn, &options.out.join("sheet.png"))
+        },
+    )
+}
+
+/// The loop of a stage; `save` is called after every checkpoint.
+fn train<M: Module>(
+    stage: &'static str,
+    options: &Options,
+    run: &mut Run<M>,
+    steps: usize,
+    task: &impl Task<M>,
+    save: impl Fn(&Run<M>) -> Outcome<()>,
+) -> Outcome<()> {
+    let folder = options.out.join("checkpoints").join(stage);
+    if options.resume
+        && let Some(checkpoint) = Checkpoint::newest(&folder)?
+    {
+        run.resume(checkpoint)?;
+    }
+    let mut metrics = Metrics::open(&options.out.join(format!("{stage}.jsonl")), run.steps())?;
+    let bar = progress_bar(steps as u64, stage);
+    while run.steps() < steps {
+        let (report, terms) = run.step(task);
+        let terms: Map<String, Value> = terms
+            .into_iter()
+            .map(|(name, value)| (name.to_owned(), json!(value)))
+            .collect();
+        metrics.write(run.steps(), steps, report, &Value::Object(terms))?;
+        bar.set_message(format!("{stage}, loss {:.4}", report.loss));
+        bar.set_position(run.steps() as u64);
+        if run.steps().is_multiple_of(options.every as usize) || run.steps() == steps {
+            run.checkpoint(&folder)?;
+            save(run)?;
+        }
+    }
+    bar.finish_and_clear();
+    println!(
+        "{stage}: {steps} steps, results in {}",
+        options.out.display()
+    );
+    Ok(())
+}
+
+/// Fits the patch transform and writes it with what it keeps.
+fn fit(options: &Options, source: &Source, config: &WakeModelConfig) -> Outcome<Shares> {
+    let device = options.devices()?.remove(0);
+    let count = source.len().min(FITTED);
+    let bar = progress_bar(count, "images for the patch transform");
+    let mut images = Vec::new();
+    for index in 0..count {
+        images.push(source.pair(index)?.image.pixels);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let pixels = images.iter().map(Vec::as_slice);
+    let (transform, shares) =
+        PatchTransform::fit(pixels, config.image_size, config.latent_channels, &device);
+    let path = options.out.join("patches.safetensors");
+    save_as(&transform, Layout::Diffusers, &path, Precision::F32)?;
+    let rows: Vec<_> = (1..=64)
+        .map(|c| json!({"channels": c, "variance": shares.kept(c), "psnr_db": finite(shares.psnr(c))}))
+        .collect();
+    std::fs::write(
+        options.out.join("shares.json"),
+        format!("{:#}\n", json!(rows)),
+    )?;
+    Ok(shares)
+}
+
+/// JSON has no infinity: all 64 components lose nothing.
+fn finite(number: f64) -> Option<f64> {
+    Some(number).filter(|number| number.is_finite())
+}
+
+/// The patch transform of an earlier run, or a new one.
+fn patches(
+    options: &Options,
+    source: &Source,
+    config: &WakeModelConfig,
+) -> Outcome<PatchTransform> {
+    if !options.out.join("patches.safetensors").exists() {
+        fit(options, source, config)?;
+    }
+    let device = options.devices()?.remove(0);
+    part(
+        PatchTransform::zeros(config.latent_channels, &device),
+        options,
+        "patches.safetensors",
+    )
+}
+
+/// A part of the model with the weights of an earlier stage.
+fn part<M: Module>(module: M, options: &Options, name: &str) -> Outcome<M> {
+    Ok(load(module, Layout::Diffusers, &options.out.join(name))?)
+}
+
+/// The widths of the model: those of --config, else those in --out, else the standard ones; written to --out.
+fn config(options: &Options) -> Outcome<WakeModelConfig> {
+    let written = options.out.join("config.json");
+    let file = match &options.config {
+        Some(file) => Some(file),
+        None => Some(&written).filter(|file| file.exists()),
+    };
+    let config = match file {
+        Some(file) => WakeModelConfig::from_json(&std::fs::read_to_string(file)?, file)?,
+        None => WakeModelConfig::standard(&vocabulary()?),
+    };
+    std::fs::create_dir_all(&options.out)?;
+    std::fs::write(&written, serde_json::to_string_pretty(&config)? + "\n")?;
+    Ok(config)
+}
+
+/// What prompts about wakes can contain: the words of every wording, and every digit.
+fn vocabulary() -> Result<Vocabulary, wake_text::Error> {
+    let (ship, mut calm) = (Scene::default(), Scene::default());
+    (calm.ship, calm.sea.wind_speed) = (None, 0.0);
+    let mut ids = tokens("0 1 2 3 4 5 6 7 8 9 .");
+    for scene in [ship, calm] {
+        for wording in Wording::ALL {
+            ids.extend(tokens(&wording.prompt(&scene)?));
+        }
+    }
+    Ok(Vocabulary::new(ids))
+}
+
+fn grid(config: &WakeModelConfig) -> MapGrid {
+    MapGrid {
+        size: config.image_size,
+        spacing: config.spacing,
+    }
+}
+
+/// Encodes all pairs, which then stay in memory.
+fn latents(
+    source: &Source,
+    patches: &PatchTransform,
+    config: &WakeModelConfig,
+) -> wake_ldm::Result<LatentSet> {
+    let bar = progress_bar(source.len(), "pairs");
+    let mut set = LatentSet::default();
+    let indices: Vec<u64> = (0..source.len()).collect();
+    for chunk in indices.chunks(AT_ONCE) {
+        let pairs: Vec<_> = chunk.par_iter().map(|&index| source.pair(index)).collect();
+        for pair in pairs {
+            let mut pair = pair?;
+            let pixels = std::mem::take(&mut pair.image.pixels);
+            set.push(patches, pixels, config.image_size, Example::of(&pair))?;
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    Ok(set)
+}
+
+fn sheet_examples(source: &Source) -> wake_ldm::Result<Vec<Pair>> {
+    (0..SHEET).map(|index| source.pair(index)).collect()
+}
+
+/// The mean images of some scenes.
+fn expected_images(
+    prior: &Prior,
+    patches: &PatchTransform,
+    config: &WakeModelConfig,
+    examples: &[Pair],
+) -> Vec<Vec<f32>> {
+    let conditions: Vec<Conditions> = examples.iter().map(|p| Example::of(p).conditions).collect();
+    let device = patches.devices().into_iter().next().unwrap_or_default();
+    let known = Known::new(&conditions, grid(config), &device);
+    let expected = prior.expect(&conditions, &known, patches, grid(config));
+    let images = patches.decode(expected.mean, expected.grey).clamp(0.0, 1.0);
+    let pixels: Vec<f32> = images.into_data().iter::<f32>().collect();
+    pixels
+        .chunks(config.image_size * config.image_size)
+        .map(<[f32]>::to_vec)
+        .collect()
+}
+
+/// Simulated images above, images of the model below.
+fn sheet(examples: &[Pair], drawn: &[Vec<f32>], path: &Path) -> Outcome<()> {
+    let size = examples[0].image.rows as u32;
+    let mut sheet = image::GrayImage::new(size * examples.len() as u32, 2 * size);
+    for (i, (pair, drawn)) in examples.iter().zip(drawn).enumerate() {
+        for (row, pixels) in [(0, &pair.image.pixels), (1, drawn)] {
+            for (p, &grey) in pixels.iter().enumerate() {
+                let (x, y) = (p as u32 % size, p as u32 / size);
+                let level = (255.0 * grey).round() as u8;
+                sheet.put_pixel(i as u32 * size + x, row * size + y, image::Luma([level]));
+            }
+        }
+    }
+    sheet.save(path)?;
+    Ok(())
+}
+
+fn progress_bar(length: u64, what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {pos} of {len} {msg}, {eta} left");
+    ProgressBar::new(length)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        .with_message(what)
+}
