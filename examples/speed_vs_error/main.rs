@@ -8,12 +8,15 @@
 //! default scene, the paper's own method and scale; the oracle of both is the harmonic sum, the strong baseline the
 //! same sum as a matrix product. Above 256 × 256 the oracles run on 4,096 random pixels and their times are scaled up.
 
+#[path = "../common/exit.rs"]
+mod exit;
 mod plot;
+#[path = "../common/progress.rs"]
+mod progress;
 mod row;
 mod stages;
 
 use clap::Parser;
-use indicatif::ProgressBar;
 use row::Row;
 use serde_json::json;
 use stages::{Memo, STAGES, measure};
@@ -44,14 +47,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    exit::code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
@@ -65,7 +61,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
             .filter(|&n| n != FRONTIER_SIZE)
             .map(|n| (n, DEFAULT_TOLERANCE)),
     );
-    let bar = ProgressBar::new((cases.len() * STAGES.len()) as u64);
+    let bar = progress::bar((cases.len() * STAGES.len()) as u64, "rows");
     let (mut rows, mut memo) = (Vec::new(), Memo::default());
     for stage in STAGES {
         for &(size, tolerance) in &cases {
