@@ -80,8 +80,8 @@ pub enum Error {
 
     /// No backend of this build has a device of this name.
     #[error(
-        "there is no device '{name}': this build has {}, and a GPU's number may follow as in cuda:1; the features \
-         flex, ndarray, wgpu and cuda add backends",
+        "there is no device '{name}' in this build: it has {}; the features flex, ndarray, wgpu and cuda add others, \
+         and a GPU's number may follow, as in cuda:1",
         compiled.join(", ")
     )]
     UnknownDevice {
