@@ -10,13 +10,17 @@
 //! Writes `images/*.png`, `labels/*.txt` (YOLO), `metadata.jsonl`, `coco.json`, `data.yaml` and `dataset.json`; see
 //! docs/dataset.md. A run that was killed continues where it stopped.
 
+#[path = "common/exit.rs"]
+mod exit;
+#[path = "common/progress.rs"]
+mod progress;
+
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
+use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
-use wake_ldm::Result;
 use wake_ldm::dataset::{Manifest, Progress, Recipe, Shard, merge, shard_folder, write};
 
 /// Number of scenes in the paper's grid.
@@ -32,7 +36,7 @@ struct Arguments {
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Number of images of the whole set [default: 100; 3456 for the paper's grid]
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     count: Option<u64>,
     /// Seed of the whole set
     #[arg(long, default_value_t = 7)]
@@ -55,16 +59,10 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    exit::code(run(&Arguments::parse()))
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let (folder, manifest, made) = if arguments.merge {
         (arguments.out.clone(), merge(&arguments.out)?, 0)
@@ -79,31 +77,29 @@ fn run(arguments: &Arguments) -> Result<()> {
     };
     let seconds = start.elapsed().as_secs_f64();
     let there = manifest.indices().end - manifest.indices().start;
+    let place = folder.display();
     if arguments.json {
         let report = json!({
             "folder": folder, "images": there, "made": made, "seconds": seconds,
             "images_per_second": made as f64 / seconds, "shard": manifest.shard, "dataset": manifest,
         });
         println!("{report:#}");
+    } else if arguments.merge {
+        println!("{there} images in {place}, joined from its shards");
     } else {
-        println!(
-            "{there} images in {}, {made} of them made in {seconds:.1} s",
-            folder.display()
-        );
+        println!("{there} images in {place}, {made} of them made in {seconds:.1} s");
     }
     Ok(())
 }
 
-fn manifest(arguments: &Arguments) -> Result<Manifest> {
-    let recipe = match arguments.grid.as_str() {
-        "paper" => Recipe::paper(),
-        "ranges" => Recipe::default(),
-        file => Recipe::read(Path::new(file))?,
-    };
-    let default_count = if arguments.grid == "paper" {
-        PAPER_COUNT
-    } else {
-        100
+fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
+    let (recipe, default_count) = match arguments.grid.as_str() {
+        "paper" => (Recipe::paper(), PAPER_COUNT),
+        "ranges" => (Recipe::default(), 100),
+        file if Path::new(file).is_file() => (Recipe::read(Path::new(file))?, 100),
+        other => {
+            return Err(format!("--grid is {other}, expected paper, ranges or a TOML file").into());
+        }
     };
     let count = arguments.count.unwrap_or(default_count);
     let recipe = recipe.with_assignments(&arguments.set)?;
@@ -114,14 +110,10 @@ fn manifest(arguments: &Arguments) -> Result<Manifest> {
 }
 
 /// Makes what is missing under a progress bar; returns how many images that were.
-fn make(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> Result<u64> {
+fn make(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> wake_ldm::Result<u64> {
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or_else(cores, usize::from);
-    let bar = ProgressBar::new(0);
-    let template = "{bar:30} {pos}/{len} images, {per_sec}, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
+    let bar = progress::bar(0, "images");
     let mut made = 0;
     write(folder, manifest, jobs, |progress: Progress| {
         made = progress.made;

@@ -5,6 +5,9 @@
 //! cargo run --no-default-features --example prompt -- --text "A ship at 8 m/s in 5 m/s wind" --json
 //! ```
 
+#[path = "common/exit.rs"]
+mod exit;
+
 use clap::Parser;
 use serde_json::{Value, json};
 use std::error::Error;
@@ -32,20 +35,17 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(output) => {
-            // A reader such as `head` may have left.
-            let _ = writeln!(std::io::stdout(), "{output}");
-            ExitCode::SUCCESS
-        }
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    exit::code(run(&Arguments::parse()))
 }
 
-fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let text = answer(arguments)?;
+    // A reader such as `head` may have left.
+    let _ = writeln!(std::io::stdout(), "{text}");
+    Ok(())
+}
+
+fn answer(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     let (prompt, base) = match &arguments.text {
         // A text has a ship only if it speaks of one.
         Some(text) => (

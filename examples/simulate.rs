@@ -7,6 +7,9 @@
 //!
 //! Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`.
 
+#[path = "common/exit.rs"]
+mod exit;
+
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -43,14 +46,7 @@ enum MethodName {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    exit::code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> wake_physics::Result<()> {

@@ -8,6 +8,8 @@
 //! Writes `report.json`, `report.md`, `spectrum.svg` and `wake_correlation.svg`. `docs/evaluation.md` says what each
 //! figure means.
 
+#[path = "../common/exit.rs"]
+mod exit;
 mod judge;
 mod measurements;
 mod model;
@@ -21,6 +23,7 @@ mod swaps;
 mod timing;
 mod wake;
 
+use burn::tensor::Device;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use judge::{Judged, Plan, judge};
@@ -28,6 +31,7 @@ use model::Model;
 use source::{OtherSea, Result, Told};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use wake_ldm::device_named;
 use wake_ldm::metrics::{Lpips, LpipsNetwork};
 use wake_physics::output;
 
@@ -53,6 +57,9 @@ struct Arguments {
     /// Linear weights of the package lpips as safetensors
     #[arg(long, value_name = "FILE", requires = "lpips_backbone")]
     lpips_linear: Option<PathBuf>,
+    /// flex, ndarray, wgpu or cuda, where compiled in; a GPU's number may follow, as in cuda:1
+    #[arg(long, default_value = "flex")]
+    device: String,
     /// Folder of the results, made if absent
     #[arg(long, value_name = "DIR", default_value = "out/evaluate")]
     out: PathBuf,
@@ -62,23 +69,21 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    exit::code(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    output::make_folder(&arguments.out)?;
-    let lpips = lpips(arguments)?;
+    let device = device_named(&arguments.device)?;
+    let lpips = lpips(arguments, &device)?;
     let model = match arguments.simulator_only {
         true => None,
-        false => Some(Model::load(arguments.weights.as_deref(), arguments.steps)?),
+        false => {
+            let folder = arguments.weights.as_deref();
+            Some(Model::load(folder, arguments.steps, &device)?)
+        }
     };
+    // What cannot be read leaves no folder behind.
+    output::make_folder(&arguments.out)?;
     let judged = match &model {
         Some(model) => Judged {
             source: model,
@@ -111,16 +116,15 @@ fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-fn lpips(arguments: &Arguments) -> Result<Option<Lpips>> {
+fn lpips(arguments: &Arguments, device: &Device) -> Result<Option<Lpips>> {
     let (Some(backbone), Some(linear)) = (&arguments.lpips_backbone, &arguments.lpips_linear)
     else {
         return Ok(None);
     };
-    let device = burn::tensor::Device::default();
     Ok(Some(Lpips::load(
         LpipsNetwork::Alex,
         backbone,
         linear,
-        &device,
+        device,
     )?))
 }

@@ -12,11 +12,14 @@ pub(crate) struct Model(WakeSampler);
 
 impl Model {
     /// The model of a folder, or the one in the crate.
-    pub(crate) fn load(folder: Option<&Path>, steps: Option<usize>) -> Result<Self> {
-        let device = Device::default();
+    pub(crate) fn load(
+        folder: Option<&Path>,
+        steps: Option<usize>,
+        device: &Device,
+    ) -> Result<Self> {
         let sampler = match folder {
-            Some(folder) => WakeSampler::from_folder(folder, &device)?,
-            None => WakeSampler::pretrained(&device)?,
+            Some(folder) => WakeSampler::from_folder(folder, device)?,
+            None => WakeSampler::pretrained(device)?,
         };
         Ok(Self(match steps {
             Some(steps) => sampler.with_steps(steps)?,

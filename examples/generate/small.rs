@@ -5,23 +5,20 @@ use std::path::Path;
 use std::time::Instant;
 
 use serde_json::json;
-use wake_ldm::WakeSampler;
 use wake_ldm::sampler::WakeImage;
-use wake_physics::Scene;
+use wake_ldm::{WakeSampler, device_named};
+use wake_physics::{Scene, output};
 
-use super::{Arguments, device, finish, prompt};
+use super::{Arguments, finish, image_name, prompt};
 
 /// Images in a row of the contact sheet.
 const ACROSS: usize = 4;
 
-/// Whether a folder holds a small model.
-pub(crate) fn is_small(folder: &Path) -> bool {
-    folder.join("patches.safetensors").is_file()
-}
-
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     refuse_options(arguments)?;
-    let device = device(&arguments.device)?;
+    let scene = arguments.scene.as_deref().map(Scene::read).transpose()?;
+    let prompt = prompt(arguments, scene.as_ref())?;
+    let device = device_named(&arguments.device)?;
     let begin = Instant::now();
     let mut sampler = match &arguments.weights {
         Some(folder) => WakeSampler::from_folder(folder, &device)?,
@@ -31,34 +28,40 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         sampler = sampler.with_steps(steps)?;
     }
     let load = begin.elapsed().as_secs_f64();
-    let scene = arguments.scene.as_deref().map(Scene::read).transpose()?;
-    let images = sample(&sampler, arguments, scene.as_ref())?;
-    let seconds = images[0].seconds;
+    let (count, seed) = (arguments.count, arguments.seed);
+    // All images as one batch.
+    let images = match &scene {
+        Some(scene) => sampler.sample_scenes(&vec![scene.clone(); count], seed)?,
+        None => sampler.sample_many(&vec![prompt.as_str(); count], seed)?,
+    };
     let total = begin.elapsed().as_secs_f64();
-    std::fs::create_dir_all(&arguments.out)?;
+    output::make_folder(&arguments.out)?;
     let files = write_images(&images, &arguments.out)?;
     let labels: Vec<_> = images.iter().map(|image| &image.labels).collect();
-    std::fs::write(
-        arguments.out.join("labels.json"),
-        format!("{:#}\n", json!(labels)),
-    )?;
+    output::write_json(&arguments.out.join("labels.json"), &labels)?;
+    let seconds = images[0].seconds;
     let report = json!({
-        "prompt": prompt(arguments, scene.as_ref())?, "seed": arguments.seed, "steps": sampler.steps(),
-        "count": images.len(), "device": arguments.device, "weights": arguments.weights, "files": files,
+        "prompt": prompt, "seed": seed, "steps": sampler.steps(), "count": count, "device": arguments.device,
+        "weights": arguments.weights, "files": files,
         "seconds": {
             "load": load, "text": seconds.text, "denoise": seconds.denoise, "decode": seconds.decode,
             "total": total,
         },
     });
-    finish(arguments, &report, &files)
+    Ok(finish(arguments, &report)?)
 }
 
-/// The small model has one sampler and no guidance.
+/// The small model has one sampler and no guidance, and draws all images at once.
 fn refuse_options(arguments: &Arguments) -> Result<(), String> {
-    if arguments.scheduler.is_some() || !arguments.negative.is_empty() {
-        return Err(
-            "--scheduler and --negative are for models in diffusers layout; give --weights".into(),
-        );
+    let given = [
+        ("--scheduler", arguments.scheduler.is_some()),
+        ("--guidance", arguments.guidance.is_some()),
+        ("--negative", arguments.negative.is_some()),
+    ];
+    if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
+        return Err(format!(
+            "{flag} is for models in diffusers layout; leave it out, or name one with --weights"
+        ));
     }
     if !(1..=256).contains(&arguments.count) {
         return Err(format!("--count is {}, outside [1, 256]", arguments.count));
@@ -66,50 +69,38 @@ fn refuse_options(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// All images as one batch.
-fn sample(
-    sampler: &WakeSampler,
-    arguments: &Arguments,
-    scene: Option<&Scene>,
-) -> Result<Vec<WakeImage>, Box<dyn Error>> {
-    let (count, seed) = (arguments.count, arguments.seed);
-    if let Some(scene) = scene {
-        return Ok(sampler.sample_scenes(&vec![scene.clone(); count], seed)?);
+/// Writes each image, and all of them as one, and returns their names.
+fn write_images(images: &[WakeImage], out: &Path) -> wake_physics::Result<Vec<String>> {
+    let levels: Vec<Vec<u8>> = images.iter().map(WakeImage::levels).collect();
+    let [rows, columns] = [images[0].grey.rows, images[0].grey.columns];
+    let mut names = Vec::new();
+    if images.len() > 1 {
+        let sheet = sheet(&levels, columns);
+        let width = columns * images.len().min(ACROSS);
+        output::write_png(&out.join("sheet.png"), &sheet, sheet.len() / width, width)?;
+        names.push("sheet.png".to_owned());
     }
-    let prompt = prompt(arguments, None)?;
-    Ok(sampler.sample_many(&vec![prompt.as_str(); count], seed)?)
+    for (k, levels) in levels.iter().enumerate() {
+        let name = image_name(k, images.len());
+        output::write_png(&out.join(&name), levels, rows, columns)?;
+        names.push(name);
+    }
+    Ok(names)
 }
 
-/// Writes each image, and all of them as one, and returns their names.
-fn write_images(images: &[WakeImage], out: &Path) -> Result<Vec<String>, Box<dyn Error>> {
-    let save = |name: &str, levels: &[u8], columns: usize| {
-        let rows = levels.len() / columns;
-        image::save_buffer(
-            out.join(name),
-            levels,
-            columns as u32,
-            rows as u32,
-            image::ColorType::L8,
-        )
-    };
-    let size = images[0].grey.columns;
-    if let [image] = images {
-        save("image.png", &image.levels(), size)?;
-        return Ok(vec!["image.png".to_owned()]);
-    }
+/// Images side by side, [`ACROSS`] in a row; what is left of the last row is black.
+fn sheet(images: &[Vec<u8>], columns: usize) -> Vec<u8> {
     let across = images.len().min(ACROSS);
-    let mut sheet = vec![0; across * size * images.len().div_ceil(across) * size];
-    let mut names = vec!["sheet.png".to_owned()];
-    for (k, image) in images.iter().enumerate() {
-        let (levels, name) = (image.levels(), format!("image-{k}.png"));
-        save(&name, &levels, size)?;
-        names.push(name);
-        let corner = (k / across * size) * across * size + k % across * size;
-        for (i, row) in levels.chunks(size).enumerate() {
-            let start = corner + i * across * size;
-            sheet[start..start + size].copy_from_slice(row);
+    let rows_of_images = images.chunks(across).map(|beside| {
+        let rows = beside[0].len() / columns;
+        let mut block = vec![0; rows * across * columns];
+        for (k, image) in beside.iter().enumerate() {
+            let lines = block.chunks_mut(across * columns);
+            for (line, row) in lines.zip(image.chunks(columns)) {
+                line[k * columns..][..columns].copy_from_slice(row);
+            }
         }
-    }
-    save("sheet.png", &sheet, across * size)?;
-    Ok(names)
+        block
+    });
+    rows_of_images.flatten().collect()
 }

@@ -2,30 +2,40 @@
 //!
 //! ```text
 //! cargo run --release --example speed_vs_error
+//! cargo run --release --example speed_vs_error -- --part model
 //! ```
 //!
-//! Writes `report.json`, `table.md` and `frontier.svg` (log-log). Sea and wake get the 10⁴ strongest waves of the
+//! Writes `report.json`, `table.md`, `frontier.svg` and `model.svg` (log-log). The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the
 //! default scene, the paper's own method and scale; the oracle of both is the harmonic sum, the strong baseline the
-//! same sum as a matrix product. Above 256 × 256 the oracles run on 4,096 random pixels and their times are scaled up.
+//! same sum as a matrix product. Above 256 × 256 the oracles run on 4,096 random pixels and their times are scaled up. The
+//! second part is the model, where it is built in: steps, batch size and weights against many steps from the same noise.
 
+#[path = "../common/exit.rs"]
+mod exit;
+#[cfg(feature = "ldm")]
+mod model;
 mod plot;
+#[path = "../common/progress.rs"]
+mod progress;
+#[cfg(feature = "ldm")]
+mod rounding;
 mod row;
 mod stages;
 
-use clap::Parser;
-use indicatif::ProgressBar;
+use clap::{Parser, ValueEnum};
 use row::Row;
 use serde_json::json;
 use stages::{Memo, STAGES, measure};
-use std::path::{Path, PathBuf};
+use std::cmp::Ordering;
+use std::error::Error;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_physics::output;
 
 /// Sizes of the sweep at the default tolerance.
 const SIZES: [usize; 5] = [128, 256, 512, 1024, 2048];
-/// Tolerances of the sweep at [`FRONTIER_SIZE`].
+/// Tolerances of the sweep at [`plot::FRONTIER_SIZE`].
 const TOLERANCES: [f64; 5] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5];
-const FRONTIER_SIZE: usize = 512;
 const DEFAULT_TOLERANCE: f64 = 1e-3;
 
 /// Measure every fast method of the simulator against its slow oracle.
@@ -41,31 +51,75 @@ struct Arguments {
     /// Largest size of the sweep over sizes, 128 to 2048 [pixels]
     #[arg(long, default_value_t = 2048, value_parser = clap::value_parser!(u32).range(128..=2048))]
     largest: u32,
+    /// What to measure
+    #[arg(long, value_enum, default_value = "all")]
+    part: Part,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    All,
+    /// The fast methods of the simulator
+    Simulator,
+    /// The model, where it is built in
+    Model,
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    exit::code(run(&Arguments::parse()))
 }
 
-fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    output::make_folder(&arguments.out)?;
-    let mut cases: Vec<(usize, f64)> = TOLERANCES.map(|t| (FRONTIER_SIZE, t)).to_vec();
-    let sizes = SIZES
-        .into_iter()
-        .filter(|&n| n <= arguments.largest as usize);
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    let out = &arguments.out;
+    output::make_folder(out)?;
+    let (mut rows, mut text) = (Vec::new(), String::new());
+    if arguments.part != Part::Model {
+        let measured = simulator(arguments.largest as usize)?;
+        plot::draw(&out.join("frontier.svg"), &plot::SIMULATOR, &measured)?;
+        text += &table(&measured);
+        for row in measured {
+            rows.push(serde_json::to_value(row)?);
+        }
+    }
+    #[cfg(feature = "ldm")]
+    if arguments.part != Part::Simulator {
+        let bar = progress::bar(model::PARTS as u64, "rows of the model");
+        let measured = model::measure(|| bar.inc(1))?;
+        bar.finish_and_clear();
+        plot::draw(
+            &out.join("model.svg"),
+            &plot::MODEL,
+            &model::steps(&measured),
+        )?;
+        text += &format!("\n{}", model::table(&measured));
+        for row in measured {
+            rows.push(serde_json::to_value(row)?);
+        }
+    }
+    if rows.is_empty() {
+        return Err("--part model needs the feature flex, or another backend".into());
+    }
+    let report = json!({ "rows": rows });
+    output::write_json(&out.join("report.json"), &report)?;
+    output::write_atomically(&out.join("table.md"), text.as_bytes())?;
+    if arguments.json {
+        println!("{report}");
+    } else {
+        println!("{text}\nwritten to {}", out.display());
+    }
+    Ok(())
+}
+
+/// The rows of the simulator.
+fn simulator(largest: usize) -> wake_physics::Result<Vec<Row>> {
+    let mut cases: Vec<(usize, f64)> = TOLERANCES.map(|t| (plot::FRONTIER_SIZE, t)).to_vec();
+    let sizes = SIZES.into_iter().filter(|&n| n <= largest);
     cases.extend(
         sizes
-            .filter(|&n| n != FRONTIER_SIZE)
+            .filter(|&n| n != plot::FRONTIER_SIZE)
             .map(|n| (n, DEFAULT_TOLERANCE)),
     );
-    let bar = ProgressBar::new((cases.len() * STAGES.len()) as u64);
+    let bar = progress::bar((cases.len() * STAGES.len()) as u64, "rows of the simulator");
     let (mut rows, mut memo) = (Vec::new(), Memo::default());
     for stage in STAGES {
         for &(size, tolerance) in &cases {
@@ -75,23 +129,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     }
     bar.finish_and_clear();
     rows.sort_by(|a, b| {
+        let tolerances = b.tolerance.partial_cmp(&a.tolerance);
         (a.stage, a.size)
             .cmp(&(b.stage, b.size))
-            .then(b.tolerance.total_cmp(&a.tolerance))
+            .then(tolerances.unwrap_or(Ordering::Equal))
     });
-    write(&arguments.out, &rows)?;
-    if arguments.json {
-        println!("{}", json!({ "rows": rows }));
-    } else {
-        println!("{}\nwritten to {}", table(&rows), arguments.out.display());
-    }
-    Ok(())
-}
-
-fn write(folder: &Path, rows: &[Row]) -> Result<(), Box<dyn std::error::Error>> {
-    output::write_json(&folder.join("report.json"), &json!({ "rows": rows }))?;
-    output::write_atomically(&folder.join("table.md"), table(rows).as_bytes())?;
-    plot::draw(&folder.join("frontier.svg"), rows, FRONTIER_SIZE)
+    Ok(rows)
 }
 
 /// The rows as a table in Markdown.
@@ -107,7 +150,7 @@ fn table(rows: &[Row]) -> String {
             "| {} | {} | {:.0e} | {:.2} | {:.3}{} | {product} | {:.0} | {:.1e} | {:.1e} |\n",
             r.stage,
             r.size,
-            r.tolerance,
+            r.tolerance.unwrap_or_default(),
             1e3 * r.fast_seconds,
             r.oracle_seconds,
             if r.extrapolated { "*" } else { "" },

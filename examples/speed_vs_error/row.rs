@@ -10,8 +10,8 @@ pub(crate) struct Row {
     pub(crate) stage: &'static str,
     /// Pixels along each side.
     pub(crate) size: usize,
-    /// Tolerance asked for.
-    pub(crate) tolerance: f64,
+    /// Tolerance asked for, where the method has one.
+    pub(crate) tolerance: Option<f64>,
     /// Seconds of the fast method: the median of several runs.
     pub(crate) fast_seconds: f64,
     /// Seconds of the oracle.

@@ -383,7 +383,7 @@ fn row(
     Row {
         stage,
         size: raster.rows,
-        tolerance,
+        tolerance: Some(tolerance),
         fast_seconds,
         oracle_seconds,
         extrapolated,

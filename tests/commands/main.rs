@@ -1,5 +1,15 @@
 //! The examples as a user starts them: bad input ends with exit code 2, one sentence, and nothing written.
 
+#[cfg(feature = "ldm")]
+mod evaluate;
+#[cfg(feature = "ldm")]
+mod generate;
+#[cfg(feature = "train")]
+mod make_dataset;
+#[cfg(feature = "train")]
+mod train;
+
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -25,22 +35,66 @@ fn run(name: &str, arguments: &[&str]) -> Output {
         .expect("an example that starts")
 }
 
-/// Runs `simulate` into a fresh folder and checks that it refuses, saying all of `words`.
-fn refused(arguments: &[&str], words: &[&str]) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("out");
-    let mut all = arguments.to_vec();
-    let out_text = out.to_str().expect("a path in Unicode").to_owned();
-    all.extend(["--out", &out_text]);
-    let output = run("simulate", &all);
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a path in Unicode")
+}
+
+/// Runs an example that must go well; gives what it printed.
+fn done(name: &str, arguments: &[&str], out: &Path) -> String {
+    let output = run(name, &[arguments, &["--out", text(out)]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{name} {arguments:?}: {message}");
+    String::from_utf8(output.stdout).expect("Unicode")
+}
+
+/// Runs an example that must refuse with exit code 2 and one sentence that says all of `words`, print no result, and
+/// leave `out` as it is.
+fn refused_into(name: &str, arguments: &[&str], words: &[&str], out: &Path) {
+    let before = out.exists().then(|| files(out));
+    let output = run(name, &[arguments, &["--out", text(out)]].concat());
     let message = String::from_utf8(output.stderr).expect("Unicode");
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
     assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
-    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    // What the parser of the command line refuses has a hint below its sentence.
+    let (sentence, hint) = message.split_once("\n\n").unwrap_or((&message, "For"));
+    assert_eq!(sentence.trim_end().lines().count(), 1, "{message}");
+    assert!(
+        hint.starts_with("For") || hint.starts_with("Usage"),
+        "{message}"
+    );
     for word in words {
-        assert!(message.contains(word), "no '{word}' in: {message}");
+        assert!(sentence.contains(word), "no '{word}' in: {message}");
     }
-    assert!(!out.exists(), "{arguments:?} left a folder behind");
+    let after = out.exists().then(|| files(out));
+    assert!(before == after, "{arguments:?} changed the folder");
+}
+
+/// The same into a folder that does not exist, and must not afterwards.
+fn refused_by(name: &str, arguments: &[&str], words: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    refused_into(name, arguments, words, &folder.path().join("out"));
+}
+
+/// Every file below a folder, and its content; a folder has none.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            let below = files(&path).into_iter();
+            let name = PathBuf::from(path.file_name().expect("a name"));
+            found.extend(below.map(|(path, content)| (name.join(path), content)));
+            found.insert(name, None);
+        } else {
+            let content = std::fs::read(&path).expect("a file");
+            found.insert(path.file_name().expect("a name").into(), Some(content));
+        }
+    }
+    found
+}
+
+fn refused(arguments: &[&str], words: &[&str]) {
+    refused_by("simulate", arguments, words);
 }
 
 #[test]
@@ -77,14 +131,10 @@ fn a_missing_or_broken_scene_file_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, "[sea]\nwind_sped = 3\n").expect("a file");
-    let path = path.to_str().expect("a path in Unicode");
-    let output = run("simulate", &["--scene", path, "--out", path]);
-    let message = String::from_utf8(output.stderr).expect("Unicode");
-    assert_eq!(output.status.code(), Some(2));
-    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
-    for word in ["scene.toml", "line 2", "wind_sped", "wind_speed"] {
-        assert!(message.contains(word), "no '{word}' in: {message}");
-    }
+    refused(
+        &["--scene", text(&path)],
+        &["scene.toml", "line 2", "wind_sped", "wind_speed"],
+    );
 }
 
 /// Fields that cannot fit in the memory of any machine this runs on, asked for within the range of the keys.
@@ -109,20 +159,18 @@ fn a_grid_that_does_not_fit_says_what_it_needs() {
 }
 
 /// A folder inside a file can be made by nobody, root included.
-#[test]
-fn an_unwritable_folder_is_named_and_nothing_is_written() {
+fn cannot_write(name: &str, arguments: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("file");
     std::fs::write(&file, "kept").expect("a file");
-    let out = file.join("out");
-    let small = ["--set", "grid.rows=8", "--set", "grid.columns=8", "--out"];
-    let mut arguments = small.to_vec();
-    arguments.push(out.to_str().expect("a path in Unicode"));
-    let output = run("simulate", &arguments);
-    let message = String::from_utf8(output.stderr).expect("Unicode");
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("file/out"), "{message}");
+    refused_into(name, arguments, &["file/out"], &file.join("out"));
     assert_eq!(std::fs::read_to_string(&file).expect("the file"), "kept");
+}
+
+#[test]
+fn an_unwritable_folder_is_named_and_nothing_is_written() {
+    let small = ["--set", "grid.rows=8", "--set", "grid.columns=8"];
+    cannot_write("simulate", &small);
 }
 
 /// What a good run writes, and the report it prints.
@@ -136,32 +184,25 @@ fn a_scene_gives_four_files_and_a_report() {
         "grid.rows=24",
         "--set",
         "grid.columns=31",
-        "--out",
-        out.to_str().expect("a path in Unicode"),
     ];
-    let output = run("simulate", &arguments);
-    assert!(output.status.success());
+    let printed = done("simulate", &arguments, &out);
     let report: serde_json::Value =
-        serde_json::from_slice(&output.stdout).expect("a report and nothing else");
+        serde_json::from_str(&printed).expect("a report and nothing else");
     assert!(report["seconds"]["total"].as_f64().is_some_and(|s| s > 0.0));
     assert!(report["plan"].is_array() && report["files"].is_array());
-    let names: Vec<String> = std::fs::read_dir(&out)
-        .expect("a folder")
-        .map(|entry| {
-            entry
-                .expect("an entry")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
-        .collect();
-    for name in [
-        "image.png",
-        "fields.safetensors",
-        "labels.json",
-        "report.json",
-    ] {
-        assert!(names.iter().any(|n| n == name), "no {name} in {names:?}");
-    }
-    assert_eq!(names.len(), 4, "{names:?}");
+    assert_eq!(
+        names(&out),
+        [
+            "fields.safetensors",
+            "image.png",
+            "labels.json",
+            "report.json"
+        ]
+    );
+}
+
+/// Names of all files below a folder, in order.
+fn names(folder: &Path) -> Vec<String> {
+    let names = files(folder).into_keys();
+    names.map(|name| text(&name).to_owned()).collect()
 }

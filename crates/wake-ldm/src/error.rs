@@ -78,6 +78,17 @@ pub enum Error {
         precision: &'static str,
     },
 
+    /// No backend of this build has a device of this name.
+    #[error(
+        "there is no device '{name}' in this build: it has {}; the features flex, ndarray, wgpu and cuda add others, \
+         and a GPU's number may follow, as in cuda:1",
+        compiled.join(", ")
+    )]
+    UnknownDevice {
+        name: String,
+        compiled: Vec<&'static str>,
+    },
+
     /// A vocabulary could not be read.
     #[error(transparent)]
     Text(#[from] wake_text::Error),

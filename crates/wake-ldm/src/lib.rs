@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod device;
 mod error;
 mod options;
 
@@ -29,6 +30,7 @@ pub mod train;
 #[cfg(feature = "flex")]
 mod self_check;
 
+pub use device::device_named;
 pub use error::{Error, Mismatch, Misshapen, Result};
 pub use sampler::WakeSampler;
 #[cfg(feature = "flex")]

@@ -1,9 +1,10 @@
 //! Scenes drawn from ranges.
 
 use super::parameters::with_length;
-use crate::error::{Result, check_range};
+use crate::error::{Error, Result, check_range};
 use crate::noise::NoiseSource;
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use wake_physics::Scene;
 use wake_physics::scene::Ship;
 
@@ -130,8 +131,13 @@ impl Ranges {
             ("fetch", self.fetch),
             ("incidence", self.incidence),
         ] {
-            let name = format!("the lower end of draw.ranges.{name}");
-            check_range(&name, low, f64::NEG_INFINITY, high)?;
+            if low.partial_cmp(&high).is_none_or(Ordering::is_gt) {
+                return Err(Error::InvalidOption {
+                    option: format!("draw.ranges.{name}"),
+                    value: format!("[{low}, {high}]"),
+                    expected: "two numbers, the lower first".to_owned(),
+                });
+            }
         }
         for end in [0.0, 1.0] {
             self.set(base, |_| end).validate()?;

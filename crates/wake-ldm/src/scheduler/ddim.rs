@@ -112,34 +112,28 @@ impl Scheduler for Ddim {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            noise,
-        } = input;
         let DdimConfig {
-            prediction: kind,
+            prediction,
             clipping,
             ..
         } = self.config;
-        let (now, next) = self.alphas(index);
-        let level = self.noise_level(index);
+        let (now, next) = self.alphas(input.index);
+        let level = self.noise_level(input.index);
         // 1. The clean image, Eq. 9, limited.
-        let denoised = clipping.apply(kind.denoised(level, sample.clone(), prediction.clone()));
+        let denoised = input.denoised(level, prediction, clipping);
         // 2. The noise.
         let direction = if self.config.noise_from_clipped {
-            Prediction::Sample.noise(level, sample, denoised.clone())
+            Prediction::Sample.noise(level, input.sample, denoised.clone())
         } else {
-            kind.noise(level, sample, prediction)
+            input.direction(level, prediction)
         };
         // 3. Both again at the next level, Eq. 12; rounding may leave −1e-17 under the root.
         let deviation = self.deviation(now, next);
         let remaining = (1.0 - next - deviation * deviation).max(0.0).sqrt();
         let mut sample = denoised.clone() * next.sqrt() + direction * remaining;
         // 4. Fresh noise.
-        if self.needs_noise(index) {
-            sample = sample + required(noise) * deviation;
+        if self.needs_noise(input.index) {
+            sample = sample + required(input.noise) * deviation;
         }
         StepOutput { sample, denoised }
     }

@@ -121,25 +121,18 @@ impl Scheduler for Ddpm {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            noise,
-        } = input;
-        let [now, next] = self.alphas(index);
+        let [now, next] = self.alphas(input.index);
         let added = 1.0 - now / next;
         // 1. The clean image, Eq. 15, limited.
-        let level = self.noise_level(index);
-        let denoised = self.prediction.denoised(level, sample.clone(), prediction);
-        let denoised = self.clipping.apply(denoised);
+        let level = self.noise_level(input.index);
+        let denoised = input.denoised(level, self.prediction, self.clipping);
         // 2. The mean of the step back, Eq. 7.
         let of_clean = next.sqrt() * added / (1.0 - now);
         let of_sample = (now / next).sqrt() * (1.0 - next) / (1.0 - now);
-        let mean: Tensor<4> = denoised.clone() * of_clean + sample * of_sample;
+        let mean: Tensor<4> = denoised.clone() * of_clean + input.sample * of_sample;
         // 3. Fresh noise, except on arrival.
-        let sample = if self.needs_noise(index) {
-            mean + required(noise) * self.deviation(now, next)
+        let sample = if self.needs_noise(input.index) {
+            mean + required(input.noise) * self.deviation(now, next)
         } else {
             mean
         };

@@ -240,28 +240,23 @@ impl Scheduler for DpmSolver {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            noise,
-        } = input;
+        let index = input.index;
         // 1. The clean image, or the noise.
         let shared = &self.config.shared;
-        let [denoised, kept] = shared.convert(self.path.level(index), &sample, prediction);
+        let [denoised, kept] = shared.convert(self.path.level(index), &input);
         self.history.insert(0, kept.clone());
         self.history.truncate(shared.order);
         // 2. The exact part, and the polynomial as far as history goes.
         let order = self.order(index);
         let factors = self.factors(index, order);
-        let mut next = sample * factors.sample + kept * factors.value;
+        let mut next = input.sample * factors.sample + kept * factors.value;
         let weights = [factors.slope, factors.curvature];
         for (difference, weight) in self.differences(index, order).into_iter().zip(weights) {
             next = next + difference * weight;
         }
         // 3. Fresh noise.
         if self.config.stochastic {
-            next = next + required(noise) * factors.noise;
+            next = next + required(input.noise) * factors.noise;
         }
         StepOutput {
             sample: next,

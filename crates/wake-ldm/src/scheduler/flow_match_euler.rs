@@ -1,6 +1,6 @@
 //! Euler's method on straight paths from noise to image.
 
-use super::prediction::Prediction;
+use super::prediction::{Clipping, Prediction};
 use super::sigmas::{SigmaOptions, Spread, check_positive, round};
 use super::spacing::linspace;
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
@@ -135,23 +135,15 @@ impl Scheduler for FlowMatchEuler {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            noise,
-        } = input;
-        let (sigma, next) = (self.sigmas[index], self.sigmas[index + 1]);
-        let level = self.noise_level(index);
-        let denoised = Prediction::Flow.denoised(level, sample.clone(), prediction.clone());
+        let (level, end) = (
+            self.noise_level(input.index),
+            self.noise_level(input.index + 1),
+        );
+        let denoised = input.denoised(level, Prediction::Flow, Clipping::Off);
         let sample = if self.stochastic {
-            NoiseLevel {
-                signal: 1.0 - next,
-                noise: next,
-            }
-            .mix(denoised.clone(), required(noise))
+            end.mix(denoised.clone(), required(input.noise))
         } else {
-            sample + prediction * (next - sigma)
+            input.sample + input.prediction * (end.noise - level.noise)
         };
         StepOutput { sample, denoised }
     }

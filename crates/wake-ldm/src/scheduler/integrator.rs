@@ -2,9 +2,9 @@
 
 use burn::tensor::Tensor;
 
-use super::NoiseLevel;
 use super::prediction::{Clipping, Prediction};
 use super::sigmas::Spread;
+use super::{NoiseLevel, StepInput};
 use crate::error::Result;
 use crate::options::Options;
 
@@ -38,21 +38,14 @@ impl IntegratorOptions {
     }
 
     /// The clean image that a prediction stands for, limited, and what the history keeps of it.
-    pub(super) fn convert(
-        &self,
-        level: NoiseLevel,
-        sample: &Tensor<4>,
-        prediction: Tensor<4>,
-    ) -> [Tensor<4>; 2] {
-        let kind = self.prediction;
-        let denoised = kind.denoised(level, sample.clone(), prediction.clone());
-        let denoised = self.clipping.apply(denoised);
+    pub(super) fn convert(&self, level: NoiseLevel, input: &StepInput) -> [Tensor<4>; 2] {
+        let denoised = input.denoised(level, self.prediction, self.clipping);
         let kept = if self.data {
             denoised.clone()
         } else if self.clipping == Clipping::Off {
-            kind.noise(level, sample.clone(), prediction)
+            input.direction(level, self.prediction)
         } else {
-            Prediction::Sample.noise(level, sample.clone(), denoised.clone())
+            Prediction::Sample.noise(level, input.sample.clone(), denoised.clone())
         };
         [denoised, kept]
     }

@@ -104,24 +104,17 @@ impl Scheduler for Lcm {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            noise,
-        } = input;
         // 1. The clean image that the prediction stands for, limited.
-        let level = self.noise_level(index);
-        let clean = self.prediction.denoised(level, sample.clone(), prediction);
-        let clean = self.clipping.apply(clean);
+        let level = self.noise_level(input.index);
+        let clean = input.denoised(level, self.prediction, self.clipping);
         // 2. The boundary condition: at t = 0 the sample itself.
-        let tau = self.path.timesteps[index] * self.timestep_scaling;
+        let tau = self.path.timesteps[input.index] * self.timestep_scaling;
         let skip = SIGMA_DATA * SIGMA_DATA / (tau * tau + SIGMA_DATA * SIGMA_DATA);
-        let denoised = clean * (tau / tau.hypot(SIGMA_DATA)) + sample * skip;
+        let denoised = clean * (tau / tau.hypot(SIGMA_DATA)) + input.sample * skip;
         // 3. Up to the next level, except on arrival.
-        let sample = if self.needs_noise(index) {
-            self.noise_level(index + 1)
-                .mix(denoised.clone(), required(noise))
+        let sample = if self.needs_noise(input.index) {
+            self.noise_level(input.index + 1)
+                .mix(denoised.clone(), required(input.noise))
         } else {
             denoised.clone()
         };

@@ -88,6 +88,18 @@ pub struct StepInput {
     pub noise: Option<Tensor<4>>,
 }
 
+impl StepInput {
+    /// The clean image that the prediction stands for, limited.
+    fn denoised(&self, level: NoiseLevel, kind: Prediction, clipping: Clipping) -> Tensor<4> {
+        clipping.apply(kind.denoised(level, self.sample.clone(), self.prediction.clone()))
+    }
+
+    /// The noise that the prediction stands for.
+    fn direction(&self, level: NoiseLevel, kind: Prediction) -> Tensor<4> {
+        kind.noise(level, self.sample.clone(), self.prediction.clone())
+    }
+}
+
 /// What one step gives.
 #[derive(Debug)]
 pub struct StepOutput {

@@ -141,25 +141,18 @@ impl<M: SigmaMethod> Scheduler for SigmaSampler<M> {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            sample,
-            noise,
-        } = input;
         // 1. The clean image, limited.
-        let level = self.path.level(index);
-        let denoised = self.prediction.denoised(level, sample.clone(), prediction);
-        let denoised = self.clipping.apply(denoised);
+        let level = self.path.level(input.index);
+        let denoised = input.denoised(level, self.prediction, self.clipping);
         // 2. The slope away from it.
-        let slope = (sample.clone() - denoised.clone()) / level.noise;
+        let slope = (input.sample.clone() - denoised.clone()) / level.noise;
         // 3. Along it, as the method does.
         let sample = self.method.advance(Call {
-            index,
+            index: input.index,
             sigmas: &self.path.sigmas,
-            sample,
+            sample: input.sample,
             slope,
-            noise,
+            noise: input.noise,
         });
         StepOutput { sample, denoised }
     }

@@ -257,16 +257,11 @@ impl Scheduler for UniPc {
     }
 
     fn step(&mut self, input: StepInput) -> StepOutput {
-        let StepInput {
-            index,
-            prediction,
-            mut sample,
-            ..
-        } = input;
+        let index = input.index;
         // 1. What the prediction says at the predicted sample.
         let shared = &self.config.shared;
-        let level = self.path.level(index);
-        let [denoised, kept] = shared.convert(level, &sample, prediction);
+        let [denoised, kept] = shared.convert(self.path.level(index), &input);
+        let mut sample = input.sample;
         // 2. With it, the last step is corrected.
         let corrects = index
             .checked_sub(1)

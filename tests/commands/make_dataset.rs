@@ -1,0 +1,125 @@
+//! `make_dataset`: what it refuses, and that shards, jobs and kills change no byte.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::{cannot_write, done, example, files, names, refused_by, refused_into, text};
+
+/// A quick recipe.
+const SMALL: [&str; 4] = [
+    "--set",
+    "scene.grid.rows=32",
+    "--set",
+    "scene.grid.columns=32",
+];
+
+fn make(arguments: &[&str], out: &Path) -> String {
+    done("make_dataset", &[&SMALL, arguments].concat(), out)
+}
+
+#[test]
+fn wrong_recipes_shares_and_numbers_are_named() {
+    for (arguments, words) in [
+        (["--grid", "papper"], ["--grid", "papper", "ranges"]),
+        (["--set", "speckel=true"], ["recipe", "speckel", "speckle"]),
+        (
+            ["--set", "scene.sea.wind_sped=3"],
+            ["wind_sped", "wind_speed", "fetch"],
+        ),
+        (
+            ["--set", "scene.radar.looks=0"],
+            ["radar.looks", "is 0", "1 to"],
+        ),
+        (
+            ["--set", "draw.ranges.ship_speed=[12,6]"],
+            ["draw.ranges.ship_speed", "[12, 6]", "lower first"],
+        ),
+        (["--shard", "5/3"], ["--shard", "5/3", "from 0 to n"]),
+        (["--shard", "half"], ["--shard", "half", "such as 0/4"]),
+        (["--count", "0"], ["--count", "'0'", "1..="]),
+        (["--jobs", "0"], ["--jobs", "'0'", "1..="]),
+    ] {
+        refused_by("make_dataset", &arguments, &words);
+    }
+    refused_by(
+        "make_dataset",
+        &["--merge"],
+        &["shard-0", "missing", "--shard 0/n"],
+    );
+    cannot_write("make_dataset", &["--count", "1"]);
+}
+
+#[test]
+fn shards_made_on_other_threads_merge_to_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (whole, joined) = (folder.path().join("whole"), folder.path().join("joined"));
+    make(&["--count", "4", "--jobs", "1"], &whole);
+    make(&["--count", "4", "--jobs", "3", "--shard", "1/2"], &joined);
+    // A share is missing: nothing is merged, nothing is lost.
+    refused_into(
+        "make_dataset",
+        &["--merge"],
+        &["shard-0", "missing"],
+        &joined,
+    );
+    make(&["--count", "4", "--shard", "0/2"], &joined);
+    done("make_dataset", &["--merge"], &joined);
+    assert!(files(&joined) == files(&whole));
+    let images = names(&whole)
+        .into_iter()
+        .filter(|name| name.ends_with(".png"));
+    assert_eq!(images.count(), 4);
+}
+
+#[test]
+fn a_killed_run_goes_on_and_ends_with_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [whole, killed] = ["whole", "killed"].map(|name| folder.path().join(name));
+    let arguments = [&SMALL[..], &["--count", "150", "--jobs", "1"]].concat();
+    let mut child = Command::new(example("make_dataset"))
+        .args(&arguments)
+        .args(["--out", text(&killed)])
+        .stderr(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("an example that starts");
+    let lines = || {
+        let metadata = std::fs::read(killed.join("metadata.jsonl")).unwrap_or_default();
+        metadata.iter().filter(|&&byte| byte == b'\n').count()
+    };
+    while lines() < 5 && child.try_wait().expect("a child").is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("a kill");
+    child.wait().expect("an end");
+    let made = lines();
+    assert!((5..150).contains(&made), "killed after {made} images");
+    let printed = done("make_dataset", &arguments, &killed);
+    assert!(printed.starts_with("150 images"), "{printed}");
+    assert!(!printed.contains("150 of them"), "began anew: {printed}");
+    done("make_dataset", &arguments, &whole);
+    assert!(files(&killed) == files(&whole));
+}
+
+#[test]
+fn a_broken_line_or_another_set_is_named_and_left_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("set");
+    make(&["--count", "3"], &out);
+    let same = [&SMALL[..], &["--count", "3"]].concat();
+    let other = [&SMALL[..], &["--count", "4"]].concat();
+    refused_into(
+        "make_dataset",
+        &other,
+        &["dataset.json", "another recipe, seed, count"],
+        &out,
+    );
+    let metadata = out.join("metadata.jsonl");
+    let good = std::fs::read_to_string(&metadata).expect("lines");
+    let second = good.lines().nth(1).expect("a second line");
+    std::fs::write(&metadata, good.replace(second, r#"{"file_name": 3}"#)).expect("a file");
+    refused_into("make_dataset", &same, &["metadata.jsonl, line 2"], &out);
+    let data = ["autoencoder", "--data", text(&out)];
+    refused_by("train", &data, &["metadata.jsonl, line 2"]);
+}
