@@ -11,8 +11,19 @@
 //! `patches.safetensors`, `reader.safetensors`, `prior.safetensors`, `flow.safetensors` (averaged weights, 16 bits),
 //! `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and `checkpoints/`. A run that was killed goes on
 //! from its last checkpoint with `--resume`.
+//!
+//! ```text
+//! cargo run --release --example train -- fine-tune --weights stable-diffusion-v1-4 --data out/make_dataset --rank 8
+//! ```
+//!
+//! `fine-tune` changes a model in diffusers layout (as Stable Diffusion v1.4) instead, and writes the same layout.
 
+#[path = "../common/exit.rs"]
+mod exit;
+mod fine_tune;
 mod options;
+#[path = "../common/progress.rs"]
+mod progress;
 mod source;
 mod stages;
 
@@ -38,20 +49,16 @@ enum Stage {
     Mean(Options),
     /// Train the flow that draws the sea.
     Diffusion(Options),
+    /// Fit a model in diffusers layout to simulated pairs: its U-Net, or low-rank changes of it.
+    FineTune(fine_tune::Options),
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().stage {
+    exit::code(match Arguments::parse().stage {
         Stage::Autoencoder(options) => stages::autoencoder(&options),
         Stage::Words(options) => stages::words(&options),
         Stage::Mean(options) => stages::mean(&options),
         Stage::Diffusion(options) => stages::diffusion(&options),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+        Stage::FineTune(options) => fine_tune::run(&options),
+    })
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use burn::tensor::Device;
 use clap::Args;
+use wake_ldm::device_named;
 use wake_ldm::train::{Rate, RunOptions, TrainerOptions};
 
 #[derive(Args, Clone)]
@@ -82,12 +83,12 @@ impl Options {
     }
 
     /// The devices, outside autodiff.
-    pub(crate) fn devices(&self) -> Result<Vec<Device>, String> {
-        self.device.split(',').map(device).collect()
+    pub(crate) fn devices(&self) -> wake_ldm::Result<Vec<Device>> {
+        self.device.split(',').map(device_named).collect()
     }
 
     /// The devices that a model learns on.
-    pub(crate) fn learning_devices(&self) -> Result<Vec<Device>, String> {
+    pub(crate) fn learning_devices(&self) -> wake_ldm::Result<Vec<Device>> {
         let autodiff = |device: Device| {
             let device = device.autodiff();
             match self.checkpointing {
@@ -96,26 +97,5 @@ impl Options {
             }
         };
         Ok(self.devices()?.into_iter().map(autodiff).collect())
-    }
-}
-
-fn device(name: &str) -> Result<Device, String> {
-    let (kind, index) = name.split_once(':').unwrap_or((name, "0"));
-    let index: usize = index
-        .parse()
-        .map_err(|_| format!("--device {name}: no number after ':'"))?;
-    match kind {
-        #[cfg(feature = "flex")]
-        "flex" if index == 0 => Ok(Device::flex()),
-        #[cfg(feature = "ndarray")]
-        #[allow(deprecated, reason = "kept until burn drops it")]
-        "ndarray" if index == 0 => Ok(Device::ndarray()),
-        #[cfg(feature = "wgpu")]
-        "wgpu" if index == 0 => Ok(Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)),
-        #[cfg(feature = "cuda")]
-        "cuda" => Ok(Device::cuda(index)),
-        _ => Err(format!(
-            "--device {name} is none of this build's: use flex, or build with --features ndarray, wgpu or cuda"
-        )),
     }
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use burn::module::Module;
 use burn::tensor::Device;
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use wake_ldm::WakeSampler;
@@ -22,6 +21,7 @@ use wake_physics::Scene;
 use wake_text::Wording;
 
 use super::options::Options;
+use super::progress;
 use super::source::Source;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -136,9 +136,9 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
         flow: config.init_flow(&device),
     };
     let set = latents(&source, &model.patches, &config)?;
-    let bar = progress_bar(set.len() as u64, "residuals");
+    let bar = progress::bar(set.len() as u64, "residuals");
     let set = set.residuals(&model.prior, &model.patches, grid(&config), |n| {
-        bar.inc(n as u64)
+        bar.inc(n as u64);
     });
     bar.finish_and_clear();
     let steps = options.steps(20_000);
@@ -196,7 +196,7 @@ fn train<M: Module>(
         run.resume(checkpoint)?;
     }
     let mut metrics = Metrics::open(&options.out.join(format!("{stage}.jsonl")), run.steps())?;
-    let bar = progress_bar(steps as u64, stage);
+    let bar = progress::bar(steps as u64, stage);
     while run.steps() < steps {
         let (report, terms) = run.step(task);
         let terms: Map<String, Value> = terms
@@ -223,7 +223,7 @@ fn train<M: Module>(
 fn fit(options: &Options, source: &Source, config: &WakeModelConfig) -> Outcome<Shares> {
     let device = options.devices()?.remove(0);
     let count = source.len().min(FITTED);
-    let bar = progress_bar(count, "images for the patch transform");
+    let bar = progress::bar(count, "images for the patch transform");
     let mut images = Vec::new();
     for index in 0..count {
         images.push(source.pair(index)?.image.pixels);
@@ -314,7 +314,7 @@ fn latents(
     patches: &PatchTransform,
     config: &WakeModelConfig,
 ) -> wake_ldm::Result<LatentSet> {
-    let bar = progress_bar(source.len(), "pairs");
+    let bar = progress::bar(source.len(), "pairs");
     let mut set = LatentSet::default();
     let indices: Vec<u64> = (0..source.len()).collect();
     for chunk in indices.chunks(AT_ONCE) {
@@ -368,11 +368,4 @@ fn sheet(examples: &[Pair], drawn: &[Vec<f32>], path: &Path) -> Outcome<()> {
     }
     sheet.save(path)?;
     Ok(())
-}
-
-fn progress_bar(length: u64, what: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos} of {len} {msg}, {eta} left");
-    ProgressBar::new(length)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-        .with_message(what)
 }

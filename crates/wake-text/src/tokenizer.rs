@@ -47,7 +47,7 @@ impl Tokens {
 ///
 /// Radford et al. (2021), Learning Transferable Visual Models From Natural Language Supervision, section
 /// 2.4; Sennrich et al. (2016), Neural Machine Translation of Rare Words with Subword Units, algorithm 1.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Tokenizer {
     vocabulary: Vocabulary,
 }

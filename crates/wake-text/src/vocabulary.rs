@@ -28,7 +28,7 @@ const CLIP_NAME: &str = "assets/clip_merges.txt.gz";
 const CLIP_MERGES: &[u8] = include_bytes!("../assets/clip_merges.txt.gz");
 
 /// The merges and the ids of the tokens they make.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Vocabulary {
     bpe: BPE,
     /// The words that end up as one token, as symbols: most words of a prompt, found without merging.

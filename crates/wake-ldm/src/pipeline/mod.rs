@@ -33,7 +33,7 @@ pub use sampling::{Progress, Sampling};
 const CACHED_PROMPTS: usize = 256;
 
 /// What a pipeline is made of.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct PipelineParts {
     /// Turns prompts into token ids; `None`: CLIP's own.
     pub tokenizer: Option<Tokenizer>,
@@ -102,6 +102,18 @@ impl Pipeline {
             latent_size,
             embeddings: Mutex::default(),
             device: device.clone(),
+        }
+    }
+
+    /// What the pipeline is made of.
+    pub fn into_parts(self) -> PipelineParts {
+        PipelineParts {
+            tokenizer: self.tokenizer,
+            text_encoder: self.text_encoder,
+            unet: self.unet,
+            autoencoder: self.autoencoder,
+            scheduler: self.scheduler,
+            latent_size: self.latent_size,
         }
     }
 

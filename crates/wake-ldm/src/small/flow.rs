@@ -23,7 +23,7 @@ const STEPS: f64 = 1000.0;
 ///
 /// # References
 ///
-/// Lipman et al. (2023), "Flow Matching for Generative Modeling", Eq. 22 with σ_min = 0.
+/// Lipman et al. (2023), "Flow Matching for Generative Modeling", Eq. 22 without its least noise.
 #[derive(Module, Debug)]
 pub struct Flow {
     places: Conv2d,

@@ -26,19 +26,19 @@ const GREY_WIDTH: usize = 128;
 /// Mean and spread of the latents of a scene, over all seas that it can have.
 ///
 /// ```text
-/// mean μ = Σ_j A_j φ_j + m        ln s
+/// mean μ = Σ_j A_j φ_j + m,    A_j = Σ_h C_jh H_h,    spread s
 /// ```
 ///
-/// - φ_j: phases of the Kelvin waves, encoded as an image would be ([`wave_squares`](crate::conditioning::wave_squares))
-/// - A_j = Σ_h C_jh H_h: a sum of harmonics H_h of the wave's direction, since a radar sees waves of each direction
-///   otherwise
-/// - C_jh, m, ln s: of a network that sees one latent pixel, its place in the ship's frame and the numbers
+/// - φ: phases of the Kelvin waves, encoded as an image would be
+///   ([`wave_squares`](crate::conditioning::wave_squares))
+/// - H: harmonics of the direction of each wave, since a radar sees waves of each direction otherwise
+/// - C, m, ln s: of a network that sees one latent pixel, its place in the ship's frame and the numbers
 ///
 /// What is left, (z − μ)/s, has mean 0 and variance 1 at every pixel; the flow draws it.
 ///
 /// # References
 ///
-/// Lee et al. (2022), "PriorGrad: Improving Conditional Denoising Diffusion Models with Data-Dependent Adaptive
+/// Lee et al. (2022), "`PriorGrad`: Improving Conditional Denoising Diffusion Models with Data-Dependent Adaptive
 /// Prior"; Han, Zheng & Zhou (2022), "CARD: Classification and Regression Diffusion Models" (a regression first, then a
 /// diffusion about it); Nix & Weigend (1994), "Estimating the Mean and Variance of the Target Probability Distribution".
 #[derive(Module, Debug)]
@@ -122,7 +122,7 @@ impl Prior {
         }
     }
 
-    /// Σ_j A_j φ_j with A_j = Σ_h C_jh H_h(direction of wave j).
+    /// The sum of the waves, each with its amplitude.
     fn waves(&self, x: Tensor<4>, places: Tensor<4>, waves: Tensor<4>) -> Tensor<4> {
         let amplitudes = convolve(&self.amplitudes, x) * WAVE_AMPLITUDE;
         let [batch, _, rows, columns] = amplitudes.dims();

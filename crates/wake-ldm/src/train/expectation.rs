@@ -51,7 +51,7 @@ impl PriorTask<'_> {
         let inside = &places[WEDGE * all.len()..][..all.len()];
         let wedge: Vec<usize> = all.iter().copied().filter(|&c| inside[c] > 0.5).collect();
         let draw = |i: usize| {
-            let from = if i % 2 == 0 && !wedge.is_empty() {
+            let from = if i.is_multiple_of(2) && !wedge.is_empty() {
                 &wedge
             } else {
                 &all

@@ -1,0 +1,180 @@
+//! A Stable Diffusion-layout model learns to draw wakes.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use burn::tensor::{Device, Int, Tensor, TensorData};
+use clap::Args;
+use serde_json::json;
+use wake_ldm::dataset::{Folder, Pair};
+use wake_ldm::device_named;
+use wake_ldm::noise::NoiseSource;
+use wake_ldm::pipeline::{Pipeline, PipelineParts};
+use wake_ldm::scheduler::Prediction;
+use wake_ldm::train::{FineTune, FineTuneOptions, Frozen, Metrics, Rate, TrainerOptions};
+use wake_ldm::weights::Precision;
+use wake_text::Tokenizer;
+
+use super::progress;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Streams of random numbers: which pairs, and which of them without their prompt.
+const PAIR_STREAM: u32 = 2200;
+const PROMPT_STREAM: u32 = 2201;
+/// Part of the pairs whose prompt is left out, for guidance.
+const WITHOUT_PROMPT: f64 = 0.1;
+
+/// The paper's recipe by default: batch 16, rate 1e-5, the whole U-Net and nothing else.
+#[derive(Args)]
+pub(crate) struct Options {
+    /// Folder of the model in diffusers layout
+    #[arg(long, value_name = "DIR")]
+    weights: PathBuf,
+    /// Folder that `make_dataset` wrote
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Learn changes of this rank of the attentions, and leave all else [default: the whole U-Net learns]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    rank: Option<u16>,
+    /// Steps
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    steps: u32,
+    /// Images of a batch
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
+    batch: u16,
+    /// Largest step of the optimizer
+    #[arg(long, default_value_t = 1e-5)]
+    rate: f64,
+    /// γ of the weights by signal-to-noise ratio [default: all steps count the same]
+    #[arg(long, value_name = "GAMMA")]
+    snr_gamma: Option<f64>,
+    /// Steps between two writings of the model
+    #[arg(long, default_value_t = 250, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+    /// Seed of everything that is drawn
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Keep less for the way back through the model, and compute it again; slower
+    #[arg(long)]
+    checkpointing: bool,
+    /// flex, ndarray, wgpu or cuda, where compiled in
+    #[arg(long, default_value = "flex")]
+    device: String,
+    /// Folder of the results, in diffusers layout, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/fine_tune")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(options: &Options) -> Outcome<()> {
+    let device = device_named(&options.device)?;
+    let data = Folder::open(&options.data)?;
+    let parts = Pipeline::load(&options.weights, &device)?.into_parts();
+    let mut run = begin(options, &parts, &device)?;
+    std::fs::create_dir_all(&options.out)?;
+    let mut metrics = Metrics::open(&options.out.join("fine_tune.jsonl"), 0)?;
+    let steps = options.steps as usize;
+    let bar = progress::bar(u64::from(options.steps), "fine-tuning");
+    while run.steps() < steps {
+        let (images, ids) = batch(options, &data, &parts, run.steps(), &device)?;
+        let report = run.step(images, ids);
+        metrics.write(run.steps(), steps, report, &json!({}))?;
+        bar.set_message(format!("fine-tuning, loss {:.4}", report.loss));
+        bar.set_position(run.steps() as u64);
+        if run.steps().is_multiple_of(options.every as usize) || run.steps() == steps {
+            save(options, &run, &parts, &device)?;
+        }
+    }
+    bar.finish_and_clear();
+    println!("{steps} steps, model in {}", options.out.display());
+    Ok(())
+}
+
+fn begin(options: &Options, parts: &PipelineParts, device: &Device) -> Outcome<FineTune> {
+    let schedule = parts.scheduler.noise_schedule().cloned();
+    let schedule = schedule.ok_or("the model's scheduler has no noise schedule to train with")?;
+    let prediction = match parts.scheduler.to_json()["prediction_type"].as_str() {
+        Some("v_prediction") => Prediction::Velocity,
+        Some("sample") => Prediction::Sample,
+        _ => Prediction::Epsilon,
+    };
+    let constants = FineTuneOptions {
+        prediction,
+        snr_gamma: options.snr_gamma,
+        seed: options.seed,
+        trainer: TrainerOptions {
+            rate: Rate {
+                peak: options.rate,
+                warmup: 20,
+                steps: options.steps as usize,
+            },
+            ..TrainerOptions::default()
+        },
+    };
+    let frozen = Frozen {
+        text: parts.text_encoder.clone(),
+        autoencoder: parts.autoencoder.clone(),
+        schedule,
+    };
+    let mut learning = device.clone().autodiff();
+    if options.checkpointing {
+        learning = learning.gradient_checkpointing();
+    }
+    let unet = parts.unet.clone();
+    Ok(match options.rank {
+        None => FineTune::whole(unet, frozen, constants, &learning),
+        Some(rank) => FineTune::low_rank(unet, usize::from(rank), frozen, constants, &learning)?,
+    })
+}
+
+/// Images in −1…1 with the channels of the autoencoder, and the ids of their prompts.
+fn batch(
+    options: &Options,
+    data: &Folder,
+    parts: &PipelineParts,
+    step: usize,
+    device: &Device,
+) -> Outcome<(Tensor<4>, Tensor<2, Int>)> {
+    let random = NoiseSource::new(options.seed);
+    let tokenizer = parts
+        .tokenizer
+        .as_ref()
+        .unwrap_or_else(|| Tokenizer::clip());
+    let count = usize::from(options.batch);
+    let (mut pixels, mut ids, mut size) = (Vec::new(), Vec::new(), [0, 0]);
+    for position in (step * count..(step + 1) * count).map(|p| p as u64) {
+        let draw = random.uniform(PAIR_STREAM, position);
+        let Pair { image, prompt, .. } = data.pair((draw * data.len() as f64) as u64)?;
+        size = [image.rows, image.columns];
+        pixels.extend(image.pixels.iter().map(|grey| 2.0 * grey - 1.0));
+        let told = random.uniform(PROMPT_STREAM, position) >= WITHOUT_PROMPT;
+        let prompt = tokenizer.encode(if told { &prompt } else { "" });
+        ids.extend(prompt.ids.iter().map(|&id| id as i32));
+    }
+    let channels = parts.autoencoder.config().in_channels;
+    let images: Tensor<4> = Tensor::from_data(
+        TensorData::new(pixels, [count, 1, size[0], size[1]]),
+        device,
+    );
+    let tokens = ids.len() / count;
+    Ok((
+        images.repeat_dim(1, channels),
+        Tensor::from_data(TensorData::new(ids, [count, tokens]), device),
+    ))
+}
+
+/// Writes the whole model, and the changes alone where they are what learns.
+fn save(options: &Options, run: &FineTune, parts: &PipelineParts, device: &Device) -> Outcome<()> {
+    let parts = PipelineParts {
+        unet: run.unet(),
+        ..parts.clone()
+    };
+    Pipeline::new(parts, device).save(&options.out, Precision::F32)?;
+    if let Some(changes) = run.changes() {
+        changes.save(
+            "unet",
+            &options.out.join("pytorch_lora_weights.safetensors"),
+        )?;
+    }
+    Ok(())
+}
