@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Longest source file [lines of code]: tests, comments and blank lines are not counted. The aim is 300.
-const LONGEST_FILE: usize = 320;
+/// Longest source file [lines of code]: tests, comments and blank lines are not counted.
+const LONGEST_FILE: usize = 300;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
