@@ -42,6 +42,9 @@ fn series(x: f64) -> f64 {
         even *= cube / ((n + 2.0) * (n + 3.0));
         odd *= cube / ((n + 3.0) * (n + 4.0));
         (f, g) = (f + even, g + odd);
+        if even.abs() + odd.abs() < 1e-16 {
+            break;
+        }
     }
     AT_ZERO * f - SLOPE * g
 }

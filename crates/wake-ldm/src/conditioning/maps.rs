@@ -11,8 +11,12 @@ use super::conditions::{Conditions, SHIP_LENGTH};
 const GRAVITY: f64 = 9.81;
 /// Side of the squares of pixels that become one latent pixel.
 pub const PATCH: usize = 8;
-/// Maps at full size: cos and sin of three waves from each of two origins, and the turbulent wake.
-pub const WAVES: usize = 13;
+/// Maps at full size that oscillate: cos and sin of five waves from each of two origins.
+pub const OSCILLATING: usize = 20;
+/// Maps at full size: those that oscillate, bands along the cusp lines, and the turbulent wake.
+pub const WAVES: usize = OSCILLATING + 2 * BANDS + 1;
+/// Bands along a cusp line, at ζ = 0, 1, 2, 3.
+const BANDS: usize = 4;
 /// Maps at the size of the latents.
 pub const PLACES: usize = 18;
 /// Which of them says whether a place is in the wedge.
@@ -21,6 +25,10 @@ pub const WEDGE: usize = 5;
 pub const DIRECTIONS: usize = 12;
 /// Nearer to their origin than this \[m\], waves are not shown stronger.
 const NEAREST: f64 = 50.0;
+/// The smallest ζ outside the wedge where anything is shown: Ai(4) is 0.001.
+const FARTHEST_OUT: f64 = -4.0;
+/// Half-width of a band along the cusp line, in ζ.
+const BAND_WIDTH: f64 = 0.5;
 
 /// Size of an image in pixels, and of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +54,16 @@ struct Wave {
     wavenumber: [f64; 2],
     /// 1/√r, and what a pixel can carry.
     envelope: f64,
+    /// The same of its second harmonic: 1/r.
+    second: f64,
+}
+
+/// The wave along the cusp line.
+struct Cusp {
+    phase: f64,
+    /// 0 at the edge of the wedge, positive inside.
+    zeta: f64,
+    envelope: f64,
 }
 
 /// Phases of the wake in some squares of pixels; all zero where the track of the ship is not known, or there is no ship.
@@ -60,6 +78,8 @@ struct Wave {
 /// - from the bow and from the stern: cos and sin of both phases, falling as 1/√r and to 0 where the wavelength is
 ///   two pixels; where both meet, at the cusp line, cos and sin of their mean phase times Ai(−ζ), ⅔ ζ^(3/2) being half
 ///   their difference (outside the wedge: half the imaginary part of it, with ζ < 0)
+/// - twice both phases, falling as 1/r: the radar's view of steep waves is not linear
+/// - bands along the cusp lines, where many waves together change the brightness
 /// - the turbulent wake: a band of 40 m half-width behind the stern
 ///
 /// `cells`: squares of [`PATCH`] × [`PATCH`] pixels, counted in rows.
@@ -170,42 +190,41 @@ impl Frame {
             let slope = (x + sign * root.sqrt()) / (4.0 * off);
             let secant = (1.0 + slope * slope).sqrt();
             let k = self.wavenumber * secant * secant;
-            let resolved = (1.0 - k * spacing / std::f64::consts::PI).max(0.0);
-            let far = (NEAREST / x.hypot(off).max(NEAREST)).sqrt();
+            let far = far(x, off);
             Wave {
                 phase: self.wavenumber * secant * (x - slope * off),
                 wavenumber: self.turned(k / secant, k * slope / secant * across.signum()),
-                envelope: far * resolved.min(0.25) * 4.0,
+                envelope: far * resolved(k, spacing),
+                second: far * far * resolved(2.0 * k, spacing),
             }
         }))
     }
 
-    /// Phase and envelope of the wave along the cusp line, at (ξ, η) from its origin.
+    /// The wave along the cusp line, at (ξ, η) from its origin; `None` ahead of it and far outside the wedge.
     ///
     /// With s = (x ∓ √(x² − 8η²))/(4|η|), complex outside the wedge, the phase is the mean of both waves', and half
     /// their difference is ⅔ ζ^(3/2).
-    fn cusp_wave(&self, [along, across]: [f64; 2], spacing: f64) -> (f64, f64) {
+    fn cusp(&self, [along, across]: [f64; 2], spacing: f64) -> Option<Cusp> {
         let (x, off) = (-along, across.abs().max(1e-3));
-        if x <= 0.0 {
-            return (0.0, 0.0);
-        }
         let square = x * x - 8.0 * off * off;
-        let root = square.abs().sqrt();
+        let root = square.abs().sqrt() / (4.0 * off);
         let phase = |slope: [f64; 2]| self.complex_phase(x, off, slope);
         let middle = x / (4.0 * off);
         let (mean, zeta) = if square > 0.0 {
             let [transverse, divergent] =
-                [-1.0, 1.0].map(|sign| phase([middle + sign * root / (4.0 * off), 0.0])[0]);
+                [-1.0, 1.0].map(|sign| phase([middle + sign * root, 0.0])[0]);
             let half = 0.5 * (transverse - divergent).abs();
-            (0.5 * (transverse + divergent), (1.5 * half).powf(2.0 / 3.0))
+            (0.5 * (transverse + divergent), (1.5 * half).cbrt().powi(2))
         } else {
-            let [mean, imaginary] = phase([middle, -root / (4.0 * off)]);
-            (mean, -(1.5 * imaginary.abs()).powf(2.0 / 3.0))
+            let [mean, imaginary] = phase([middle, -root]);
+            (mean, -(1.5 * imaginary.abs()).cbrt().powi(2))
         };
         let k = 1.5 * self.wavenumber;
-        let resolved = (1.0 - k * spacing / std::f64::consts::PI).max(0.0);
-        let far = (NEAREST / x.hypot(off).max(NEAREST)).sqrt();
-        (mean, far * resolved.min(0.25) * 4.0 * airy(-zeta))
+        (x > 0.0 && zeta > FARTHEST_OUT).then(|| Cusp {
+            phase: mean,
+            zeta,
+            envelope: far(x, off) * resolved(k, spacing),
+        })
     }
 
     /// ν √(1 + s²) (x − s|η|) for a complex s.
@@ -229,15 +248,23 @@ impl Frame {
         let mut values = [0.0; WAVES];
         for (i, start) in [0.5, -0.5].into_iter().enumerate() {
             let behind = [place[0] - start * SHIP_LENGTH, place[1]];
+            let mut set = |wave: usize, phase: f64, envelope: f64| {
+                let (sin, cos) = phase.sin_cos();
+                let map = OSCILLATING / 2 * i + 2 * wave;
+                (values[map], values[map + 1]) = (envelope * cos, envelope * sin);
+            };
             for (j, wave) in self.waves(behind, spacing).iter().flatten().enumerate() {
-                let (sin, cos) = wave.phase.sin_cos();
-                values[6 * i + 2 * j] = wave.envelope * cos;
-                values[6 * i + 2 * j + 1] = wave.envelope * sin;
+                set(j, wave.phase, wave.envelope);
+                set(3 + j, 2.0 * wave.phase, wave.second);
             }
-            let (phase, envelope) = self.cusp_wave(behind, spacing);
-            let (sin, cos) = phase.sin_cos();
-            values[6 * i + 4] = envelope * cos;
-            values[6 * i + 5] = envelope * sin;
+            let Some(cusp) = self.cusp(behind, spacing) else {
+                continue;
+            };
+            set(2, cusp.phase, cusp.envelope * airy(-cusp.zeta));
+            for band in 0..BANDS {
+                let off = (cusp.zeta - band as f64) / BAND_WIDTH;
+                values[OSCILLATING + BANDS * i + band] = cusp.envelope * (-0.5 * off * off).exp();
+            }
         }
         values[WAVES - 1] = turbulent(place);
         values
@@ -294,6 +321,16 @@ impl Frame {
             cusp[1],
         ]
     }
+}
+
+/// 1/√r, bounded near the origin.
+fn far(x: f64, off: f64) -> f64 {
+    (NEAREST / x.hypot(off).max(NEAREST)).sqrt()
+}
+
+/// 1, falling to 0 from four pixels a half wave to one.
+fn resolved(k: f64, spacing: f64) -> f64 {
+    4.0 * (1.0 - k * spacing / std::f64::consts::PI).clamp(0.0, 0.25)
 }
 
 /// A band behind the stern.

@@ -21,7 +21,9 @@ use wake_text::Tokenizer;
 
 pub use conditions::Conditions;
 pub use features::{FEATURES, features};
-pub use maps::{DIRECTIONS, MapGrid, PATCH, PLACES, WAVES, WEDGE, places, wave_squares};
+pub use maps::{
+    DIRECTIONS, MapGrid, OSCILLATING, PATCH, PLACES, WAVES, WEDGE, places, wave_squares,
+};
 pub use statement::{QUANTITIES, statement};
 pub use vocabulary::Vocabulary;
 

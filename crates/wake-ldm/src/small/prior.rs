@@ -9,7 +9,7 @@ use burn::tensor::{Device, Tensor};
 use super::config::WakeModelConfig;
 use super::input::{Known, phases};
 use super::patches::PatchTransform;
-use crate::conditioning::{Conditions, DIRECTIONS, FEATURES, MapGrid, PLACES, WAVES};
+use crate::conditioning::{Conditions, DIRECTIONS, FEATURES, MapGrid, OSCILLATING, PLACES, WAVES};
 use crate::nn::conv::{conv1x1, convolve};
 
 /// Amplitude of a wave in the image \[grey\] for an output of 1.
@@ -72,7 +72,7 @@ impl Prior {
             places: conv1x1(PLACES, width, device),
             layers: (0..LAYERS).map(|_| conv1x1(width, width, device)).collect(),
             numbers: (0..=LAYERS).map(|_| linear(FEATURES, width)).collect(),
-            amplitudes: conv1x1(width, HARMONICS * (WAVES - 1) + 1, device),
+            amplitudes: conv1x1(width, HARMONICS * OSCILLATING + WAVES - OSCILLATING, device),
             mean: conv1x1(width, channels, device),
             spread: conv1x1(width, channels, device),
             grey_in: linear(FEATURES, GREY_WIDTH),
@@ -127,14 +127,15 @@ impl Prior {
         let amplitudes = convolve(&self.amplitudes, x) * WAVE_AMPLITUDE;
         let [batch, _, rows, columns] = amplitudes.dims();
         let pixels = rows * columns;
-        let oscillating = amplitudes.clone().narrow(1, 0, HARMONICS * (WAVES - 1));
-        // From bow or stern, transverse, divergent or at the cusp line, cosine or sine.
-        let oscillating: Tensor<6> = oscillating.reshape([batch, 2, 3, 2, HARMONICS, pixels]);
-        let harmonics: Tensor<6> = harmonics(places).reshape([batch, 1, 3, 1, HARMONICS, pixels]);
+        let many = HARMONICS * OSCILLATING;
+        let oscillating = amplitudes.clone().narrow(1, 0, many);
+        // From bow or stern, which wave, cosine or sine.
+        let oscillating: Tensor<6> = oscillating.reshape([batch, 2, 5, 2, HARMONICS, pixels]);
+        let harmonics: Tensor<6> = harmonics(places).reshape([batch, 1, 5, 1, HARMONICS, pixels]);
         let oscillating = (oscillating * harmonics).sum_dim(4);
-        let oscillating: Tensor<4> = oscillating.reshape([batch, WAVES - 1, rows, columns]);
-        let band = amplitudes.narrow(1, HARMONICS * (WAVES - 1), 1);
-        let amplitudes = Tensor::cat(vec![oscillating, band], 1);
+        let oscillating: Tensor<4> = oscillating.reshape([batch, OSCILLATING, rows, columns]);
+        let steady = amplitudes.narrow(1, many, WAVES - OSCILLATING);
+        let amplitudes = Tensor::cat(vec![oscillating, steady], 1);
         let [_, channels, ..] = waves.dims();
         let waves: Tensor<5> = waves.reshape([batch, WAVES, channels, rows, columns]);
         let amplitudes = amplitudes.reshape([batch, WAVES, 1, rows, columns]);
@@ -144,11 +145,12 @@ impl Prior {
     }
 }
 
-/// 1, cos α, sin α, cos 2α, sin 2α, cos 3α, sin 3α of the directions of the three waves.
+/// 1, cos α, sin α, cos 2α, sin 2α, cos 3α, sin 3α of the directions of each wave:
+/// transverse, divergent, cusp, and the second harmonics of the first two.
 ///
 /// # Shapes
 ///
-/// `[batch, PLACES, rows, columns]` to `[batch, 3 · HARMONICS, rows, columns]`
+/// `[batch, PLACES, rows, columns]` to `[batch, 5 · HARMONICS, rows, columns]`
 fn harmonics(places: Tensor<4>) -> Tensor<4> {
     let of_wave = |wave: usize| {
         let cos = places.clone().narrow(1, DIRECTIONS + 2 * wave, 1);
@@ -159,7 +161,7 @@ fn harmonics(places: Tensor<4>) -> Tensor<4> {
         let sin3 = sin2.clone() * cos.clone() + cos2.clone() * sin.clone();
         [cos.ones_like(), cos, sin, cos2, sin2, cos3, sin3]
     };
-    Tensor::cat([of_wave(0), of_wave(1), of_wave(2)].concat(), 1)
+    Tensor::cat([0, 1, 2, 0, 1].map(of_wave).concat(), 1)
 }
 
 impl Expected {
