@@ -7,7 +7,7 @@
 //!
 //! Four stages, each with its own subcommand: `autoencoder` fits the patch transform in closed form, `words` trains the
 //! reader of prompts, `mean` the mean and spread of the latents, and `diffusion` the flow that draws the rest. A stage
-//! runs the earlier ones first where their weights are not in `--out` yet. Writes there: `config.json`,
+//! runs the earlier ones first, or to their end, where their weights are not in `--out` yet. Writes there: `config.json`,
 //! `patches.safetensors`, `reader.safetensors`, `prior.safetensors`, `flow.safetensors` (averaged weights, 16 bits),
 //! `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and `checkpoints/`. A run that was killed goes on
 //! from its last checkpoint with `--resume`.

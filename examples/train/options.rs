@@ -21,10 +21,10 @@ pub(crate) struct Options {
     /// Go on from the newest checkpoint in --out
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Steps of the whole stage [default: words 4000, mean 6000, diffusion 20000]
+    /// Steps of the whole stage [default: words 4000, mean 10000, diffusion 20000]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
-    /// Examples of a batch [default: words 128, mean 128, diffusion 16]
+    /// Examples of a batch [default: words 128, mean 32, diffusion 8]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) batch: Option<u16>,
     /// Parts of a batch that are computed one after the other, to save memory
@@ -51,13 +51,19 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The same for a stage that runs because a later one needs it.
-    pub(crate) fn before(&self) -> Self {
+    /// The same for a stage that runs because a later one needs it, and that may have been killed half-way.
+    pub(crate) fn before(&self, stage: &str) -> Self {
         Self {
             steps: None,
             batch: None,
+            resume: self.checkpoints(stage).is_dir(),
             ..self.clone()
         }
+    }
+
+    /// Where the checkpoints of a stage lie.
+    pub(crate) fn checkpoints(&self, stage: &str) -> PathBuf {
+        self.out.join("checkpoints").join(stage)
     }
 
     /// Steps of a stage.

@@ -41,7 +41,9 @@ const PROMPT_RANGES: [&str; 4] = [
 ];
 
 pub(crate) fn autoencoder(options: &Options) -> Outcome<()> {
-    let (config, source) = (config(options)?, Source::new(options)?);
+    let source = Source::new(options)?;
+    options.devices()?;
+    let config = config(options)?;
     let shares = fit(options, &source, &config)?;
     for channels in [4, 8, 16] {
         println!(
@@ -54,6 +56,7 @@ pub(crate) fn autoencoder(options: &Options) -> Outcome<()> {
 }
 
 pub(crate) fn words(options: &Options) -> Outcome<()> {
+    let stage = Stage::new("words", options)?;
     let config = config(options)?;
     let recipe = Recipe::default().with_assignments(&PROMPT_RANGES)?;
     let prompts = Prompts::new(Simulated::new(recipe, options.seed)?);
@@ -67,31 +70,24 @@ pub(crate) fn words(options: &Options) -> Outcome<()> {
         vocabulary: &vocabulary,
     };
     let file = options.out.join("reader.safetensors");
-    train(
-        "words",
-        options,
-        &mut run,
-        steps,
-        &task,
-        |run: &Run<Reader>| {
-            Ok(save_as(
-                &run.averaged(),
-                Layout::Diffusers,
-                &file,
-                Precision::F16,
-            )?)
-        },
-    )
+    stage.train(&mut run, steps, &task, |_: &Run<Reader>| Ok(()))?;
+    Ok(save_as(
+        &run.averaged(),
+        Layout::Diffusers,
+        &file,
+        Precision::F16,
+    )?)
 }
 
 pub(crate) fn mean(options: &Options) -> Outcome<()> {
-    let (config, source) = (config(options)?, Source::new(options)?);
+    let (stage, source) = (Stage::new("mean", options)?, Source::new(options)?);
+    let config = config(options)?;
     let patches = patches(options, &source, &config)?;
     let set = latents(&source, &patches, &config)?;
-    let steps = options.steps(6000);
+    let steps = options.steps(10_000);
     let devices = options.learning_devices()?;
     let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
-    let mut run = Run::new("mean", &config, init, options.run(steps, 128), devices)?;
+    let mut run = Run::new("mean", &config, init, options.run(steps, 32), devices)?;
     let task = PriorTask {
         set: &set,
         patches: &patches,
@@ -99,35 +95,29 @@ pub(crate) fn mean(options: &Options) -> Outcome<()> {
         seed: options.seed,
     };
     let examples = sheet_examples(&source)?;
-    train(
-        "mean",
-        options,
-        &mut run,
-        steps,
-        &task,
-        |run: &Run<Prior>| {
-            let prior = run.averaged();
-            save_as(
-                &prior,
-                Layout::Diffusers,
-                &options.out.join("prior.safetensors"),
-                Precision::F16,
-            )?;
-            let means = expected_images(&prior, &patches, &config, &examples);
-            sheet(&examples, &means, &options.out.join("sheet.png"))
-        },
-    )
+    stage.train(&mut run, steps, &task, |run: &Run<Prior>| {
+        let means = expected_images(&run.averaged(), &patches, &config, &examples);
+        sheet(&examples, &means, &options.out.join("sheet.png"))
+    })?;
+    let file = options.out.join("prior.safetensors");
+    Ok(save_as(
+        &run.averaged(),
+        Layout::Diffusers,
+        &file,
+        Precision::F16,
+    )?)
 }
 
 pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
+    let (stage, source) = (Stage::new("diffusion", options)?, Source::new(options)?);
     let missing = |name: &str| !options.out.join(name).exists();
     if missing("reader.safetensors") {
-        words(&options.before())?;
+        words(&options.before("words"))?;
     }
     if missing("prior.safetensors") {
-        mean(&options.before())?;
+        mean(&options.before("mean"))?;
     }
-    let (config, source) = (config(options)?, Source::new(options)?);
+    let config = config(options)?;
     let device = options.devices()?.remove(0);
     let model = WakeModel {
         patches: patches(options, &source, &config)?,
@@ -144,79 +134,95 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
     let steps = options.steps(20_000);
     let devices = options.learning_devices()?;
     let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
-    let mut run = Run::new("diffusion", &config, init, options.run(steps, 16), devices)?;
+    let mut run = Run::new("diffusion", &config, init, options.run(steps, 8), devices)?;
     let task = FlowTask {
         set: &set,
         grid: grid(&config),
         seed: options.seed,
     };
     let examples = sheet_examples(&source)?;
-    train(
-        "diffusion",
-        options,
-        &mut run,
-        steps,
-        &task,
-        |run: &Run<Flow>| {
-            let flow = run.averaged();
-            save_as(
-                &flow,
-                Layout::Diffusers,
-                &options.out.join("flow.safetensors"),
-                Precision::F16,
-            )?;
-            let sampler = WakeSampler::new(
-                WakeModel {
-                    flow,
-                    ..model.clone()
-                },
-                config.clone(),
-            )?;
-            let prompts: Vec<&str> = examples.iter().map(|pair| pair.prompt.as_str()).collect();
-            let drawn = sampler.sample_many(&prompts, 0)?;
-            let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
-            sheet(&examples, &drawn, &options.out.join("sheet.png"))
-        },
-    )
+    stage.train(&mut run, steps, &task, |run: &Run<Flow>| {
+        let flow = run.averaged();
+        save_as(
+            &flow,
+            Layout::Diffusers,
+            &options.out.join("flow.safetensors"),
+            Precision::F16,
+        )?;
+        let sampler = WakeSampler::new(
+            WakeModel {
+                flow,
+                ..model.clone()
+            },
+            config.clone(),
+        )?;
+        let prompts: Vec<&str> = examples.iter().map(|pair| pair.prompt.as_str()).collect();
+        let drawn = sampler.sample_many(&prompts, 0)?;
+        let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
+        sheet(&examples, &drawn, &options.out.join("sheet.png"))
+    })
 }
 
-/// The loop of a stage; `save` is called after every checkpoint.
-fn train<M: Module>(
-    stage: &'static str,
-    options: &Options,
-    run: &mut Run<M>,
-    steps: usize,
-    task: &impl Task<M>,
-    save: impl Fn(&Run<M>) -> Outcome<()>,
-) -> Outcome<()> {
-    let folder = options.out.join("checkpoints").join(stage);
-    if options.resume
-        && let Some(checkpoint) = Checkpoint::newest(&folder)?
-    {
-        run.resume(checkpoint)?;
+/// One run with its checkpoints and its log.
+struct Stage<'a> {
+    name: &'static str,
+    options: &'a Options,
+    checkpoint: Option<Checkpoint>,
+}
+
+impl<'a> Stage<'a> {
+    /// Reads the newest checkpoint where the run is to go on; nothing is written yet.
+    fn new(name: &'static str, options: &'a Options) -> Outcome<Self> {
+        options.devices()?;
+        let folder = options.checkpoints(name);
+        let checkpoint = match options.resume {
+            true => Some(Checkpoint::newest(&folder)?.ok_or_else(|| {
+                format!(
+                    "--resume: there is no checkpoint in {}; begin without it",
+                    folder.display()
+                )
+            })?),
+            false => None,
+        };
+        Ok(Self {
+            name,
+            options,
+            checkpoint,
+        })
     }
-    let mut metrics = Metrics::open(&options.out.join(format!("{stage}.jsonl")), run.steps())?;
-    let bar = progress::bar(steps as u64, stage);
-    while run.steps() < steps {
-        let (report, terms) = run.step(task);
-        let terms: Map<String, Value> = terms
-            .into_iter()
-            .map(|(name, value)| (name.to_owned(), json!(value)))
-            .collect();
-        metrics.write(run.steps(), steps, report, &Value::Object(terms))?;
-        bar.set_message(format!("{stage}, loss {:.4}", report.loss));
-        bar.set_position(run.steps() as u64);
-        if run.steps().is_multiple_of(options.every as usize) || run.steps() == steps {
-            run.checkpoint(&folder)?;
-            save(run)?;
+
+    /// Makes all steps; `show` is called after every checkpoint.
+    fn train<M: Module>(
+        self,
+        run: &mut Run<M>,
+        steps: usize,
+        task: &impl Task<M>,
+        show: impl Fn(&Run<M>) -> Outcome<()>,
+    ) -> Outcome<()> {
+        let (stage, out) = (self.name, &self.options.out);
+        if let Some(checkpoint) = self.checkpoint {
+            run.resume(checkpoint)?;
         }
+        let mut metrics = Metrics::open(&out.join(format!("{stage}.jsonl")), run.steps())?;
+        let bar = progress::bar(steps as u64, stage);
+        while run.steps() < steps {
+            let (report, terms) = run.step(task);
+            let terms: Map<String, Value> = terms
+                .into_iter()
+                .map(|(name, value)| (name.to_owned(), json!(value)))
+                .collect();
+            metrics.write(run.steps(), steps, report, &Value::Object(terms))?;
+            bar.set_message(format!("{stage}, loss {:.4}", report.loss));
+            bar.set_position(run.steps() as u64);
+            if run.steps().is_multiple_of(self.options.every as usize) || run.steps() == steps {
+                run.checkpoint(&self.options.checkpoints(stage))?;
+                show(run)?;
+            }
+        }
+        bar.finish_and_clear();
+        println!("{stage}: {steps} steps, results in {}", out.display());
+        Ok(())
     }
-    bar.finish_and_clear();
-    println!(
-        "{stage}: {steps} steps, results in {}",
-        options.out.display()
-    );
-    Ok(())
 }
 
 /// Fits the patch transform and writes it with what it keeps.

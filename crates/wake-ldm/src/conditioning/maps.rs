@@ -86,25 +86,25 @@ struct Cusp {
 ///
 /// # Shapes
 ///
-/// `[WAVES, PATCH², cells]`
+/// `[cells, WAVES, PATCH²]`
 ///
 /// # References
 ///
 /// Kelvin (1887); Lighthill (1978), "Waves in Fluids", section 3.10; Ursell (1960), "On Kelvin's Ship-Wave Pattern",
 /// section 4 (cusp line).
 pub fn wave_squares(conditions: &Conditions, grid: MapGrid, cells: &[usize]) -> Vec<f32> {
-    let (pixels, count) = (PATCH * PATCH, cells.len());
-    let mut maps = vec![0.0; WAVES * pixels * count];
+    const PIXELS: usize = PATCH * PATCH;
+    let mut maps = vec![0.0; cells.len() * WAVES * PIXELS];
     let Some(frame) = Frame::of(conditions) else {
         return maps;
     };
-    for (n, &cell) in cells.iter().enumerate() {
-        for pixel in 0..pixels {
-            let [row, column] = grid.corner(cell);
+    for (&cell, maps) in cells.iter().zip(maps.chunks_mut(WAVES * PIXELS)) {
+        let [row, column] = grid.corner(cell);
+        for pixel in 0..PIXELS {
             let place = grid.place(row + pixel / PATCH, column + pixel % PATCH, 0.0);
             let values = frame.phases(frame.seen_from_ship(place), grid.spacing);
             for (map, value) in values.into_iter().enumerate() {
-                maps[(map * pixels + pixel) * count + n] = value as f32;
+                maps[map * PIXELS + pixel] = value as f32;
             }
         }
     }

@@ -50,7 +50,7 @@ fn images(conditions: &Conditions) -> Vec<f32> {
         let (row, column) = (p / GRID.size, p % GRID.size);
         let cell = row / PATCH * coarse + column / PATCH;
         let pixel = row % PATCH * PATCH + column % PATCH;
-        squares[(map * pixels + pixel) * cells.len() + cell]
+        squares[(cell * WAVES + map) * pixels + pixel]
     };
     (0..WAVES * GRID.size * GRID.size).map(at).collect()
 }

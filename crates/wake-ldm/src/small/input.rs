@@ -1,10 +1,15 @@
 //! Batches of conditions as tensors.
 
+use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 
+use super::patches::PatchTransform;
 use crate::conditioning::{
     Conditions, FEATURES, MapGrid, PATCH, PLACES, WAVES, features, places, wave_squares,
 };
+
+/// Latent pixels whose phases one thread computes at a time.
+const CELLS_AT_ONCE: usize = 128;
 
 /// Numbers of a batch, and where its latent pixels lie.
 #[derive(Debug, Clone)]
@@ -45,24 +50,36 @@ impl Known {
     }
 }
 
-/// Phases of the wakes of some scenes at some of their latent pixels; made on all cores.
+/// Phases of the wakes of some scenes at some of their latent pixels, encoded as an image would be; made on all cores.
 ///
 /// - `cells`, `shape`: as in [`Known::of_cells`]
 ///
 /// # Shapes
 ///
-/// `[batch · WAVES, 64, rows, columns]`
-pub fn phases(
+/// `[batch, WAVES · channels, rows, columns]`, on the device of `patches`
+pub fn encoded_phases(
     conditions: &[Conditions],
     grid: MapGrid,
     cells: &[Vec<usize>],
     [rows, columns]: [usize; 2],
-    device: &Device,
+    patches: &PatchTransform,
 ) -> Tensor<4> {
-    let scenes: Vec<_> = conditions.iter().zip(cells).collect();
-    let squares = in_parallel(&scenes, |(c, cells)| wave_squares(c, grid, cells)).concat();
-    let shape = [conditions.len() * WAVES, PATCH * PATCH, rows, columns];
-    Tensor::from_data(TensorData::new(squares, shape), device)
+    let parts: Vec<(&Conditions, &[usize])> = conditions
+        .iter()
+        .zip(cells)
+        .flat_map(|(c, cells)| cells.chunks(CELLS_AT_ONCE).map(move |part| (c, part)))
+        .collect();
+    let squares = in_parallel(&parts, |(c, cells)| wave_squares(c, grid, cells)).concat();
+    let (batch, pixels) = (conditions.len(), PATCH * PATCH);
+    let shape = [squares.len() / pixels, pixels];
+    let device = patches.devices().into_iter().next().unwrap_or_default();
+    let squares = Tensor::from_data(TensorData::new(squares, shape), &device);
+    let latents: Tensor<2> = patches.encode_rows(squares);
+    let [_, channels] = latents.dims();
+    latents
+        .reshape([batch, rows * columns, WAVES * channels])
+        .swap_dims(1, 2)
+        .reshape([batch, WAVES * channels, rows, columns])
 }
 
 /// A function of every item, on as many threads as there are cores.

@@ -10,7 +10,9 @@ mod reader;
 
 pub use config::WakeModelConfig;
 pub use flow::{Flow, Told};
-pub use input::{Known, phases};
+#[cfg(feature = "train")]
+pub(crate) use input::in_parallel;
+pub use input::{Known, encoded_phases};
 pub use model::WakeModel;
 pub use patches::{PatchTransform, Shares};
 pub use prior::{Expected, Prior};

@@ -102,16 +102,12 @@ impl PatchTransform {
         let [batch, _, rows, columns] = images.dims();
         let mean = images.clone().reshape([batch, rows * columns]).mean_dim(1);
         let squares = space_to_depth(images - mean.clone().reshape([batch, 1, 1, 1]), PATCH);
-        (self.encode_squares(squares), mean)
+        (mix(self.encoder.val(), squares), mean)
     }
 
-    /// Encodes squares of pixels of grey whose mean is 0.
-    ///
-    /// # Shapes
-    ///
-    /// `[batch, 64, rows, columns]` to `[batch, channels, rows, columns]`
-    pub fn encode_squares(&self, squares: Tensor<4>) -> Tensor<4> {
-        mix(self.encoder.val(), squares)
+    /// Encodes squares of pixels, each a row of a matrix, `[squares, 64]` to `[squares, channels]`.
+    pub fn encode_rows(&self, squares: Tensor<2>) -> Tensor<2> {
+        squares.matmul(self.encoder.val().transpose())
     }
 
     /// Decodes latents to grey; values may lie a little beyond 0…1.

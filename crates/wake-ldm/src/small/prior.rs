@@ -7,7 +7,7 @@ use burn::tensor::activation::silu;
 use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
-use super::input::{Known, phases};
+use super::input::{Known, encoded_phases};
 use super::patches::PatchTransform;
 use crate::conditioning::{Conditions, DIRECTIONS, FEATURES, MapGrid, OSCILLATING, PLACES, WAVES};
 use crate::nn::conv::{conv1x1, convolve};
@@ -93,16 +93,15 @@ impl Prior {
     ) -> Expected {
         let [_, _, rows, columns] = known.places.dims();
         let cells = vec![grid.cells(); conditions.len()];
-        let device = known.places.device();
-        let phases = phases(conditions, grid, &cells, [rows, columns], &device);
-        self.forward(known, patches.encode_squares(phases))
+        let waves = encoded_phases(conditions, grid, &cells, [rows, columns], patches);
+        self.forward(known, waves)
     }
 
     /// Mean, spread and brightness at the latent pixels of `known`.
     ///
     /// # Shapes
     ///
-    /// `waves`: encoded phases, `[batch · WAVES, channels, rows, columns]`; result: see [`Expected`].
+    /// `waves`: encoded phases, `[batch, WAVES · channels, rows, columns]`; result: see [`Expected`].
     pub fn forward(&self, known: &Known, waves: Tensor<4>) -> Expected {
         let told = |layer: &Linear| {
             let told = layer.forward(known.numbers.clone());
@@ -136,7 +135,7 @@ impl Prior {
         let oscillating: Tensor<4> = oscillating.reshape([batch, OSCILLATING, rows, columns]);
         let steady = amplitudes.narrow(1, many, WAVES - OSCILLATING);
         let amplitudes = Tensor::cat(vec![oscillating, steady], 1);
-        let [_, channels, ..] = waves.dims();
+        let channels = waves.dims()[1] / WAVES;
         let waves: Tensor<5> = waves.reshape([batch, WAVES, channels, rows, columns]);
         let amplitudes = amplitudes.reshape([batch, WAVES, 1, rows, columns]);
         (waves * amplitudes)

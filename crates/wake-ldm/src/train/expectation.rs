@@ -9,7 +9,7 @@ use super::order::examples;
 use super::run::{Task, Terms, number};
 use crate::conditioning::{Conditions, MapGrid, WEDGE, places};
 use crate::noise::NoiseSource;
-use crate::small::{Known, PatchTransform, Prior, phases};
+use crate::small::{Known, PatchTransform, Prior, encoded_phases};
 
 /// Stream that latent pixels are drawn from.
 const CELL_STREAM: u32 = 2001;
@@ -19,11 +19,12 @@ const CELLS: usize = 64;
 /// Learning mean and spread by the likelihood of the latents, and the mean grey by its squared error.
 ///
 /// ```text
-/// loss = mean[⌊s⌋ (½ ((z − μ)/s)² + ln s)] + ½ (10 (grey − found))²
+/// loss = mean[½ (z − μ)²/⌊s⌋] + mean[½ ((z − ⌊μ⌋)/s)² + ln s] + ½ (10 (grey − found))²
 /// ```
 ///
-/// Many scenes, few pixels of each: the network sees one latent pixel at a time. ⌊s⌋ counts as a constant. Without it a wake not yet learnt would first be taken for a rough sea, and hardly be
-/// learnt any more.
+/// ⌊ ⌋ counts as a constant. With the likelihood alone, ½ ((z − μ)/s)² in the first mean, a wake not yet learnt would be
+/// taken for a rough sea, and hardly be learnt any more. Many scenes, few pixels of each: the network sees one latent
+/// pixel at a time.
 ///
 /// # References
 ///
@@ -76,9 +77,8 @@ impl Task<Prior> for PriorTask<'_> {
             .map(|(conditions, position)| self.cells(conditions, position))
             .collect();
         let shape = [CELLS, 1];
-        let inner = device.clone().inner();
-        let phases = phases(&conditions, self.grid, &cells, shape, &inner);
-        let waves = Tensor::from_inner(self.patches.encode_squares(phases));
+        let waves = encoded_phases(&conditions, self.grid, &cells, shape, self.patches);
+        let waves = Tensor::from_inner(waves.to_device(&device.clone().inner()));
         let known = Known::of_cells(&conditions, self.grid, &cells, shape, device);
         let expected = model.forward(&known, waves);
         let latents: Vec<f32> = indices
@@ -88,20 +88,22 @@ impl Task<Prior> for PriorTask<'_> {
             .collect();
         let shape = [indices.len(), self.set.shape()[0], CELLS, 1];
         let latents: Tensor<4> = Tensor::from_data(TensorData::new(latents, shape), device);
-        let error = (latents.clone() - expected.mean.clone()).square().mean();
-        let surprise = expected.residual(latents).square() * 0.5 + expected.log_spread.clone();
-        let weight = expected.log_spread.clone().detach().exp();
-        let likelihood = (surprise.clone() * weight).mean();
-        let surprise = surprise.mean();
+        let off = latents - expected.mean;
+        let error = number(&off.clone().square().mean());
+        let log_spread = expected.log_spread;
+        let spread = log_spread.clone().detach().exp();
+        let steady = (off.clone().square() / spread).mean() * 0.5;
+        let scaled = off.detach() * log_spread.clone().neg().exp();
+        let surprise = (scaled.square() * 0.5 + log_spread).mean();
         let greys: Vec<f32> = indices.iter().map(|&i| self.set.example(i).grey).collect();
         let count = greys.len();
         let greys: Tensor<2> = Tensor::from_data(TensorData::new(greys, [count, 1]), device);
         let grey = (expected.grey - greys).square().mean();
         let terms = vec![
             ("surprise", number(&surprise)),
-            ("error", number(&error)),
+            ("error", error),
             ("grey", number(&grey)),
         ];
-        (likelihood + grey * 50.0, terms)
+        (steady + surprise + grey * 50.0, terms)
     }
 }

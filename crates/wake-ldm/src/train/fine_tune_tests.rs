@@ -75,7 +75,8 @@ fn falls(mut run: FineTune, steps: usize) {
         })
         .collect();
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-    let (early, late) = (mean(&losses[..5]), mean(&losses[steps - 5..]));
+    // Each step draws its own noise levels; twenty of them are alike enough.
+    let (early, late) = (mean(&losses[..20]), mean(&losses[steps - 20..]));
     assert!(late < 0.9 * early, "{early} {late}");
 }
 
@@ -91,7 +92,7 @@ fn noise_and_velocity_are_learnt() {
                 options,
                 &device.clone().autodiff(),
             ),
-            30,
+            120,
         );
     }
 }

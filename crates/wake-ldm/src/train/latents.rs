@@ -7,10 +7,10 @@ use half::f16;
 use crate::conditioning::{Conditions, MapGrid};
 use crate::dataset::Pair;
 use crate::error::{Error, Result};
-use crate::small::{Known, PatchTransform, Prior};
+use crate::small::{Known, PatchTransform, Prior, in_parallel};
 
 /// Examples whose residuals are computed at once.
-const RESIDUALS: usize = 16;
+const RESIDUALS: usize = 8;
 
 /// One example beside its latents.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,32 +85,50 @@ impl LatentSet {
         Ok(())
     }
 
-    /// The residuals of the latents about the mean and spread that a prior expects.
+    /// The residuals of the latents about the mean and spread that a prior expects; computed on all cores.
     ///
     /// - `patches`: what the latents were encoded with
-    /// - `done`: called with the number of examples after each batch
+    /// - `done`: called with a number of examples when they are done, from several threads
     pub fn residuals(
         self,
         prior: &Prior,
         patches: &PatchTransform,
         grid: MapGrid,
-        mut done: impl FnMut(usize),
+        done: impl Fn(usize) + Sync,
     ) -> Self {
-        let device = patches.devices().into_iter().next().unwrap_or_default();
-        let mut latents = Vec::with_capacity(self.latents.len());
         let all: Vec<usize> = (0..self.len()).collect();
-        for indices in all.chunks(RESIDUALS) {
-            let conditions: Vec<Conditions> = indices
-                .iter()
-                .map(|&i| self.examples[i].conditions)
-                .collect();
-            let known = Known::new(&conditions, grid, &device);
-            let expected = prior.expect(&conditions, &known, patches, grid);
-            let residual = expected.residual(self.latents(indices, &device));
-            latents.extend(residual.into_data().iter::<f32>().map(f16::from_f32));
+        let chunks: Vec<&[usize]> = all.chunks(RESIDUALS).collect();
+        let residuals = in_parallel(&chunks, |indices| {
+            let residuals = self.residual(indices, prior, patches, grid);
             done(indices.len());
+            residuals
+        });
+        Self {
+            latents: residuals.concat(),
+            ..self
         }
-        Self { latents, ..self }
+    }
+
+    fn residual(
+        &self,
+        indices: &[usize],
+        prior: &Prior,
+        patches: &PatchTransform,
+        grid: MapGrid,
+    ) -> Vec<f16> {
+        let device = patches.devices().into_iter().next().unwrap_or_default();
+        let conditions: Vec<Conditions> = indices
+            .iter()
+            .map(|&i| self.examples[i].conditions)
+            .collect();
+        let known = Known::new(&conditions, grid, &device);
+        let expected = prior.expect(&conditions, &known, patches, grid);
+        let residual = expected.residual(self.latents(indices, &device));
+        residual
+            .into_data()
+            .iter::<f32>()
+            .map(f16::from_f32)
+            .collect()
     }
 
     /// Number of examples.

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -175,9 +176,10 @@ fn early_and_late(losses: &[f64]) -> [f64; 2] {
 
 #[test]
 fn the_loss_of_the_flow_falls() {
-    let losses = advance(&mut run(1, 1), &set().0, 30);
-    let [early, late] = early_and_late(&losses);
-    assert!(late < 0.8 * early, "{early} {late}");
+    let losses = advance(&mut run(1, 1), &set().0, 150);
+    let [_, late] = early_and_late(&losses);
+    // Noise less latents has variance 2; the mean of five losses, 1,280 squares, is known to 0.08.
+    assert!(late < 1.6, "{late}");
 }
 
 #[test]
@@ -199,14 +201,17 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
         grid: grid(),
         seed: 5,
     };
-    let steps: Vec<(StepReport, Terms)> = (0..150).map(|_| run.step(&task)).collect();
-    let [early, late] = early_and_late(&steps.iter().map(|(r, _)| r.loss).collect::<Vec<_>>());
-    // Latents have variance 1; what is expected without knowing anything has a surprise of ½.
-    assert!(late < early && late < 0.45, "{early} {late}");
+    let steps: Vec<(StepReport, Terms)> = (0..300).map(|_| run.step(&task)).collect();
+    let losses: Vec<f64> = steps.iter().map(|(report, _)| report.loss).collect();
+    let [_, late] = early_and_late(&losses);
+    // Latents have variance 1: both terms of the loss are ½ where nothing is known but that.
+    assert!(late < 0.9, "{late}");
     let count = set.len();
-    let mut done = 0;
-    let residuals = set.residuals(&run.averaged(), &patches, grid(), |n| done += n);
-    assert_eq!(done, count);
+    let done = AtomicUsize::new(0);
+    let residuals = set.residuals(&run.averaged(), &patches, grid(), |n| {
+        done.fetch_add(n, Relaxed);
+    });
+    assert_eq!(done.into_inner(), count);
     let all: Vec<usize> = (0..count).collect();
     let squares = residuals.latents(&all, &Device::flex()).square().mean();
     let variance = squares.into_scalar::<f32>();
