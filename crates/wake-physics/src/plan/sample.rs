@@ -60,7 +60,8 @@ pub(crate) fn wake(
             let (before, after) = (n.saturating_sub(1), (n + 1).min(count - 1));
             let spacing = (across(after) - across(before)).abs() / (after - before) as f64;
             let square = nodes.amplitude[n].norm_sqr();
-            let variance = if square > 0.0 {
+            // Wavenumbers that underflow, as far astern in shallow water, coincide at 0 and carry nothing.
+            let variance = if square > 0.0 && spacing > 0.0 {
                 PI * square / spacing * track_length / area
             } else {
                 0.0
