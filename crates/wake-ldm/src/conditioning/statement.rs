@@ -70,11 +70,22 @@ impl Conditions {
         }
     }
 
-    /// These conditions, and those of `other` where they leave a quantity open.
+    /// These conditions, and those of `other` where they leave a quantity open; without a ship there are no values of
+    /// one.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
+        let ship = self.ship.or(other.ship);
+        let other = match ship {
+            Some(false) => Self {
+                ship_speed: None,
+                ship_heading: None,
+                ship_position: None,
+                ..other
+            },
+            _ => other,
+        };
         Self {
-            ship: self.ship.or(other.ship),
+            ship,
             ship_speed: self.ship_speed.or(other.ship_speed),
             ship_heading: self.ship_heading.or(other.ship_heading),
             ship_position: self.ship_position.or(other.ship_position),
@@ -135,5 +146,15 @@ mod tests {
         let both = some.or(full());
         assert_eq!(both.wind_speed, Some(7.0));
         assert_eq!(both.incidence, full().incidence);
+        let open_sea = Conditions {
+            ship: Some(false),
+            ..Conditions::default()
+        };
+        let sea = open_sea.or(full());
+        assert_eq!((sea.ship, sea.wind_toward), (Some(false), Some(90.0)));
+        assert_eq!(
+            (sea.ship_speed, sea.ship_heading, sea.ship_position),
+            (None, None, None)
+        );
     }
 }
