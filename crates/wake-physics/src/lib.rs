@@ -69,5 +69,7 @@ pub use error::{Error, Result};
 pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
-pub use simulate::{Method, Seconds, Simulation, labels_of, simulate, simulate_with};
+pub use simulate::{
+    Method, Seconds, Simulation, expected_intensity, labels_of, simulate, simulate_with,
+};
 pub use track::Track;

@@ -45,6 +45,8 @@ pub(crate) struct Setup {
     pub(crate) wake: Option<KelvinWake>,
     /// Standard deviation of the line-of-sight velocity of unresolved waves [m/s].
     pub(crate) unresolved_velocity: f64,
+    /// Slopes of resolved waves that are averaged over nevertheless.
+    averaged_slopes: SlopeCovariance,
 }
 
 impl Setup {
@@ -90,8 +92,18 @@ impl Setup {
                 .as_ref()
                 .map(|ship| wake(ship, scene.sea.depth, scene.sea.time)),
             unresolved_velocity: unresolved.radial_velocity.sqrt(),
+            averaged_slopes: SlopeCovariance::NONE,
             image,
         }
+    }
+
+    /// Averages over resolved waves too, as if a pixel held them.
+    ///
+    /// - `slopes`: their covariance
+    /// - `velocity`: standard deviation of their line-of-sight velocity [m/s]
+    pub(crate) fn average_over(&mut self, slopes: &SlopeCovariance, velocity: f64) {
+        self.averaged_slopes = self.averaged_slopes.plus(slopes);
+        self.unresolved_velocity = self.unresolved_velocity.hypot(velocity);
     }
 
     /// σ⁰ of facets, with or without the average over unresolved slopes and the specular return.
@@ -113,9 +125,10 @@ impl Setup {
         }
     }
 
-    /// Slopes of the waves between the pixel's and the radar's split wavenumber.
+    /// Slopes of the waves between the pixel's and the radar's split wavenumber, and of those that are averaged over.
     pub(crate) fn unresolved_slopes(&self) -> SlopeCovariance {
-        self.two_scale.slopes_from(self.image.nyquist_wavenumber())
+        let short = self.two_scale.slopes_from(self.image.nyquist_wavenumber());
+        short.plus(&self.averaged_slopes)
     }
 
     /// Whether the wind raises no waves that scatter.

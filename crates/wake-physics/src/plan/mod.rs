@@ -16,7 +16,7 @@ use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::setup::Setup;
 use serde::Serialize;
-use situation::Situation;
+pub(crate) use situation::Situation;
 
 /// Fields of four bytes a pixel that are alive at once, at most; the target of the design.
 const FIELDS_IN_MEMORY: u64 = 40;
@@ -61,6 +61,13 @@ impl Plan {
         self.terms.iter().any(|t| t.term == term && t.used)
     }
 
+    /// Computes these terms, and not those.
+    pub(crate) fn change(&mut self, with: &[Term], without: &[Term]) {
+        for t in &mut self.terms {
+            t.used = (t.used || with.contains(&t.term)) && !without.contains(&t.term);
+        }
+    }
+
     /// Sum of the bounds of the terms left out of the image before speckle.
     #[must_use]
     pub fn bound(&self) -> f64 {
@@ -79,7 +86,14 @@ impl Plan {
     }
 
     pub(crate) fn of(scene: &Scene, setup: &Setup) -> Result<Self> {
-        let situation = Situation::new(scene, setup);
+        Self::of_situation(scene, setup, &Situation::new(scene, setup))
+    }
+
+    pub(crate) fn of_situation(
+        scene: &Scene,
+        setup: &Setup,
+        situation: &Situation,
+    ) -> Result<Self> {
         let effects = situation.effects();
         let terms = choose::choose(&effects, &scene.model.terms, scene.model.tolerance);
         let margin = situation.margin(setup);

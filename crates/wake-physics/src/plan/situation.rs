@@ -1,6 +1,6 @@
 //! What is known of a scene before it is computed: its waves, its backscatter, its motion.
 
-use super::linear::{LinearImage, WaveSample};
+use super::linear::{LinearImage, WaveSample, rms};
 use super::sample;
 use crate::kelvin::KelvinWake;
 use crate::raster::Raster;
@@ -128,6 +128,12 @@ impl Situation {
         .into_iter()
         .filter_map(|(term, why)| why.map(|why| (term, why)))
         .collect()
+    }
+
+    /// Slopes of the resolved waves of the sea, and the standard deviation of their line-of-sight velocity [m/s].
+    pub(crate) fn resolved_sea(&self) -> (SlopeCovariance, f64) {
+        let radial = |w: &WaveSample| self.image.transfer.radial(w.k, w.omega);
+        (slopes(&self.sea), rms(&self.sea, radial))
     }
 
     /// What a user should know.

@@ -11,11 +11,13 @@ use crate::scene::Scene;
 use crate::setup::Setup;
 use clock::Clock;
 pub use clock::Seconds;
+pub use expected::expected_intensity;
 pub use label::labels_of;
 use serde::Serialize;
 use stages::Run;
 
 mod clock;
+mod expected;
 mod label;
 mod report;
 mod stages;
