@@ -131,7 +131,11 @@ fn imports_point_up_the_lists_of_the_architecture_page() {
 fn crates_meet_in_few_files() {
     let mut wrong = Vec::new();
     let rules: [(&str, &str, &[&str]); 2] = [
-        ("wake-ldm", "wake_physics", &["dataset", "sampler", "error"]),
+        (
+            "wake-ldm",
+            "wake_physics",
+            &["conditioning", "small", "sampler", "dataset", "error"],
+        ),
         (
             "wake-ldm",
             "wake_text",

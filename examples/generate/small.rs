@@ -44,8 +44,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         "prompt": prompt, "seed": seed, "steps": sampler.steps(), "count": count, "device": arguments.device,
         "weights": arguments.weights, "files": files,
         "seconds": {
-            "load": load, "text": seconds.text, "denoise": seconds.denoise, "decode": seconds.decode,
-            "total": total,
+            "load": load, "text": seconds.text, "expect": seconds.expect, "denoise": seconds.denoise,
+            "decode": seconds.decode, "total": total,
         },
     });
     Ok(finish(arguments, &report)?)

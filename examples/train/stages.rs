@@ -11,7 +11,8 @@ use wake_ldm::WakeSampler;
 use wake_ldm::conditioning::{Conditions, MapGrid, Vocabulary, tokens};
 use wake_ldm::dataset::{Pair, Prompts, Recipe, Simulated};
 use wake_ldm::small::{
-    Flow, Known, PatchTransform, Prior, Reader, Shares, WakeModel, WakeModelConfig,
+    Flow, Known, PatchTransform, Prior, Reader, Shares, WakeModel, WakeModelConfig, expected_grey,
+    expected_latents,
 };
 use wake_ldm::train::{
     Checkpoint, Example, FlowTask, LatentSet, Metrics, PriorTask, Run, Task, WordsTask,
@@ -71,12 +72,7 @@ pub(crate) fn words(options: &Options) -> Outcome<()> {
     };
     let file = options.out.join("reader.safetensors");
     stage.train(&mut run, steps, &task, |_: &Run<Reader>| Ok(()))?;
-    Ok(save_as(
-        &run.averaged(),
-        Layout::Diffusers,
-        &file,
-        Precision::F16,
-    )?)
+    Ok(keep(&run.averaged(), &file)?)
 }
 
 pub(crate) fn mean(options: &Options) -> Outcome<()> {
@@ -90,22 +86,16 @@ pub(crate) fn mean(options: &Options) -> Outcome<()> {
     let mut run = Run::new("mean", &config, init, options.run(steps, 32), devices)?;
     let task = PriorTask {
         set: &set,
-        patches: &patches,
         grid: grid(&config),
         seed: options.seed,
     };
     let examples = sheet_examples(&source)?;
     stage.train(&mut run, steps, &task, |run: &Run<Prior>| {
-        let means = expected_images(&run.averaged(), &patches, &config, &examples);
+        let means = expected_images(&run.averaged(), &patches, &config, &examples)?;
         sheet(&examples, &means, &options.out.join("sheet.png"))
     })?;
     let file = options.out.join("prior.safetensors");
-    Ok(save_as(
-        &run.averaged(),
-        Layout::Diffusers,
-        &file,
-        Precision::F16,
-    )?)
+    Ok(keep(&run.averaged(), &file)?)
 }
 
 pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
@@ -127,7 +117,7 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
     };
     let set = latents(&source, &model.patches, &config)?;
     let bar = progress::bar(set.len() as u64, "residuals");
-    let set = set.residuals(&model.prior, &model.patches, grid(&config), |n| {
+    let set = set.residuals(&model.prior, grid(&config), |n| {
         bar.inc(n as u64);
     });
     bar.finish_and_clear();
@@ -135,20 +125,18 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
     let devices = options.learning_devices()?;
     let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
     let mut run = Run::new("diffusion", &config, init, options.run(steps, 8), devices)?;
+    let base = config.base_scene();
     let task = FlowTask {
         set: &set,
+        patches: &model.patches,
+        base: &base,
         grid: grid(&config),
         seed: options.seed,
     };
     let examples = sheet_examples(&source)?;
     stage.train(&mut run, steps, &task, |run: &Run<Flow>| {
         let flow = run.averaged();
-        save_as(
-            &flow,
-            Layout::Diffusers,
-            &options.out.join("flow.safetensors"),
-            Precision::F16,
-        )?;
+        keep(&flow, &options.out.join("flow.safetensors"))?;
         let sampler = WakeSampler::new(
             WakeModel {
                 flow,
@@ -156,11 +144,15 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
             },
             config.clone(),
         )?;
-        let prompts: Vec<&str> = examples.iter().map(|pair| pair.prompt.as_str()).collect();
-        let drawn = sampler.sample_many(&prompts, 0)?;
+        let drawn = sampler.sample_scenes(&scenes_of(&examples, &config), 0)?;
         let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
         sheet(&examples, &drawn, &options.out.join("sheet.png"))
     })
+}
+
+/// Writes a part of the model as it ships.
+fn keep(part: &impl Module, path: &Path) -> wake_ldm::Result<()> {
+    save_as(part, Layout::Diffusers, path, Precision::F16)
 }
 
 /// One run with its checkpoints and its log.
@@ -314,7 +306,7 @@ fn grid(config: &WakeModelConfig) -> MapGrid {
     }
 }
 
-/// Encodes all pairs, which then stay in memory.
+/// Encodes all pairs and the images expected of their scenes, which then stay in memory.
 fn latents(
     source: &Source,
     patches: &PatchTransform,
@@ -323,12 +315,18 @@ fn latents(
     let bar = progress::bar(source.len(), "pairs");
     let mut set = LatentSet::default();
     let indices: Vec<u64> = (0..source.len()).collect();
+    let base = config.base_scene();
     for chunk in indices.chunks(AT_ONCE) {
-        let pairs: Vec<_> = chunk.par_iter().map(|&index| source.pair(index)).collect();
+        let read = |&index: &u64| -> wake_ldm::Result<_> {
+            let mut pair = source.pair(index)?;
+            let example = Example::of(&pair);
+            let expected = expected_grey(&example.conditions.onto(&base))?;
+            Ok((example, [std::mem::take(&mut pair.image.pixels), expected]))
+        };
+        let pairs: Vec<_> = chunk.par_iter().map(read).collect();
         for pair in pairs {
-            let mut pair = pair?;
-            let pixels = std::mem::take(&mut pair.image.pixels);
-            set.push(patches, pixels, config.image_size, Example::of(&pair))?;
+            let (example, images) = pair?;
+            set.push(patches, images, config.image_size, example)?;
             bar.inc(1);
         }
     }
@@ -340,23 +338,27 @@ fn sheet_examples(source: &Source) -> wake_ldm::Result<Vec<Pair>> {
     (0..SHEET).map(|index| source.pair(index)).collect()
 }
 
+fn scenes_of(examples: &[Pair], config: &WakeModelConfig) -> Vec<Scene> {
+    let base = config.base_scene();
+    let scene = |pair: &Pair| Example::of(pair).conditions.onto(&base);
+    examples.iter().map(scene).collect()
+}
+
 /// The mean images of some scenes.
 fn expected_images(
     prior: &Prior,
     patches: &PatchTransform,
     config: &WakeModelConfig,
     examples: &[Pair],
-) -> Vec<Vec<f32>> {
-    let conditions: Vec<Conditions> = examples.iter().map(|p| Example::of(p).conditions).collect();
-    let device = patches.devices().into_iter().next().unwrap_or_default();
-    let known = Known::new(&conditions, grid(config), &device);
-    let expected = prior.expect(&conditions, &known, patches, grid(config));
+) -> wake_ldm::Result<Vec<Vec<f32>>> {
+    let scenes = scenes_of(examples, config);
+    let conditions: Vec<Conditions> = scenes.iter().map(Conditions::of_scene).collect();
+    let wake = expected_latents(&scenes, patches)?;
+    let expected = prior.forward(&Known::new(&conditions, grid(config), wake));
     let images = patches.decode(expected.mean, expected.grey).clamp(0.0, 1.0);
     let pixels: Vec<f32> = images.into_data().iter::<f32>().collect();
-    pixels
-        .chunks(config.image_size * config.image_size)
-        .map(<[f32]>::to_vec)
-        .collect()
+    let size = config.image_size * config.image_size;
+    Ok(pixels.chunks(size).map(<[f32]>::to_vec).collect())
 }
 
 /// Simulated images above, images of the model below.

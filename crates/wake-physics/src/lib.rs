@@ -70,6 +70,6 @@ pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
 pub use simulate::{
-    Method, Seconds, Simulation, expected_intensity, labels_of, simulate, simulate_with,
+    LinearSea, Method, Seconds, Simulation, expected_intensity, labels_of, simulate, simulate_with,
 };
 pub use track::Track;

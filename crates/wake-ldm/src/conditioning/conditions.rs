@@ -1,5 +1,7 @@
 //! The numbers of a scene, as far as they are known.
 
+use wake_physics::Scene;
+use wake_physics::scene::Ship;
 use wake_text::PartialScene;
 
 /// Length of the ship that the small model knows \[m\]: the one of the paper's grid.
@@ -41,10 +43,78 @@ impl Conditions {
         }
     }
 
+    /// All numbers of a scene that the model knows.
+    pub fn of_scene(scene: &Scene) -> Self {
+        let ship = scene.ship.as_ref();
+        let windy = scene.sea.wind_speed > 0.0;
+        Self {
+            ship: Some(ship.is_some()),
+            ship_speed: ship.map(|ship| ship.speed),
+            ship_heading: ship.map(|ship| ship.heading),
+            ship_position: ship.map(|ship| ship.position),
+            wind_speed: Some(scene.sea.wind_speed),
+            wind_toward: windy.then_some(scene.sea.wind_toward),
+            fetch: windy.then_some(scene.sea.fetch),
+            incidence: Some(scene.radar.incidence),
+        }
+    }
+
+    /// A scene with these numbers in the place of its own; what is open, and all else, stays.
+    #[must_use]
+    pub fn onto(&self, scene: &Scene) -> Scene {
+        let mut scene = scene.clone();
+        match self.ship {
+            Some(false) => scene.ship = None,
+            Some(true) => scene.ship = Some(scene.ship.unwrap_or_default()),
+            None => {}
+        }
+        if let Some(Ship {
+            speed,
+            heading,
+            position,
+            ..
+        }) = &mut scene.ship
+        {
+            *speed = self.ship_speed.unwrap_or(*speed);
+            *heading = self.ship_heading.unwrap_or(*heading);
+            *position = self.ship_position.unwrap_or(*position);
+        }
+        let sea = &mut scene.sea;
+        sea.wind_speed = self.wind_speed.unwrap_or(sea.wind_speed);
+        sea.wind_toward = self.wind_toward.unwrap_or(sea.wind_toward);
+        sea.fetch = self.fetch.unwrap_or(sea.fetch);
+        scene.radar.incidence = self.incidence.unwrap_or(scene.radar.incidence);
+        scene
+    }
+
     /// Speed, heading and place of the ship, where all are known.
     pub fn track(&self) -> Option<(f64, f64, [f64; 2])> {
         let known = self.ship != Some(false);
         let (speed, heading) = self.ship_speed.zip(self.ship_heading).filter(|_| known)?;
         Some((speed, heading, self.ship_position?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conditions_of_a_scene_make_the_scene_again() {
+        let mut scene = Scene::default();
+        for with_ship in [true, false] {
+            scene.ship = scene.ship.filter(|_| with_ship);
+            scene.sea.wind_speed = 4.5;
+            let again = Conditions::of_scene(&scene).onto(&Scene::default());
+            assert_eq!(again, scene);
+        }
+        let open = Conditions::default();
+        assert_eq!(open.onto(&scene), scene);
+        let ship = Conditions {
+            ship: Some(true),
+            ship_speed: Some(7.0),
+            ..open
+        };
+        assert_eq!(ship.onto(&scene).ship.map(|ship| ship.speed), Some(7.0));
     }
 }

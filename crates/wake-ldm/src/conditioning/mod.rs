@@ -1,15 +1,15 @@
-//! What the small wake model is told about a scene: numbers, the geometry of the wake, and words.
+//! What the small wake model is told about a scene: numbers, places in the ship's frame, and words.
 //!
 //! ```text
 //! prompt ─► token ids ─► compact ids ─► reader ─► numbers
-//! numbers ─► Fourier features ──────────────────────────┐
-//! numbers ─► phases of the Kelvin wake at each pixel ───┴─► model
+//! numbers ─┬─► Fourier features ──────────────┐
+//!          ├─► places in the ship's frame ────┼─► model
+//!          └─► scene ─► image expected of it ─┘
 //! ```
 //!
 //! Whatever is not known is left out: a number that no prompt states has the flag 0 and no value, and without
 //! speed, heading and place of the ship the maps are empty.
 
-mod airy;
 mod conditions;
 mod features;
 mod maps;
@@ -21,9 +21,7 @@ use wake_text::Tokenizer;
 
 pub use conditions::Conditions;
 pub use features::{FEATURES, features};
-pub use maps::{
-    DIRECTIONS, MapGrid, OSCILLATING, PATCH, PLACES, WAVES, WEDGE, places, wave_squares,
-};
+pub use maps::{MapGrid, PATCH, PLACES, WEDGE, places};
 pub use statement::{QUANTITIES, statement};
 pub use vocabulary::Vocabulary;
 

@@ -41,7 +41,8 @@ pub fn statement(conditions: &Conditions) -> Vec<f32> {
 }
 
 impl Conditions {
-    /// The conditions of a [`statement`]; a quantity counts as stated above ½. The ship, if any, is in the middle.
+    /// The conditions of a [`statement`]; a quantity counts as stated above ½, a number beyond its range as the end of
+    /// it. The ship, if any, is in the middle.
     ///
     /// # Panics
     ///
@@ -52,18 +53,19 @@ impl Conditions {
             let [stated, a, b] = [0, 1, 2].map(|i| f64::from(statement[3 * quantity + i]));
             (stated > 0.5).then_some([a, b])
         };
-        let number =
-            |quantity: usize, range: Range| value(quantity).map(|[u, _]| range.unscaled(u));
+        let number = |quantity: usize, range: Range| {
+            value(quantity).map(|[u, _]| range.unscaled(u.clamp(-1.0, 1.0)))
+        };
         let direction = |quantity: usize| {
             value(quantity).map(|[sin, cos]| sin.atan2(cos).to_degrees().rem_euclid(360.0))
         };
-        let ship_speed = number(1, SHIP_SPEED).map(|speed| speed.max(0.0));
+        let ship_speed = number(1, SHIP_SPEED);
         Self {
             ship: value(0).map(|[ship, _]| ship > 0.0),
             ship_speed,
             ship_heading: direction(2),
             ship_position: ship_speed.and(Some([0.0, 0.0])),
-            wind_speed: number(3, WIND_SPEED).map(|speed| speed.max(0.0)),
+            wind_speed: number(3, WIND_SPEED),
             wind_toward: direction(4),
             fetch: number(5, LOG_FETCH).map(|log| 10f64.powf(log)),
             incidence: number(6, INCIDENCE),

@@ -8,8 +8,10 @@ use wake_physics::{Field, Scene, labels_of};
 /// Seconds of the stages of one call, for all images of its batch together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SampleSeconds {
-    /// Words, numbers and maps.
+    /// Words to numbers.
     pub text: f64,
+    /// Numbers to the mean and spread of the latents.
+    pub expect: f64,
     /// Steps from noise to latents.
     pub denoise: f64,
     /// Latents to grey.

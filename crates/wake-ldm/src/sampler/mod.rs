@@ -3,6 +3,7 @@
 mod image;
 mod pretrained;
 
+use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;
 
 use burn::module::Module;
@@ -14,8 +15,8 @@ use wake_text::{PartialScene, Wording};
 
 use crate::conditioning::{Conditions, MapGrid, Vocabulary};
 use crate::error::{Error, Result, check_range};
-use crate::noise::{INITIAL_STREAM, NoiseSource, normal_batch};
-use crate::small::{Expected, Known, WakeModel, WakeModelConfig};
+use crate::noise::NoiseSource;
+use crate::small::{Expected, Known, WakeModel, WakeModelConfig, expected_latents, sea_noise};
 pub use image::{SampleSeconds, WakeImage};
 
 /// Steps from noise to image, unless others are asked for.
@@ -40,7 +41,7 @@ pub enum Told {
 ///
 /// # References
 ///
-/// Lipman et al. (2023), "Flow Matching for Generative Modeling".
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants: A Unifying Framework for Flows and Diffusions".
 #[derive(Debug, Clone)]
 pub struct WakeSampler {
     model: WakeModel,
@@ -94,10 +95,7 @@ impl WakeSampler {
     /// The scene that [`sample`](Self::sample) takes what a prompt leaves open from: the default one, on the
     /// pixels of the model.
     pub fn base_scene(&self) -> Scene {
-        let mut scene = Scene::default();
-        (scene.grid.rows, scene.grid.columns) = (self.config.image_size, self.config.image_size);
-        scene.grid.spacing = self.config.spacing;
-        scene
+        self.config.base_scene()
     }
 
     /// An image of a prompt, with labels that follow from the numbers it states.
@@ -117,21 +115,19 @@ impl WakeSampler {
     /// As [`sample`](Self::sample).
     pub fn sample_many(&self, prompts: &[&str], seed: u64) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
-        let (mut inputs, mut scenes) = (Vec::new(), Vec::new());
-        for (k, prompt) in prompts.iter().enumerate() {
+        let input = |(k, prompt): (u64, &&str)| -> Result<Input> {
             let said = PartialScene::read(prompt)?;
             let mut scene = said.onto(&self.base_scene())?;
-            scene.seed = seed.wrapping_add(k as u64);
-            inputs.push((Conditions::of_prompt(&said), (*prompt).to_owned()));
-            scenes.push(scene);
-        }
-        let seeds: Vec<u64> = scenes.iter().map(|scene| scene.seed).collect();
-        let mut drawn = self.run(&inputs, &seeds, begin)?;
-        Ok(scenes
-            .iter()
-            .enumerate()
-            .map(|(k, scene)| drawn.finish(k, scene))
-            .collect())
+            scene.seed = seed.wrapping_add(k);
+            Ok(Input {
+                known: Conditions::of_prompt(&said),
+                words: (*prompt).to_owned(),
+                scene,
+            })
+        };
+        let inputs = (0..).zip(prompts).map(input);
+        let inputs: Vec<Input> = inputs.collect::<Result<_>>()?;
+        Ok(self.run(&inputs, begin)?.images(&inputs))
     }
 
     /// An image of each scene; image k has the seed `seed + k`.
@@ -140,13 +136,9 @@ impl WakeSampler {
     ///
     /// As [`sample_batch`](Self::sample_batch).
     pub fn sample_scenes(&self, scenes: &[Scene], seed: u64) -> Result<Vec<WakeImage>> {
-        let mut drawn = self.run_scenes(scenes, seed)?;
-        let images = scenes.iter().enumerate().map(|(k, scene)| {
-            let mut scene = scene.clone();
-            scene.seed = seed.wrapping_add(k as u64);
-            drawn.finish(k, &scene)
-        });
-        Ok(images.collect())
+        let begin = Instant::now();
+        let inputs = self.inputs(scenes, seed)?;
+        Ok(self.run(&inputs, begin)?.images(&inputs))
     }
 
     /// An image of each scene, in one batch on the device, without speckle, and its labels; image k has the seed
@@ -160,22 +152,21 @@ impl WakeSampler {
     ///
     /// [`Error::InvalidOption`] for a scene whose grid is not the model's, [`Error::Text`] for one that is not valid.
     pub fn sample_batch(&self, scenes: &[Scene], seed: u64) -> Result<(Tensor<4>, Vec<Labels>)> {
-        let drawn = self.run_scenes(scenes, seed)?;
+        let inputs = self.inputs(scenes, seed)?;
+        let drawn = self.run(&inputs, Instant::now())?;
         Ok((drawn.grey, scenes.iter().map(labels_of).collect()))
     }
 
-    fn run_scenes(&self, scenes: &[Scene], seed: u64) -> Result<Drawn> {
-        let begin = Instant::now();
-        let inputs = scenes.iter().map(|scene| self.input(scene));
-        let inputs: Vec<(Conditions, String)> = inputs.collect::<Result<_>>()?;
-        let seeds: Vec<u64> = (0..scenes.len() as u64)
-            .map(|k| seed.wrapping_add(k))
-            .collect();
-        self.run(&inputs, &seeds, begin)
+    fn inputs(&self, scenes: &[Scene], seed: u64) -> Result<Vec<Input>> {
+        let seeds = (0..).map(|k| seed.wrapping_add(k));
+        let inputs = scenes.iter().zip(seeds);
+        inputs
+            .map(|(scene, seed)| self.input(scene, seed))
+            .collect()
     }
 
     /// Numbers and words of a scene.
-    fn input(&self, scene: &Scene) -> Result<(Conditions, String)> {
+    fn input(&self, scene: &Scene, seed: u64) -> Result<Input> {
         let grid = &scene.grid;
         let size = self.config.image_size;
         if [grid.rows, grid.columns] != [size, size]
@@ -193,27 +184,42 @@ impl WakeSampler {
                 ),
             });
         }
-        Ok((conditions_of(scene), Wording::Paper.prompt(scene)?))
+        Ok(Input {
+            known: Conditions::of_scene(scene),
+            words: Wording::Paper.prompt(scene)?,
+            scene: Scene {
+                seed,
+                ..scene.clone()
+            },
+        })
     }
 
     /// From noise to grey, all images at once.
-    fn run(&self, inputs: &[(Conditions, String)], seeds: &[u64], begin: Instant) -> Result<Drawn> {
+    fn run(&self, inputs: &[Input], begin: Instant) -> Result<Drawn> {
         let mut seconds = SampleSeconds::default();
         let conditions = self.told(inputs);
         seconds.text = begin.elapsed().as_secs_f64();
-        let known = Known::new(&conditions, self.grid(), &self.device);
-        let expected = self.model.expect(&conditions, &known, self.grid());
-        let latents = self.denoise(&known, &expected, seeds);
+        let told = conditions.iter().zip(inputs);
+        let scenes: Vec<Scene> = told.map(|(told, input)| told.onto(&input.scene)).collect();
+        let wake = expected_latents(&scenes, &self.model.patches)?;
+        let known = Known::new(&conditions, self.grid(), wake);
+        let expected = self.model.prior.forward(&known);
+        wait_for(&expected.mean);
+        seconds.expect = begin.elapsed().as_secs_f64() - seconds.text;
+        let sources = inputs
+            .iter()
+            .map(|input| NoiseSource::new(input.scene.seed));
+        let noise = sea_noise(&scenes, &sources.collect::<Vec<_>>(), &self.model.patches)?;
+        let latents = self.denoise(&known, &expected, noise);
         wait_for(&latents);
-        seconds.denoise = begin.elapsed().as_secs_f64() - seconds.text;
+        seconds.denoise = begin.elapsed().as_secs_f64() - seconds.text - seconds.expect;
         let grey = self.model.decode(latents, &expected);
         let pixels: Vec<f32> = grey.to_data().iter::<f32>().collect();
         seconds.total = begin.elapsed().as_secs_f64();
-        seconds.decode = seconds.total - seconds.text - seconds.denoise;
+        seconds.decode = seconds.total - seconds.text - seconds.expect - seconds.denoise;
         Ok(Drawn {
             grey,
             pixels,
-            size: self.config.image_size,
             seconds,
         })
     }
@@ -226,52 +232,34 @@ impl WakeSampler {
     }
 
     /// The numbers that images are drawn from; what is told of none is that of the base scene.
-    fn told(&self, inputs: &[(Conditions, String)]) -> Vec<Conditions> {
-        let base = conditions_of(&self.base_scene());
+    fn told(&self, inputs: &[Input]) -> Vec<Conditions> {
+        let base = Conditions::of_scene(&self.base_scene());
         if self.told == Told::Numbers {
-            return inputs.iter().map(|(known, _)| known.or(base)).collect();
+            return inputs.iter().map(|input| input.known.or(base)).collect();
         }
-        let prompts: Vec<&str> = inputs.iter().map(|(_, text)| text.as_str()).collect();
+        let prompts: Vec<&str> = inputs.iter().map(|input| input.words.as_str()).collect();
         let read = self.model.read(&prompts, &self.vocabulary, &self.device);
         let pairs = inputs.iter().zip(read);
         pairs
-            .map(|((known, _), read)| match self.told {
+            .map(|(input, read)| match self.told {
                 Told::Words => read.or(base),
-                _ => known.or(read).or(base),
+                _ => input.known.or(read).or(base),
             })
             .collect()
     }
 
-    /// Euler's steps along the flow, equal in σ, from noise to latents.
-    fn denoise(&self, known: &Known, expected: &Expected, seeds: &[u64]) -> Tensor<4> {
-        let size = self.config.latent_size();
-        let sources: Vec<NoiseSource> = seeds.iter().map(|&seed| NoiseSource::new(seed)).collect();
-        let shape = [self.config.latent_channels, size, size];
-        let mut x = normal_batch(&sources, INITIAL_STREAM, shape, &self.device);
-        let told = self.model.flow.told(known);
+    /// Euler's steps along the flow, equal in the angle, from noise to latents.
+    fn denoise(&self, known: &Known, expected: &Expected, noise: Tensor<4>) -> Tensor<4> {
+        let [batch, ..] = noise.dims();
+        let mut x = noise;
+        let prepared = self.model.flow.prepared(known);
         for i in 0..self.steps {
             let sigma = 1.0 - i as f64 / self.steps as f64;
-            let sigma = Tensor::full([seeds.len()], sigma, &self.device);
-            let velocity = self.model.flow.velocity(x.clone(), sigma, &told);
-            x = x - velocity / self.steps as f64;
+            let sigma = Tensor::full([batch], sigma, &self.device);
+            let velocity = self.model.flow.velocity(x.clone(), sigma, &prepared);
+            x = x - velocity * (FRAC_PI_2 / self.steps as f64);
         }
         expected.latents(x)
-    }
-}
-
-/// All numbers of a scene that the model knows.
-fn conditions_of(scene: &Scene) -> Conditions {
-    let ship = scene.ship.as_ref();
-    let windy = scene.sea.wind_speed > 0.0;
-    Conditions {
-        ship: Some(ship.is_some()),
-        ship_speed: ship.map(|ship| ship.speed),
-        ship_heading: ship.map(|ship| ship.heading),
-        ship_position: ship.map(|ship| ship.position),
-        wind_speed: Some(scene.sea.wind_speed),
-        wind_toward: windy.then_some(scene.sea.wind_toward),
-        fetch: windy.then_some(scene.sea.fetch),
-        incidence: Some(scene.radar.incidence),
     }
 }
 
@@ -280,24 +268,36 @@ fn wait_for(tensor: &Tensor<4>) {
     tensor.clone().slice([0..1, 0..1, 0..1, 0..1]).into_data();
 }
 
+/// What an image is drawn from.
+struct Input {
+    known: Conditions,
+    words: String,
+    /// What the numbers are put into, and its seed.
+    scene: Scene,
+}
+
 /// Images as they come from the model.
 struct Drawn {
     grey: Tensor<4>,
     pixels: Vec<f32>,
-    size: usize,
     seconds: SampleSeconds,
 }
 
 impl Drawn {
-    /// One of the images with its speckle and labels.
-    fn finish(&mut self, index: usize, scene: &Scene) -> WakeImage {
-        let length = self.size * self.size;
-        let grey = Field {
-            rows: self.size,
-            columns: self.size,
-            values: self.pixels[index * length..(index + 1) * length].to_vec(),
-        };
-        WakeImage::new(grey, scene, self.seconds)
+    /// The images with their speckle and labels.
+    fn images(&self, inputs: &[Input]) -> Vec<WakeImage> {
+        let [_, _, rows, columns] = self.grey.dims();
+        let images = self.pixels.chunks(rows * columns).zip(inputs);
+        images
+            .map(|(pixels, input)| {
+                let grey = Field {
+                    rows,
+                    columns,
+                    values: pixels.to_vec(),
+                };
+                WakeImage::new(grey, &input.scene, self.seconds)
+            })
+            .collect()
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use wake_physics::Scene;
 
 use crate::conditioning::{FEATURES, Vocabulary};
 use crate::error::{Error, Result, check_range};
@@ -100,6 +101,14 @@ impl WakeModelConfig {
             });
         }
         self.unet().validate()
+    }
+
+    /// The default scene on the pixels of the model: what the model knows nothing of has its values.
+    pub fn base_scene(&self) -> Scene {
+        let mut scene = Scene::default();
+        (scene.grid.rows, scene.grid.columns) = (self.image_size, self.image_size);
+        scene.grid.spacing = self.spacing;
+        scene
     }
 
     /// Rows and columns of the latent image.

@@ -16,61 +16,67 @@ use crate::unet::{UNet, UNetInput};
 /// The steps that σ = 1 stands for in the embedding of the step.
 const STEPS: f64 = 1000.0;
 
-/// The flow that turns noise into the residual of a scene's latents.
+/// The flow that turns noise n into the residual r of a scene's latents, along x = cos φ r + sin φ n, φ = πσ/2.
 ///
-/// The numbers enter every residual block, and every attention as its only token; the places in the ship's frame are
-/// laid over the noisy image.
+/// The noise is [`SeaNoise`](super::SeaNoise). Were the residual like it, the velocity would be 0 everywhere: the flow only
+/// has to learn what tells the two apart.
+///
+/// The numbers enter every residual block, and every attention as its only token; the places in the ship's frame and
+/// the expected image are laid over the noisy one.
 ///
 /// # References
 ///
-/// Lipman et al. (2023), "Flow Matching for Generative Modeling", Eq. 22 without its least noise.
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants: A Unifying Framework for Flows and Diffusions", Eq.
+/// 4.9 (the trigonometric interpolant); Salimans & Ho (2022), "Progressive Distillation for Fast Sampling of Diffusion
+/// Models", appendix D (v in terms of an angle).
 #[derive(Module, Debug)]
 pub struct Flow {
-    places: Conv2d,
+    maps: Conv2d,
     unet: UNet,
     fold: usize,
 }
 
-/// What is told about a scene, in the form that every step uses.
+/// What is known of some scenes, in the form that every step uses.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct Prepared {
     numbers: Tensor<2>,
     maps: Tensor<4>,
 }
 
 impl Flow {
     pub(super) fn new(config: &WakeModelConfig, device: &Device) -> Self {
-        let folded = PLACES * config.fold * config.fold;
+        let folded = (PLACES + config.latent_channels) * config.fold * config.fold;
         Self {
-            places: conv3x3(folded, config.map_channels, device),
+            maps: conv3x3(folded, config.map_channels, device),
             unet: config.unet().init(device),
             fold: config.fold,
         }
     }
 
-    /// Puts numbers and places in the form that every step uses.
-    pub fn told(&self, known: &Known) -> Told {
-        let dtype = self.places.weight.val().dtype();
-        let places = space_to_depth(cast_to(known.places.clone(), dtype), self.fold);
-        Told {
+    /// Puts what is known in the form that every step uses.
+    pub fn prepared(&self, known: &Known) -> Prepared {
+        let dtype = self.maps.weight.val().dtype();
+        let maps = Tensor::cat(vec![known.places.clone(), known.wake.clone()], 1);
+        let maps = space_to_depth(cast_to(maps, dtype), self.fold);
+        Prepared {
             numbers: cast_to(known.numbers.clone(), dtype),
-            maps: silu(convolve(&self.places, places)),
+            maps: silu(convolve(&self.maps, maps)),
         }
     }
 
-    /// The velocity n − r of the flow at x = (1 − σ) r + σ n.
+    /// The velocity ∂x/∂φ = cos φ n − sin φ r, on average over all r and n that make x.
     ///
     /// # Shapes
     ///
     /// `x` and result: `[batch, channels, rows, columns]`; `sigma`: 0 to 1, `[batch]`.
-    pub fn velocity(&self, x: Tensor<4>, sigma: Tensor<1>, told: &Told) -> Tensor<4> {
-        let maps = cast_to(told.maps.clone(), x.dtype());
+    pub fn velocity(&self, x: Tensor<4>, sigma: Tensor<1>, known: &Prepared) -> Tensor<4> {
+        let maps = cast_to(known.maps.clone(), x.dtype());
         let folded = space_to_depth(x, self.fold);
         let velocity = self.unet.forward(UNetInput {
             sample: Tensor::cat(vec![folded, maps], 1),
             timesteps: sigma * STEPS,
-            context: told.numbers.clone().unsqueeze_dim(1),
-            condition: Some(told.numbers.clone()),
+            context: known.numbers.clone().unsqueeze_dim(1),
+            condition: Some(known.numbers.clone()),
         });
         depth_to_space(velocity, self.fold)
     }

@@ -5,17 +5,18 @@ use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::flow::Flow;
-use super::input::Known;
 use super::patches::PatchTransform;
 use super::prior::{Expected, Prior};
 use super::reader::{Reader, windows};
-use crate::conditioning::{Conditions, MapGrid, QUANTITIES, Vocabulary, tokens};
+use crate::conditioning::{Conditions, QUANTITIES, Vocabulary, tokens};
 
 /// A latent diffusion model of radar images of wakes.
 ///
 /// ```text
-/// words ─► reader ─► numbers ─┬─► prior ─► mean μ, spread s, mean grey ─┐
-///                             └─► flow: noise ─► residual r ────────────┴─► z = μ + s r ─► patches ─► image
+/// words ─► reader ─► numbers ─► physics: expected image ─► patches: w ─┐
+///                       ├───────► prior ─► mean μ, spread s, mean grey ◄┤
+///                       └───────► flow: noise ─► residual r ◄───────────┘
+///                                 z = μ + s r ─► patches ─► image
 /// ```
 #[derive(Module, Debug)]
 pub struct WakeModel {
@@ -97,11 +98,6 @@ impl WakeModel {
             .chunks(3 * QUANTITIES)
             .map(Conditions::of_statement)
             .collect()
-    }
-
-    /// Mean and spread of the latents of some scenes.
-    pub fn expect(&self, conditions: &[Conditions], known: &Known, grid: MapGrid) -> Expected {
-        self.prior.expect(conditions, known, &self.patches, grid)
     }
 
     /// The image of latents, grey 0…1, `[batch, 1, rows, columns]`.

@@ -7,7 +7,7 @@ use crate::autoencoder::patch::{depth_to_space, space_to_depth};
 use crate::conditioning::PATCH;
 
 /// Pixels of a square.
-const PIXELS: usize = PATCH * PATCH;
+pub(super) const PIXELS: usize = PATCH * PATCH;
 
 /// A linear map between squares of 8 × 8 pixels and a few numbers, both ways.
 ///
@@ -92,6 +92,16 @@ impl PatchTransform {
         (transform, Shares { variances: values })
     }
 
+    /// Where the transform lies.
+    pub(super) fn device(&self) -> Device {
+        self.encoder.val().device()
+    }
+
+    /// What each channel weighs the pixels of a square with, `[channels, 64]`.
+    pub(super) fn encoder_rows(&self) -> Vec<f32> {
+        self.encoder.val().into_data().iter::<f32>().collect()
+    }
+
     /// Encodes images.
     ///
     /// # Shapes
@@ -103,11 +113,6 @@ impl PatchTransform {
         let mean = images.clone().reshape([batch, rows * columns]).mean_dim(1);
         let squares = space_to_depth(images - mean.clone().reshape([batch, 1, 1, 1]), PATCH);
         (mix(self.encoder.val(), squares), mean)
-    }
-
-    /// Encodes squares of pixels, each a row of a matrix, `[squares, 64]` to `[squares, channels]`.
-    pub fn encode_rows(&self, squares: Tensor<2>) -> Tensor<2> {
-        squares.matmul(self.encoder.val().transpose())
     }
 
     /// Decodes latents to grey; values may lie a little beyond 0…1.

@@ -9,7 +9,7 @@ use super::order::examples;
 use super::run::{Task, Terms, number};
 use crate::conditioning::{Conditions, MapGrid, WEDGE, places};
 use crate::noise::NoiseSource;
-use crate::small::{Known, PatchTransform, Prior, encoded_phases};
+use crate::small::{Known, Prior};
 
 /// Stream that latent pixels are drawn from.
 const CELL_STREAM: u32 = 2001;
@@ -35,8 +35,6 @@ const CELLS: usize = 64;
 pub struct PriorTask<'a> {
     /// The latents.
     pub set: &'a LatentSet,
-    /// What they were encoded with, outside autodiff.
-    pub patches: &'a PatchTransform,
     /// Pixels of the images.
     pub grid: MapGrid,
     /// Seed of the order.
@@ -76,18 +74,15 @@ impl Task<Prior> for PriorTask<'_> {
             .zip(positions)
             .map(|(conditions, position)| self.cells(conditions, position))
             .collect();
-        let shape = [CELLS, 1];
-        let waves = encoded_phases(&conditions, self.grid, &cells, shape, self.patches);
-        let waves = Tensor::from_inner(waves.to_device(&device.clone().inner()));
-        let known = Known::of_cells(&conditions, self.grid, &cells, shape, device);
-        let expected = model.forward(&known, waves);
-        let latents: Vec<f32> = indices
-            .iter()
-            .zip(&cells)
-            .flat_map(|(&i, cells)| self.set.pixels(i, cells))
-            .collect();
-        let shape = [indices.len(), self.set.shape()[0], CELLS, 1];
-        let latents: Tensor<4> = Tensor::from_data(TensorData::new(latents, shape), device);
+        let tensor = |pixels: fn(&LatentSet, usize, &[usize]) -> Vec<f32>| -> Tensor<4> {
+            let pairs = indices.iter().zip(&cells);
+            let numbers = pairs.flat_map(|(&i, cells)| pixels(self.set, i, cells));
+            let shape = [indices.len(), self.set.shape()[0], CELLS, 1];
+            Tensor::from_data(TensorData::new(numbers.collect(), shape), device)
+        };
+        let wake = tensor(LatentSet::expected_pixels);
+        let expected = model.forward(&Known::of_cells(&conditions, self.grid, &cells, wake));
+        let latents = tensor(LatentSet::pixels);
         let off = latents - expected.mean;
         let error = number(&off.clone().square().mean());
         let log_spread = expected.log_spread;

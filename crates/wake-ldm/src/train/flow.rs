@@ -1,37 +1,58 @@
 //! The flow learns to turn noise into residuals.
 
+use std::f32::consts::FRAC_PI_2;
 use std::ops::Range;
 
 use burn::tensor::{Device, Tensor, TensorData};
+use wake_physics::Scene;
 
 use super::latents::LatentSet;
 use super::loss::noise_level;
 use super::order::{examples, noise_of};
 use super::run::{Task, Terms, number};
 use crate::conditioning::{Conditions, MapGrid};
-use crate::noise::{NoiseSource, normal_batch};
-use crate::small::{Flow, Known};
-
-/// Stream of the noise that images are mixed with.
-const NOISE_STREAM: u32 = 2002;
+use crate::noise::NoiseSource;
+use crate::small::{Flow, Known, PatchTransform, in_parallel, sea_noise};
 
 /// Learning the velocity of the flow by its squared error.
 ///
 /// ```text
-/// x = (1 − σ) r + σ n,    loss = |v(x, σ, numbers) − (n − r)|²
+/// φ = πσ/2,    x = cos φ r + sin φ n,    loss = |v(x, σ, numbers) − (cos φ n − sin φ r)|²
 /// ```
+///
+/// with n of [`sea_noise`]. A batch whose noise cannot be made has a loss that is not a number, and is passed over.
 ///
 /// # References
 ///
-/// Lipman et al. (2023), "Flow Matching for Generative Modeling", Eq. 23.
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants", Eq. 2.13; Salimans & Ho (2022), "Progressive
+/// Distillation for Fast Sampling of Diffusion Models", section 4 (v).
 #[derive(Debug)]
 pub struct FlowTask<'a> {
     /// The residuals.
     pub set: &'a LatentSet,
+    /// What they were encoded with, outside autodiff.
+    pub patches: &'a PatchTransform,
+    /// What the numbers of an example are put into to make its scene.
+    pub base: &'a Scene,
     /// Pixels of the images.
     pub grid: MapGrid,
     /// Seed of order, noise and noise levels.
     pub seed: u64,
+}
+
+impl FlowTask<'_> {
+    /// The noise at some positions, made on all cores.
+    fn noise(&self, conditions: &[Conditions], positions: Range<u64>) -> Tensor<4> {
+        let pairs: Vec<(&Conditions, u64)> = conditions.iter().zip(positions).collect();
+        let [channels, rows, columns] = self.set.shape();
+        let noise = in_parallel(&pairs, |&(conditions, position)| {
+            let scene = conditions.onto(self.base);
+            sea_noise(&[scene], &[noise_of(self.seed, position)], self.patches).unwrap_or_else(
+                |_| Tensor::full([1, channels, rows, columns], f32::NAN, &Device::default()),
+            )
+        });
+        Tensor::cat(noise, 0)
+    }
 }
 
 impl Task<Flow> for FlowTask<'_> {
@@ -46,15 +67,20 @@ impl Task<Flow> for FlowTask<'_> {
             .clone()
             .map(|p| noise_level(random, p) as f32)
             .collect();
-        let sources: Vec<NoiseSource> = positions.map(|p| noise_of(self.seed, p)).collect();
-        let noise = normal_batch(&sources, NOISE_STREAM, self.set.shape(), device);
+        let noise = self.noise(&conditions, positions);
+        let noise = Tensor::from_inner(noise.to_device(&device.clone().inner()));
         let residual = self.set.latents(&indices, device);
         let count = levels.len();
-        let sigma: Tensor<1> = Tensor::from_data(TensorData::new(levels, [count]), device);
-        let level = sigma.clone().reshape([-1, 1, 1, 1]);
-        let x = residual.clone() * (level.clone().neg() + 1.0) + noise.clone() * level;
-        let told = model.told(&Known::new(&conditions, self.grid, device));
-        let error = model.velocity(x, sigma, &told) - (noise - residual);
+        let angles: Vec<f32> = levels.iter().map(|level| FRAC_PI_2 * level).collect();
+        let tensor =
+            |numbers| -> Tensor<1> { Tensor::from_data(TensorData::new(numbers, [count]), device) };
+        let angle = tensor(angles).reshape([-1, 1, 1, 1]);
+        let (cos, sin) = (angle.clone().cos(), angle.sin());
+        let x = residual.clone() * cos.clone() + noise.clone() * sin.clone();
+        let target = noise * cos - residual * sin;
+        let wake = self.set.expected(&indices, device);
+        let known = model.prepared(&Known::new(&conditions, self.grid, wake));
+        let error = model.velocity(x, tensor(levels), &known) - target;
         let loss = error.square().mean();
         let terms = vec![("flow", number(&loss))];
         (loss, terms)

@@ -42,18 +42,20 @@ impl Example {
     }
 }
 
-/// Latents of many images, 16 bits a number.
+/// Latents of many images and of the images expected of their scenes, 16 bits a number.
 #[derive(Debug, Default)]
 pub struct LatentSet {
     shape: [usize; 3],
     latents: Vec<f16>,
+    expected: Vec<f16>,
     examples: Vec<Example>,
 }
 
 impl LatentSet {
     /// Encodes an image and adds it.
     ///
-    /// - `image`: grey, `size × size` pixels in rows
+    /// - `images`: the image and the one expected of its scene, [`expected_grey`](crate::small::expected_grey), each
+    ///   `size × size` pixels in rows
     ///
     /// # Errors
     ///
@@ -61,11 +63,11 @@ impl LatentSet {
     pub fn push(
         &mut self,
         transform: &PatchTransform,
-        image: Vec<f32>,
+        images: [Vec<f32>; 2],
         size: usize,
         mut example: Example,
     ) -> Result<()> {
-        let data = TensorData::new(image, [1, 1, size, size]);
+        let data = TensorData::new(images.concat(), [2, 1, size, size]);
         let device = transform.devices().into_iter().next().unwrap_or_default();
         let (latents, grey) = transform.encode(Tensor::from_data(data, &device));
         let [_, channels, rows, columns] = latents.dims();
@@ -78,28 +80,23 @@ impl LatentSet {
             });
         }
         self.shape = shape;
-        example.grey = grey.into_scalar::<f32>();
-        self.latents
-            .extend(latents.into_data().iter::<f32>().map(f16::from_f32));
+        example.grey = grey.narrow(0, 0, 1).into_scalar::<f32>();
+        let latents = halves(latents);
+        let (image, expected) = latents.split_at(latents.len() / 2);
+        self.latents.extend(image);
+        self.expected.extend(expected);
         self.examples.push(example);
         Ok(())
     }
 
     /// The residuals of the latents about the mean and spread that a prior expects; computed on all cores.
     ///
-    /// - `patches`: what the latents were encoded with
     /// - `done`: called with a number of examples when they are done, from several threads
-    pub fn residuals(
-        self,
-        prior: &Prior,
-        patches: &PatchTransform,
-        grid: MapGrid,
-        done: impl Fn(usize) + Sync,
-    ) -> Self {
+    pub fn residuals(self, prior: &Prior, grid: MapGrid, done: impl Fn(usize) + Sync) -> Self {
         let all: Vec<usize> = (0..self.len()).collect();
         let chunks: Vec<&[usize]> = all.chunks(RESIDUALS).collect();
         let residuals = in_parallel(&chunks, |indices| {
-            let residuals = self.residual(indices, prior, patches, grid);
+            let residuals = self.residual(indices, prior, grid);
             done(indices.len());
             residuals
         });
@@ -109,26 +106,15 @@ impl LatentSet {
         }
     }
 
-    fn residual(
-        &self,
-        indices: &[usize],
-        prior: &Prior,
-        patches: &PatchTransform,
-        grid: MapGrid,
-    ) -> Vec<f16> {
-        let device = patches.devices().into_iter().next().unwrap_or_default();
+    fn residual(&self, indices: &[usize], prior: &Prior, grid: MapGrid) -> Vec<f16> {
+        let device = prior.devices().into_iter().next().unwrap_or_default();
         let conditions: Vec<Conditions> = indices
             .iter()
             .map(|&i| self.examples[i].conditions)
             .collect();
-        let known = Known::new(&conditions, grid, &device);
-        let expected = prior.expect(&conditions, &known, patches, grid);
-        let residual = expected.residual(self.latents(indices, &device));
-        residual
-            .into_data()
-            .iter::<f32>()
-            .map(f16::from_f32)
-            .collect()
+        let wake = self.expected(indices, &device);
+        let expected = prior.forward(&Known::new(&conditions, grid, wake));
+        halves(expected.residual(self.latents(indices, &device)))
     }
 
     /// Number of examples.
@@ -153,28 +139,47 @@ impl LatentSet {
 
     /// Some latent pixels of one example, `[channels, cells]`.
     pub fn pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
-        let [channels, rows, columns] = self.shape;
-        let image = &self.latents[index * channels * rows * columns..];
-        (0..channels)
-            .flat_map(|channel| {
-                cells
-                    .iter()
-                    .map(move |cell| channel * rows * columns + cell)
-            })
-            .map(|i| image[i].to_f32())
-            .collect()
+        self.some(&self.latents, index, cells)
+    }
+
+    /// The same pixels of the image expected of its scene.
+    pub fn expected_pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
+        self.some(&self.expected, index, cells)
     }
 
     /// Latents of some examples, `[indices, channels, rows, columns]`.
     pub fn latents(&self, indices: &[usize], device: &Device) -> Tensor<4> {
+        self.whole(&self.latents, indices, device)
+    }
+
+    /// Latents of the images expected of their scenes.
+    pub fn expected(&self, indices: &[usize], device: &Device) -> Tensor<4> {
+        self.whole(&self.expected, indices, device)
+    }
+
+    fn some(&self, images: &[f16], index: usize, cells: &[usize]) -> Vec<f32> {
+        let [channels, rows, columns] = self.shape;
+        let image = &images[index * channels * rows * columns..];
+        let of_channel = |channel: usize| cells.iter().map(move |c| channel * rows * columns + c);
+        let places = (0..channels).flat_map(of_channel);
+        places.map(|i| image[i].to_f32()).collect()
+    }
+
+    fn whole(&self, images: &[f16], indices: &[usize], device: &Device) -> Tensor<4> {
         let [channels, rows, columns] = self.shape;
         let length = channels * rows * columns;
         let numbers: Vec<f32> = indices
             .iter()
-            .flat_map(|&i| &self.latents[i * length..(i + 1) * length])
+            .flat_map(|&i| &images[i * length..(i + 1) * length])
             .map(|x| x.to_f32())
             .collect();
         let shape = [indices.len(), channels, rows, columns];
         Tensor::from_data(TensorData::new(numbers, shape), device)
     }
+}
+
+/// The numbers of a tensor in 16 bits.
+fn halves(tensor: Tensor<4>) -> Vec<f16> {
+    let data = tensor.into_data();
+    data.iter::<f32>().map(f16::from_f32).collect()
 }

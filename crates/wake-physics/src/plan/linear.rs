@@ -1,6 +1,6 @@
 //! The linear image: how strongly each wave modulates the intensity, to first order in its height.
 //!
-//! It decides what matters; it never makes an image.
+//! It decides what matters, and has the spectrum of open sea; it never makes an image of a scene.
 
 use crate::waves::{Quantity, Transfer};
 use num_complex::Complex64;

@@ -15,6 +15,7 @@ use crate::memory;
 use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::setup::Setup;
+pub(crate) use linear::smear;
 use serde::Serialize;
 pub(crate) use situation::Situation;
 

@@ -136,6 +136,14 @@ impl Situation {
         (slopes(&self.sea), rms(&self.sea, radial))
     }
 
+    /// The linear image of a setup that may average over more than the one this was made of.
+    pub(crate) fn linear_image(&self, setup: &Setup) -> LinearImage {
+        LinearImage {
+            tilt: slope_of_ln_sigma(&setup.backscatter(true, true)).0,
+            ..self.image
+        }
+    }
+
     /// What a user should know.
     pub(crate) fn notes(&self, scene: &Scene, setup: &Setup) -> Vec<String> {
         let mut notes = Vec::new();

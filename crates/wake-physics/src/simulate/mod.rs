@@ -13,12 +13,14 @@ use clock::Clock;
 pub use clock::Seconds;
 pub use expected::expected_intensity;
 pub use label::labels_of;
+pub use linear_sea::LinearSea;
 use serde::Serialize;
 use stages::Run;
 
 mod clock;
 mod expected;
 mod label;
+mod linear_sea;
 mod report;
 mod stages;
 

@@ -12,6 +12,7 @@ use crate::raster::{Field, Raster};
 use crate::vectorize::vectorized;
 use crate::waves::{PlaneWaves, Quantity, Transfer};
 use crate::wind_sea::DirectionalSpectrum;
+use amplitude::Amplitudes;
 use draw::{Draw, Scatter};
 use factor::Factors;
 use lattice::Lattice;
@@ -21,6 +22,46 @@ use vector::Lane;
 
 /// From this tolerance on single precision is enough: its error stays below a quarter of it.
 const SINGLE_PRECISION_TOLERANCE: f64 = 2e-5;
+
+/// Variances Ψ dkx dky \[m²\] of the waves along +k of a square lattice, |k| ≤ π/spacing, in the order of [`crate::fft`].
+///
+/// # Shapes
+///
+/// `[columns, rows]`, both `period`
+pub(crate) fn wave_variances(
+    spectrum: &DirectionalSpectrum,
+    period: usize,
+    spacing: f64,
+) -> Vec<f32> {
+    let lattice = Lattice {
+        rows: period,
+        columns: period,
+        spacing,
+    };
+    let mut variances = vec![0.0; period * period];
+    if spectrum.is_flat() {
+        return variances;
+    }
+    let amplitudes = Amplitudes::new(spectrum, &lattice);
+    let ky: Vec<f32> = (0..period).map(|a| lattice.ky(a) as f32).collect();
+    let (mut along, mut against) = (ky.clone(), ky.clone());
+    let variance = |amplitude: f32| 0.5 * amplitude * amplitude;
+    for line in 0..lattice.lines() {
+        for range in lattice.disk(line) {
+            let (along, against) = (&mut along[range.clone()], &mut against[range.clone()]);
+            amplitudes.fill(lattice.kx(line), &ky[range.clone()], along, against);
+            for (row, (&mut along, &mut against)) in range.zip(along.iter_mut().zip(against)) {
+                variances[line * period + row] = variance(along);
+                if line > 0 {
+                    variances[(period - line) * period + (period - row) % period] =
+                        variance(against);
+                }
+            }
+        }
+    }
+    variances[0] = 0.0;
+    variances
+}
 
 /// One realisation of a wind sea at one instant, around one raster.
 ///

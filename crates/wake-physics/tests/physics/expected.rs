@@ -1,9 +1,9 @@
-//! The expected image against means over many seas.
+//! The expected image and the spectrum of open sea against means over many simulated seas.
 
 use crate::open_sea;
 use wake_physics::measure::{ShipPlace, kelvin_wedge};
 use wake_physics::scene::{Term, Terms};
-use wake_physics::{Field, Scene, expected_intensity, simulate};
+use wake_physics::{Field, LinearSea, Scene, expected_intensity, simulate};
 
 /// Seas of each half.
 const SEAS: u64 = 16;
@@ -136,5 +136,107 @@ fn open_sea_is_expected_to_be_even() {
         let seas = mean_over_seas(&scene, 0..SEAS);
         let level = mean * seas.len() as f64 / seas.iter().sum::<f64>();
         assert!((level - 1.0).abs() < 0.03, "{wind}: {level}");
+    }
+}
+
+/// Mean products of pixels some rows and columns apart.
+fn products(values: &[f64], size: usize, lags: &[[usize; 2]]) -> Vec<f64> {
+    let at = |i: usize, j: usize| values[i * size + j];
+    let of_lag = |&[down, right]: &[usize; 2]| {
+        let count = (size - down) * (size - right);
+        let pairs = (0..size - down).flat_map(|i| (0..size - right).map(move |j| (i, j)));
+        pairs
+            .map(|(i, j)| at(i, j) * at(i + down, j + right))
+            .sum::<f64>()
+            / count as f64
+    };
+    lags.iter().map(of_lag).collect()
+}
+
+const LAGS: [[usize; 2]; 7] = [[0, 0], [0, 1], [1, 0], [0, 3], [2, 2], [4, 1], [0, 8]];
+
+#[test]
+fn a_linear_sea_has_the_covariance_it_states() {
+    let sea = LinearSea::new(&scene(&["sea.wind_speed=5", "sea.wind_toward=30"])).unwrap();
+    let stated = sea.covariance();
+    let seas = 24;
+    let mut sums = [0.0; LAGS.len()];
+    for seed in 0..seas {
+        // Uniform numbers of variance 1: a sum of many waves is Gaussian all the same.
+        let mut state = seed as u64 + 1;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 40) as f32 / (1u64 << 23) as f32 - 1.0) * 3f32.sqrt()
+        };
+        let normals: Vec<f32> = (0..sea.normals()).map(|_| uniform()).collect();
+        let field = numbers(&sea.field(&normals));
+        for (sum, product) in sums.iter_mut().zip(products(&field, 160, &LAGS)) {
+            *sum += product / f64::from(seas);
+        }
+    }
+    let variance = f64::from(stated.values[0]);
+    for (found, [down, right]) in sums.iter().zip(LAGS) {
+        let expected = f64::from(stated.at(down, right));
+        // 600,000 pixels, of which some thousand are independent: 2 % of the variance, four times.
+        assert!(
+            (found - expected).abs() < 0.08 * variance,
+            "{found} {expected} {variance}"
+        );
+    }
+}
+
+#[test]
+fn simulated_seas_of_small_modulation_have_the_covariance_of_the_linear_sea() {
+    for assignments in [
+        [
+            "sea.wind_speed=4",
+            "sea.wind_toward=90",
+            "radar.range_to_velocity=10",
+        ],
+        [
+            "sea.wind_speed=4",
+            "sea.wind_toward=20",
+            "radar.range_to_velocity=25",
+        ],
+        [
+            "sea.wind_speed=3",
+            "sea.wind_toward=60",
+            "radar.range_to_velocity=100",
+        ],
+    ] {
+        let scene = open_sea(scene(&assignments));
+        let stated = LinearSea::new(&scene).unwrap().covariance();
+        let mut sums = [0.0; LAGS.len()];
+        for seed in 0..SEAS {
+            let image = simulate(&Scene {
+                seed,
+                ..scene.clone()
+            })
+            .unwrap()
+            .intensity;
+            let mean = image.mean();
+            let relative: Vec<f64> = numbers(&image).iter().map(|v| v / mean - 1.0).collect();
+            for (sum, product) in sums.iter_mut().zip(products(&relative, 160, &LAGS)) {
+                *sum += product / SEAS as f64;
+            }
+        }
+        let likeness = |stated: &Field| {
+            let stated = LAGS.map(|[down, right]| f64::from(stated.at(down, right)));
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            dot(&sums, &stated) / (dot(&sums, &sums) * dot(&stated, &stated)).sqrt()
+        };
+        // Modulations of 0.05 to 0.25, so that the second order has up to a quarter of the first; imaging spreads a
+        // source over two columns and at least a pixel of rows, which takes from the shortest waves.
+        let (like, level) = (likeness(&stated), sums[0] / f64::from(stated.values[0]));
+        assert!(
+            like > 0.97 && (level - 1.0).abs() < 0.3,
+            "{assignments:?}: {like} {level}"
+        );
+        let mut turned = scene.clone();
+        turned.sea.wind_toward += 70.0;
+        let other = likeness(&LinearSea::new(&turned).unwrap().covariance());
+        assert!(other < like - 0.05, "{assignments:?}: {other} {like}");
     }
 }

@@ -1,0 +1,134 @@
+//! The open sea as a radar sees it to first order: a Gaussian field with the spectrum of the image.
+
+use crate::dispersion::angular_frequency;
+use crate::error::Result;
+use crate::fft::{Synthesis, fast_length, signed_index};
+use crate::memory;
+use crate::plan::{Situation, smear};
+use crate::raster::Field;
+use crate::scene::Scene;
+use crate::setup::Setup;
+use crate::surface::wave_variances;
+use num_complex::Complex32;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Pixels between opposite edges of an image, around the period of the field.
+const GUARD: usize = 64;
+
+/// Waves that the smear leaves less of their variance are not there.
+const LEAST_SHARE: f64 = 1e-6;
+
+/// The relative intensity (I − E I)/E I of open sea, linear in the waves.
+///
+/// ```text
+/// P(k) = |M(k)|² exp(−2 (ky ρ'/2π)²) Ψ(k),     M = tilt + hydrodynamic + range bunching + velocity bunching
+/// ```
+///
+/// with ρ' and the derivative of ln σ⁰ that the whole sea has: the quasi-linear spectrum of the image, here even in k. The
+/// image itself is steeper and not Gaussian.
+///
+/// # References
+///
+/// Hasselmann & Hasselmann (1991), J. Geophys. Res. 96(C6), 10713, Eq. 56.
+#[derive(Debug, Clone)]
+pub struct LinearSea {
+    rows: usize,
+    columns: usize,
+    /// Pixels of a period along both axes.
+    period: usize,
+    /// √(P dkx dky) of each wave, `[columns, rows]` of the period, in the order of [`crate::fft`].
+    amplitudes: Vec<f32>,
+}
+
+impl LinearSea {
+    /// The sea of a scene, whether or not a ship is there; all zero without waves that a pixel carries.
+    ///
+    /// # Errors
+    ///
+    /// As [`simulate`](super::simulate).
+    pub fn new(scene: &Scene) -> Result<Self> {
+        scene.validate()?;
+        let scene = Scene {
+            ship: None,
+            ..scene.clone()
+        };
+        let [rows, columns] = [scene.grid.rows, scene.grid.columns];
+        let period = fast_length(rows.max(columns) + GUARD);
+        // White numbers, waves, two fields.
+        memory::check([rows, columns], [0, 0], 24 * (period * period) as u64)?;
+        let mut setup = Setup::new(&scene);
+        let situation = Situation::new(&scene, &setup);
+        let (slopes, velocity) = situation.resolved_sea();
+        setup.average_over(&slopes, velocity);
+        let image = situation.linear_image(&setup);
+        let spacing = scene.grid.spacing;
+        let step = TAU / (period as f64 * spacing);
+        let resolution = setup.resolution().at(0.0);
+        let mut amplitudes = wave_variances(&setup.sea, period, spacing);
+        let line = |(column, line): (usize, &mut [f32])| {
+            let kx = signed_index(column, period) as f64 * step;
+            for (row, amplitude) in line.iter_mut().enumerate().filter(|(_, v)| **v > 0.0) {
+                let ky = signed_index(row, period) as f64 * step;
+                let share = smear(ky, resolution).powi(2);
+                if share < LEAST_SHARE {
+                    *amplitude = 0.0;
+                    continue;
+                }
+                let omega = angular_frequency(kx.hypot(ky), setup.sea.depth());
+                let modulation = image.modulation([kx, ky], omega).total();
+                let variance = f64::from(*amplitude) * share * modulation.norm_sqr();
+                *amplitude = variance.sqrt() as f32;
+            }
+        };
+        amplitudes.par_chunks_mut(period).enumerate().for_each(line);
+        Ok(Self {
+            rows,
+            columns,
+            period,
+            amplitudes,
+        })
+    }
+
+    /// Independent standard normal numbers that [`field`](Self::field) is made of.
+    #[must_use]
+    pub fn normals(&self) -> usize {
+        2 * self.period * self.period
+    }
+
+    /// One sea, `[rows, columns]` of the image; its opposite edges are independent.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer numbers than [`normals`](Self::normals).
+    #[must_use]
+    pub fn field(&self, normals: &[f32]) -> Field {
+        let pairs = normals[..self.normals()].as_chunks::<2>().0;
+        let waves = self.amplitudes.iter().zip(pairs);
+        let waves = waves.map(|(&a, &[re, im])| Complex32::new(a * re, a * im));
+        self.sum(waves.collect(), [self.rows, self.columns])
+    }
+
+    /// Covariance of two pixels by their distance in rows and columns, `[period, period]`, negative ones from the end.
+    #[must_use]
+    pub fn covariance(&self) -> Field {
+        let waves = self.amplitudes.iter().map(|a| Complex32::new(a * a, 0.0));
+        self.sum(waves.collect(), [self.period; 2])
+    }
+
+    /// The real part of a sum of waves.
+    fn sum(&self, mut waves: Vec<Complex32>, [rows, columns]: [usize; 2]) -> Field {
+        let [mut values, mut other] = [(); 2].map(|()| vec![0.0; rows * columns]);
+        Synthesis::new(self.period, self.period).run(
+            &mut waves,
+            [rows, columns],
+            (&mut values, &mut other),
+            |_, _| {},
+        );
+        Field {
+            rows,
+            columns,
+            values,
+        }
+    }
+}
