@@ -15,6 +15,7 @@ use wake_ldm::train::{FineTune, FineTuneOptions, Frozen, Metrics, Rate, TrainerO
 use wake_ldm::weights::Precision;
 use wake_text::Tokenizer;
 
+use super::options::learning;
 use super::progress;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -58,6 +59,9 @@ pub(crate) struct Options {
     /// Keep less for the way back through the model, and compute it again; slower
     #[arg(long)]
     checkpointing: bool,
+    /// Compute losses and gradients in bfloat16, where the device can; weights keep 32 bits
+    #[arg(long)]
+    bf16: bool,
     /// flex, ndarray, wgpu or cuda, where compiled in
     #[arg(long, default_value = "flex")]
     device: String,
@@ -108,6 +112,7 @@ fn begin(options: &Options, parts: &PipelineParts, device: &Device) -> Outcome<F
                 warmup: 20,
                 steps: options.steps as usize,
             },
+            bf16: options.bf16,
             ..TrainerOptions::default()
         },
     };
@@ -116,10 +121,7 @@ fn begin(options: &Options, parts: &PipelineParts, device: &Device) -> Outcome<F
         autoencoder: parts.autoencoder.clone(),
         schedule,
     };
-    let mut learning = device.clone().autodiff();
-    if options.checkpointing {
-        learning = learning.gradient_checkpointing();
-    }
+    let learning = learning(device.clone(), options.checkpointing, options.bf16)?;
     let unet = parts.unet.clone();
     Ok(match options.rank {
         None => FineTune::whole(unet, frozen, constants, &learning),

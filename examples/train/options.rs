@@ -1,8 +1,9 @@
 //! What a stage is told on the command line.
 
+use std::error::Error;
 use std::path::PathBuf;
 
-use burn::tensor::Device;
+use burn::tensor::{DType, Device};
 use clap::Args;
 use wake_ldm::device_named;
 use wake_ldm::train::{Rate, RunOptions, TrainerOptions};
@@ -42,6 +43,9 @@ pub(crate) struct Options {
     /// Keep less for the way back through the model, and compute it again; slower
     #[arg(long)]
     pub(crate) checkpointing: bool,
+    /// Compute losses and gradients in bfloat16, where the device can; weights keep 32 bits
+    #[arg(long)]
+    pub(crate) bf16: bool,
     /// flex, ndarray, wgpu or cuda, where compiled in; a comma between several
     #[arg(long, default_value = "flex")]
     pub(crate) device: String,
@@ -83,6 +87,7 @@ impl Options {
                     steps,
                 },
                 accumulation: usize::from(self.accumulation),
+                bf16: self.bf16,
                 ..TrainerOptions::default()
             },
         }
@@ -94,14 +99,28 @@ impl Options {
     }
 
     /// The devices that a model learns on.
-    pub(crate) fn learning_devices(&self) -> wake_ldm::Result<Vec<Device>> {
-        let autodiff = |device: Device| {
-            let device = device.autodiff();
-            match self.checkpointing {
-                true => device.gradient_checkpointing(),
-                false => device,
-            }
-        };
-        Ok(self.devices()?.into_iter().map(autodiff).collect())
+    pub(crate) fn learning_devices(&self) -> Result<Vec<Device>, Box<dyn Error>> {
+        let devices = self.devices()?.into_iter();
+        devices
+            .map(|device| learning(device, self.checkpointing, self.bf16))
+            .collect()
     }
+}
+
+/// A device that a model learns on.
+pub(crate) fn learning(
+    device: Device,
+    checkpointing: bool,
+    bf16: bool,
+) -> Result<Device, Box<dyn Error>> {
+    if bf16 && !device.supports_dtype(DType::BF16) {
+        return Err(
+            "--bf16: this device does not compute in bfloat16; leave the option out".into(),
+        );
+    }
+    let device = device.autodiff();
+    Ok(match checkpointing {
+        true => device.gradient_checkpointing(),
+        false => device,
+    })
 }

@@ -45,7 +45,7 @@ impl WakeModelConfig {
             spacing: 4.0,
             latent_channels: 16,
             fold: 2,
-            widths: vec![64, 96],
+            widths: vec![96, 96],
             attention: vec![false, true],
             text_width: 64,
             prior_width: 128,

@@ -3,7 +3,7 @@
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::tensor::activation::silu;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{DType, Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::input::Known;
@@ -53,9 +53,14 @@ impl Flow {
         }
     }
 
+    /// Type of the weights.
+    pub fn dtype(&self) -> DType {
+        self.maps.weight.val().dtype()
+    }
+
     /// Puts what is known in the form that every step uses.
     pub fn prepared(&self, known: &Known) -> Prepared {
-        let dtype = self.maps.weight.val().dtype();
+        let dtype = self.dtype();
         let maps = Tensor::cat(vec![known.places.clone(), known.wake.clone()], 1);
         let maps = space_to_depth(cast_to(maps, dtype), self.fold);
         Prepared {

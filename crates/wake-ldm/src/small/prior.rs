@@ -9,6 +9,7 @@ use burn::tensor::{Device, Tensor};
 use super::config::WakeModelConfig;
 use super::input::Known;
 use crate::conditioning::{FEATURES, PLACES};
+use crate::nn::cast_to;
 use crate::nn::conv::{conv1x1, convolve};
 
 /// Largest |ln s|.
@@ -76,26 +77,27 @@ impl Prior {
         }
     }
 
-    /// Mean, spread and brightness at the latent pixels of `known`.
+    /// Mean, spread and brightness at the latent pixels of `known`, of its type.
     pub fn forward(&self, known: &Known) -> Expected {
+        let (dtype, wide) = (self.mean.weight.val().dtype(), known.wake.dtype());
+        let numbers = cast_to(known.numbers.clone(), dtype);
         let told = |layer: &Linear| {
-            let told = layer.forward(known.numbers.clone());
+            let told = layer.forward(numbers.clone());
             let [batch, width] = told.dims();
             told.reshape([batch, width, 1, 1])
         };
-        let seen =
-            convolve(&self.places, known.places.clone()) + convolve(&self.wake, known.wake.clone());
+        let seen = convolve(&self.places, cast_to(known.places.clone(), dtype))
+            + convolve(&self.wake, cast_to(known.wake.clone(), dtype));
         let mut x = silu(seen + told(&self.numbers[0]));
         for (layer, numbers) in self.layers.iter().zip(&self.numbers[1..]) {
             x = silu(convolve(layer, x.clone()) + told(numbers)) + x;
         }
-        let gain = convolve(&self.gain, x.clone()) + 1.0;
-        let spread = convolve(&self.spread, x.clone()) / LARGEST_LOG_SPREAD;
-        let hidden = silu(self.grey_in.forward(known.numbers.clone()));
+        let out = |layer: &Conv2d| cast_to(convolve(layer, x.clone()), wide);
+        let hidden = silu(self.grey_in.forward(numbers.clone()));
         Expected {
-            mean: known.wake.clone() * gain + convolve(&self.mean, x),
-            log_spread: spread.tanh() * LARGEST_LOG_SPREAD,
-            grey: self.grey_out.forward(hidden),
+            mean: known.wake.clone() * (out(&self.gain) + 1.0) + out(&self.mean),
+            log_spread: (out(&self.spread) / LARGEST_LOG_SPREAD).tanh() * LARGEST_LOG_SPREAD,
+            grey: cast_to(self.grey_out.forward(hidden), wide),
         }
     }
 }

@@ -3,11 +3,12 @@
 use burn::module::{Module, Param};
 use burn::nn::{Embedding, EmbeddingConfig, Initializer, Linear, LinearConfig};
 use burn::tensor::activation::gelu;
-use burn::tensor::{Device, Int, Tensor, TensorData};
+use burn::tensor::{DType, Device, Int, Tensor, TensorData};
 
 use super::config::WakeModelConfig;
 use crate::conditioning::{QUANTITIES, Vocabulary};
 use crate::nn::attention::CrossAttention;
+use crate::nn::cast_to;
 
 /// Tokens on each side that a token sees at once.
 const REACH: usize = 6;
@@ -60,7 +61,7 @@ impl Reader {
         }
     }
 
-    /// What prompts state, as [`statement`](crate::conditioning::statement).
+    /// What prompts state, as [`statement`](crate::conditioning::statement), in 32 bits.
     ///
     /// # Shapes
     ///
@@ -74,7 +75,7 @@ impl Reader {
         let queries = self.queries.val().unsqueeze::<3>().repeat_dim(0, batch);
         let found = queries.clone() + self.attention.forward(queries, Some(states));
         let stated = self.out.forward(gelu(self.hidden.forward(found)));
-        stated.reshape([batch, 3 * QUANTITIES])
+        cast_to(stated.reshape([batch, 3 * QUANTITIES]), DType::F32)
     }
 }
 

@@ -1,7 +1,9 @@
 //! The parameters of a module as a list of flat tensors, always in the same order.
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{Gradients, Tensor};
+use burn::tensor::{DType, Gradients, Tensor};
+
+use crate::nn::cast_to;
 
 /// Names and shapes of all parameters, in the order of [`values`].
 pub fn names<M: Module>(module: &M) -> Vec<(String, Vec<usize>)> {
@@ -17,7 +19,7 @@ pub fn values<M: Module>(module: &M) -> Vec<Tensor<1>> {
     lister.found
 }
 
-/// The gradients of all parameters, flat; zeros where the loss does not depend on one.
+/// The gradients of all parameters, flat, of 32 bits; zeros where the loss does not depend on one.
 pub fn gradients<M: Module>(module: &M, gradients: Gradients) -> Vec<Tensor<1>> {
     let mut lister = Differentials {
         gradients,
@@ -42,6 +44,11 @@ pub fn replaced<M: Module>(module: M, values: Vec<Tensor<1>>) -> M {
         "more values than parameters"
     );
     module
+}
+
+/// The module with parameters of type `bfloat16`, which learn where the old ones did.
+pub(super) fn rounded<M: Module>(module: M) -> M {
+    module.map(&mut Rounder)
 }
 
 /// A flat tensor of the same numbers.
@@ -76,13 +83,7 @@ struct Values {
 
 impl ModuleVisitor for Values {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let value = param.val();
-        let value = if value.is_autodiff() {
-            value.inner()
-        } else {
-            value
-        };
-        self.found.push(flat(value));
+        self.found.push(flat(plain(&param.val())));
     }
 }
 
@@ -95,8 +96,8 @@ impl ModuleVisitor for Differentials {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
         let value = param.val();
         let gradient = value.grad_remove(&mut self.gradients);
-        self.found
-            .push(flat(gradient.unwrap_or_else(|| value.inner().zeros_like())));
+        let gradient = gradient.unwrap_or_else(|| value.inner().zeros_like());
+        self.found.push(cast_to(flat(gradient), DType::F32));
     }
 }
 
@@ -104,20 +105,38 @@ struct Replacer {
     values: std::vec::IntoIter<Tensor<1>>,
 }
 
+struct Rounder;
+
+impl ModuleMapper for Rounder {
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        param.map(|old| relearnt(&old, cast_to(plain(&old), DType::BF16)))
+    }
+}
+
 impl ModuleMapper for Replacer {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let value = self.values.next().expect("one value for each parameter");
-        param.map(|old| {
-            let new = value.reshape(old.dims());
-            if !old.is_autodiff() {
-                return new;
-            }
-            let new = Tensor::from_inner(new);
-            if old.is_require_grad() {
-                new.require_grad()
-            } else {
-                new
-            }
-        })
+        param.map(|old| relearnt(&old, value.reshape(old.dims())))
+    }
+}
+
+/// A tensor outside autodiff.
+fn plain<const D: usize>(tensor: &Tensor<D>) -> Tensor<D> {
+    if tensor.is_autodiff() {
+        return tensor.clone().inner();
+    }
+    tensor.clone()
+}
+
+/// A new value in the place of an old one: in autodiff, and learning, if the old one is.
+fn relearnt<const D: usize>(old: &Tensor<D>, new: Tensor<D>) -> Tensor<D> {
+    if !old.is_autodiff() {
+        return new;
+    }
+    let new = Tensor::from_inner(new);
+    if old.is_require_grad() {
+        new.require_grad()
+    } else {
+        new
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{DType, Device, Tensor};
 
 use super::*;
 use crate::conditioning::{Conditions, MapGrid, Vocabulary};
@@ -190,6 +190,33 @@ fn the_loss_of_the_flow_falls() {
     let [_, late] = early_and_late(&losses);
     // The velocity has variance 1; the mean of five losses, 1,280 squares, is known to 0.04.
     assert!(late < 0.8, "{late}");
+}
+
+#[test]
+fn sixteen_bits_learn_as_32_bits_do() {
+    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let start = start(folder.path());
+    let losses = |bf16: bool| {
+        let devices = vec![Device::flex().autodiff()];
+        let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+        let mut options = options(1);
+        options.trainer.bf16 = bf16;
+        let mut run = Run::new("flow", &config(), init, options, devices).unwrap();
+        run.resume(start.clone()).unwrap();
+        let losses = advance(&mut run, &set, 40);
+        assert_eq!(run.averaged().dtype(), DType::F32);
+        losses
+    };
+    let (wide, narrow) = (losses(false), losses(true));
+    // Eight bits of mantissa, a dozen layers: 2⁻⁸ √12 of the velocity, once forward.
+    assert!((wide[0] - narrow[0]).abs() < 0.014 * wide[0]);
+    let [[early, late], [_, other]] = [&wide, &narrow].map(|losses| early_and_late(losses));
+    // Rounding sends the two apart; what is left to learn falls alike.
+    assert!(
+        late < 0.9 * early && (other - late).abs() < 0.25 * (early - late),
+        "{early} {late} {other}"
+    );
+    assert!(wide != narrow);
 }
 
 #[test]

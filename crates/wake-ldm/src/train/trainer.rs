@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor};
 use super::adam::{Adam, AdamOptions};
 use super::average::Average;
 use super::rate::Rate;
-use super::tensors::{gradients, replaced, values};
+use super::tensors::{gradients, replaced, rounded, values};
 
 /// Constants of a [`Trainer`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +21,9 @@ pub struct TrainerOptions {
     pub average_decay: f64,
     /// Parts of a batch that one device takes after the other.
     pub accumulation: usize,
+    /// Whether losses and gradients are computed with weights of type `bfloat16`, where the device has it; weights,
+    /// averages and steps are 32 bits all the same (Micikevicius et al. 2018, "Mixed Precision Training", section 3.1).
+    pub bf16: bool,
 }
 
 impl Default for TrainerOptions {
@@ -35,6 +38,7 @@ impl Default for TrainerOptions {
             largest_norm: 1.0,
             average_decay: 0.999,
             accumulation: 1,
+            bf16: false,
         }
     }
 }
@@ -153,7 +157,12 @@ impl<M: Module> Trainer<M> {
         loss: &(impl Fn(&M, &Device, usize) -> Tensor<1> + Sync),
     ) -> (Vec<Tensor<1>>, f64) {
         let accumulation = self.options.accumulation;
+        let bf16 = self.options.bf16;
         let work = |model: M, device: &Device, worker: usize| {
+            let model = match bf16 {
+                true => rounded(model),
+                false => model,
+            };
             let parts = (0..accumulation).map(|i| {
                 let loss = loss(&model, device, worker * accumulation + i);
                 let value = f64::from(loss.clone().inner().into_scalar::<f32>());
