@@ -41,7 +41,7 @@ impl Plan {
             scenes: count,
             wake_scenes: count.div_ceil(12),
             condition_scenes: count.div_ceil(4),
-            pairs: count.div_ceil(10),
+            pairs: count.div_ceil(5),
         }
     }
 

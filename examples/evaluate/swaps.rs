@@ -2,7 +2,7 @@
 
 use crate::measurements::{Quantity, Reading};
 use crate::scenes::{held_out, ship};
-use crate::source::{ImageSource, Result, Simulator, Told};
+use crate::source::{ImageSource, OtherSea, Result, Simulator, Told};
 use serde::Serialize;
 use wake_physics::Scene;
 
@@ -19,7 +19,7 @@ pub(crate) struct SwapRow {
     pub(crate) pairs: usize,
     /// Pairs in which the value follows on simulated images: those that count.
     pub(crate) counted: usize,
-    /// Share of the counted pairs in which it follows on generated images.
+    /// Share of the counted pairs in which it follows on generated images, or on simulated ones of other seas.
     pub(crate) right: Option<f64>,
 }
 
@@ -71,6 +71,13 @@ pub(crate) fn swaps(
             }
             progress();
         }
+        let share = |source: &dyn ImageSource, told: Told| -> Result<Option<f64>> {
+            let mut right = 0;
+            for pair in &counted {
+                right += usize::from(follows(pair, quantity, source, told)?);
+            }
+            Ok((!counted.is_empty()).then(|| right as f64 / counted.len() as f64))
+        };
         let row = |told: &'static str, right: Option<f64>| SwapRow {
             quantity: quantity.name()[0],
             told,
@@ -78,17 +85,10 @@ pub(crate) fn swaps(
             counted: counted.len(),
             right,
         };
-        let Some(model) = model else {
-            rows.push(row("simulator", None));
-            continue;
-        };
-        for &told in told {
-            let mut right = 0;
-            for pair in &counted {
-                right += usize::from(follows(pair, quantity, model, told)?);
-            }
-            let share = (!counted.is_empty()).then(|| right as f64 / counted.len() as f64);
-            rows.push(row(told.name(), share));
+        rows.push(row("simulator", share(&OtherSea, Told::Both)?));
+        for &told in told.iter().filter(|_| model.is_some()) {
+            let right = model.map(|model| share(model, told)).transpose()?;
+            rows.push(row(told.name(), right.flatten()));
         }
     }
     Ok(rows)

@@ -36,7 +36,7 @@ struct Arguments {
     /// Folder of a model: one that `train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Steps from noise to image [default: 8, or 50 in diffusers layout]
+    /// Steps from noise to image [default: 4, or 50 in diffusers layout]
     #[arg(long)]
     steps: Option<usize>,
     /// Diffusers layout: ddpm, ddim, pndm, euler, euler-ancestral, dpm++, heun, lms, unipc, lcm or flow-match-euler

@@ -15,7 +15,7 @@ use wake_ldm::train::{FineTune, FineTuneOptions, Frozen, Metrics, Rate, TrainerO
 use wake_ldm::weights::Precision;
 use wake_text::Tokenizer;
 
-use super::options::learning;
+use super::options::{learning, newest};
 use super::progress;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -56,6 +56,9 @@ pub(crate) struct Options {
     /// Seed of everything that is drawn
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Go on from the newest checkpoint in --out
+    #[arg(long)]
+    resume: bool,
     /// Keep less for the way back through the model, and compute it again; slower
     #[arg(long)]
     checkpointing: bool,
@@ -75,8 +78,12 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     let data = Folder::open(&options.data)?;
     let parts = Pipeline::load(&options.weights, &device)?.into_parts();
     let mut run = begin(options, &parts, &device)?;
+    let checkpoints = options.out.join("checkpoints");
+    if options.resume {
+        run.resume(newest(&checkpoints)?)?;
+    }
     std::fs::create_dir_all(&options.out)?;
-    let mut metrics = Metrics::open(&options.out.join("fine_tune.jsonl"), 0)?;
+    let mut metrics = Metrics::open(&options.out.join("fine_tune.jsonl"), run.steps())?;
     let steps = options.steps as usize;
     let bar = progress::bar(u64::from(options.steps), "fine-tuning");
     while run.steps() < steps {
@@ -86,6 +93,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         bar.set_message(format!("fine-tuning, loss {:.4}", report.loss));
         bar.set_position(run.steps() as u64);
         if run.steps().is_multiple_of(options.every as usize) || run.steps() == steps {
+            run.checkpoint(&checkpoints)?;
             save(options, &run, &parts, &device)?;
         }
     }

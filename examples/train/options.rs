@@ -1,12 +1,12 @@
 //! What a stage is told on the command line.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use burn::tensor::{DType, Device};
 use clap::Args;
 use wake_ldm::device_named;
-use wake_ldm::train::{Rate, RunOptions, TrainerOptions};
+use wake_ldm::train::{Checkpoint, Rate, RunOptions, TrainerOptions};
 
 #[derive(Args, Clone)]
 pub(crate) struct Options {
@@ -22,7 +22,7 @@ pub(crate) struct Options {
     /// Go on from the newest checkpoint in --out
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Steps of the whole stage [default: words 4000, mean 10000, diffusion 20000]
+    /// Steps of the whole stage [default: words 4000, mean 6000, diffusion 6000]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: Option<u32>,
     /// Examples of a batch [default: words 128, mean 32, diffusion 8]
@@ -122,5 +122,16 @@ pub(crate) fn learning(
     Ok(match checkpointing {
         true => device.gradient_checkpointing(),
         false => device,
+    })
+}
+
+/// The checkpoint that --resume goes on from.
+pub(crate) fn newest(folder: &Path) -> Result<Checkpoint, Box<dyn Error>> {
+    Checkpoint::newest(folder)?.ok_or_else(|| {
+        format!(
+            "--resume: there is no checkpoint in {}; begin without it",
+            folder.display()
+        )
+        .into()
     })
 }

@@ -8,7 +8,7 @@ use burn::tensor::Device;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use wake_ldm::WakeSampler;
-use wake_ldm::conditioning::{Conditions, MapGrid, Vocabulary, tokens};
+use wake_ldm::conditioning::{Conditions, Vocabulary, tokens};
 use wake_ldm::dataset::{Pair, Prompts, Recipe, Simulated};
 use wake_ldm::small::{
     Flow, Known, PatchTransform, Prior, Reader, Shares, WakeModel, WakeModelConfig, expected_grey,
@@ -21,7 +21,7 @@ use wake_ldm::weights::{Layout, Precision, load, save_as};
 use wake_physics::Scene;
 use wake_text::Wording;
 
-use super::options::Options;
+use super::options::{Options, newest};
 use super::progress;
 use super::source::Source;
 
@@ -80,13 +80,13 @@ pub(crate) fn mean(options: &Options) -> Outcome<()> {
     let config = config(options)?;
     let patches = patches(options, &source, &config)?;
     let set = latents(&source, &patches, &config)?;
-    let steps = options.steps(10_000);
+    let steps = options.steps(6000);
     let devices = options.learning_devices()?;
     let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
     let mut run = Run::new("mean", &config, init, options.run(steps, 32), devices)?;
     let task = PriorTask {
         set: &set,
-        grid: grid(&config),
+        grid: config.grid(),
         seed: options.seed,
     };
     let examples = sheet_examples(&source)?;
@@ -117,20 +117,18 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
     };
     let set = latents(&source, &model.patches, &config)?;
     let bar = progress::bar(set.len() as u64, "residuals");
-    let set = set.residuals(&model.prior, grid(&config), |n| {
+    let set = set.residuals(&model.prior, config.grid(), |n| {
         bar.inc(n as u64);
     });
     bar.finish_and_clear();
-    let steps = options.steps(20_000);
+    let steps = options.steps(6000);
     let devices = options.learning_devices()?;
     let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
     let mut run = Run::new("diffusion", &config, init, options.run(steps, 8), devices)?;
-    let base = config.base_scene();
     let task = FlowTask {
         set: &set,
         patches: &model.patches,
-        base: &base,
-        grid: grid(&config),
+        config: &config,
         seed: options.seed,
     };
     let examples = sheet_examples(&source)?;
@@ -166,14 +164,8 @@ impl<'a> Stage<'a> {
     /// Reads the newest checkpoint where the run is to go on; nothing is written yet.
     fn new(name: &'static str, options: &'a Options) -> Outcome<Self> {
         options.devices()?;
-        let folder = options.checkpoints(name);
         let checkpoint = match options.resume {
-            true => Some(Checkpoint::newest(&folder)?.ok_or_else(|| {
-                format!(
-                    "--resume: there is no checkpoint in {}; begin without it",
-                    folder.display()
-                )
-            })?),
+            true => Some(newest(&options.checkpoints(name))?),
             false => None,
         };
         Ok(Self {
@@ -299,13 +291,6 @@ fn vocabulary() -> Result<Vocabulary, wake_text::Error> {
     Ok(Vocabulary::new(ids))
 }
 
-fn grid(config: &WakeModelConfig) -> MapGrid {
-    MapGrid {
-        size: config.image_size,
-        spacing: config.spacing,
-    }
-}
-
 /// Encodes all pairs and the images expected of their scenes, which then stay in memory.
 fn latents(
     source: &Source,
@@ -354,7 +339,7 @@ fn expected_images(
     let scenes = scenes_of(examples, config);
     let conditions: Vec<Conditions> = scenes.iter().map(Conditions::of_scene).collect();
     let wake = expected_latents(&scenes, patches)?;
-    let expected = prior.forward(&Known::new(&conditions, grid(config), wake));
+    let expected = prior.forward(&Known::new(&conditions, config.grid(), wake));
     let images = patches.decode(expected.mean, expected.grey).clamp(0.0, 1.0);
     let pixels: Vec<f32> = images.into_data().iter::<f32>().collect();
     let size = config.image_size * config.image_size;

@@ -90,10 +90,16 @@ fn a_model_in_diffusers_layout_is_fine_tuned_whole_and_by_low_rank_changes() {
     let set = folder.path().join("set");
     for (name, rank) in [("whole", None), ("changes", Some("2"))] {
         let out = folder.path().join(name);
-        let mut arguments = vec!["fine-tune", "--weights", weights, "--data", text(&set)];
-        arguments.extend(["--batch", "2", "--steps", "2", "--rate", "1e-3"]);
-        arguments.extend(rank.iter().flat_map(|rank| ["--rank", *rank]));
-        done("train", &arguments, &out);
+        // Two steps, then two more from the checkpoint.
+        for more in [&["--steps", "2"][..], &["--steps", "4", "--resume"]] {
+            let mut arguments = vec!["fine-tune", "--weights", weights, "--data", text(&set)];
+            arguments.extend(["--batch", "2", "--rate", "1e-3"]);
+            arguments.extend(more);
+            arguments.extend(rank.iter().flat_map(|rank| ["--rank", *rank]));
+            done("train", &arguments, &out);
+        }
+        let metrics = std::fs::read_to_string(out.join("fine_tune.jsonl")).expect("metrics");
+        assert_eq!(metrics.lines().count(), 4);
         let written = files(&out);
         let has = |path: &str| written.contains_key(Path::new(path));
         assert!(has("unet/diffusion_pytorch_model.safetensors") && has("model_index.json"));

@@ -13,14 +13,14 @@ use wake_physics::labels::Labels;
 use wake_physics::{Field, labels_of};
 use wake_text::{PartialScene, Wording};
 
-use crate::conditioning::{Conditions, MapGrid, Vocabulary};
+use crate::conditioning::{Conditions, Vocabulary};
 use crate::error::{Error, Result, check_range};
 use crate::noise::NoiseSource;
 use crate::small::{Expected, Known, WakeModel, WakeModelConfig, expected_latents, sea_noise};
 pub use image::{SampleSeconds, WakeImage};
 
 /// Steps from noise to image, unless others are asked for.
-const STEPS: usize = 8;
+const STEPS: usize = 4;
 
 /// What the model is told about a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -202,7 +202,7 @@ impl WakeSampler {
         let told = conditions.iter().zip(inputs);
         let scenes: Vec<Scene> = told.map(|(told, input)| told.onto(&input.scene)).collect();
         let wake = expected_latents(&scenes, &self.model.patches)?;
-        let known = Known::new(&conditions, self.grid(), wake);
+        let known = Known::new(&conditions, self.config.grid(), wake);
         let expected = self.model.prior.forward(&known);
         wait_for(&expected.mean);
         seconds.expect = begin.elapsed().as_secs_f64() - seconds.text;
@@ -222,13 +222,6 @@ impl WakeSampler {
             pixels,
             seconds,
         })
-    }
-
-    fn grid(&self) -> MapGrid {
-        MapGrid {
-            size: self.config.image_size,
-            spacing: self.config.spacing,
-        }
     }
 
     /// The numbers that images are drawn from; what is told of none is that of the base scene.

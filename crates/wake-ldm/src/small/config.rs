@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use wake_physics::Scene;
 
-use crate::conditioning::{FEATURES, Vocabulary};
+use crate::conditioning::{FEATURES, MapGrid, Vocabulary};
 use crate::error::{Error, Result, check_range};
 use crate::unet::UNetConfig;
 
@@ -109,6 +109,14 @@ impl WakeModelConfig {
         (scene.grid.rows, scene.grid.columns) = (self.image_size, self.image_size);
         scene.grid.spacing = self.spacing;
         scene
+    }
+
+    /// The pixels of an image.
+    pub fn grid(&self) -> MapGrid {
+        MapGrid {
+            size: self.image_size,
+            spacing: self.spacing,
+        }
     }
 
     /// Rows and columns of the latent image.

@@ -1,8 +1,12 @@
 //! Fine-tuning of a Stable Diffusion-layout model: the U-Net, or low-rank changes of it.
 
+use std::path::{Path, PathBuf};
+
 use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor, TensorData};
+use serde_json::{Value, json};
 
+use super::checkpoint::Checkpoint;
 use super::loss::min_snr_weights;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
 use crate::autoencoder::AutoencoderKl;
@@ -109,6 +113,43 @@ impl FineTune {
             Learning::Whole(trainer) => trainer.steps(),
             Learning::Changes(trainer, _) => trainer.steps(),
         }
+    }
+
+    /// Writes a checkpoint of what learns.
+    ///
+    /// # Errors
+    ///
+    /// As [`Checkpoint::write`].
+    pub fn checkpoint(&self, folder: &Path) -> Result<PathBuf> {
+        let checkpoint = match &self.learning {
+            Learning::Whole(trainer) => trainer.checkpoint(&self.state()),
+            Learning::Changes(trainer, _) => trainer.checkpoint(&self.state()),
+        };
+        checkpoint.write(folder)
+    }
+
+    /// Goes on where a checkpoint left off, on the same curve if the batches are the same.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidOption`](crate::Error::InvalidOption) for a checkpoint of another model, prediction, weighting or seed.
+    pub fn resume(&mut self, checkpoint: Checkpoint) -> Result<()> {
+        let state = self.state();
+        match &mut self.learning {
+            Learning::Whole(trainer) => trainer.restore(checkpoint, &state),
+            Learning::Changes(trainer, _) => trainer.restore(checkpoint, &state),
+        }
+    }
+
+    /// What two runs must have in common for one to go on from the other.
+    fn state(&self) -> Value {
+        json!({
+            "part": "fine-tune",
+            "prediction": format!("{:?}", self.options.prediction),
+            "snr_gamma": self.options.snr_gamma,
+            "seed": self.options.seed,
+            "low_rank": matches!(self.learning, Learning::Changes(..)),
+        })
     }
 
     /// The U-Net with averaged weights, or with averaged changes merged into it.

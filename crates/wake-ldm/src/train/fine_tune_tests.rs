@@ -65,7 +65,7 @@ fn batch(device: &Device) -> (Tensor<4>, Tensor<2, Int>) {
     (images, ids)
 }
 
-fn losses(mut run: FineTune, steps: usize) -> Vec<f64> {
+fn losses(run: &mut FineTune, steps: usize) -> Vec<f64> {
     let step = |_| {
         let (images, ids) = batch(&Device::flex());
         let report = run.step(images, ids);
@@ -90,7 +90,7 @@ fn noise_and_velocity_are_learnt() {
             FineTune::whole(unet.clone(), parts, options, &device.clone().autodiff())
         };
         // Both see the same draws, one of them without learning: step by step, only what is learnt differs.
-        let (learning, idle) = (losses(run(5e-3), 100), losses(run(0.0), 100));
+        let (learning, idle) = (losses(&mut run(5e-3), 100), losses(&mut run(0.0), 100));
         let gains: Vec<f64> = idle
             .iter()
             .zip(&learning)
@@ -129,6 +129,45 @@ fn low_rank_changes_leave_the_model_as_it_is() {
         .filter(|(a, b)| differ(a, b))
         .count();
     assert_eq!(different, changed.layers().len());
+}
+
+#[test]
+fn a_killed_run_goes_on_to_the_bit() {
+    let device = Device::flex();
+    let autodiff = device.clone().autodiff();
+    let (base, parts) = (unet(&device), frozen(&device));
+    for rank in [None, Some(2)] {
+        let run = |seed: u64| {
+            let parts = Frozen {
+                text: parts.text.clone(),
+                autoencoder: parts.autoencoder.clone(),
+                schedule: parts.schedule.clone(),
+            };
+            let options = FineTuneOptions {
+                seed,
+                ..options(Prediction::Epsilon, 1e-2)
+            };
+            let unet = base.clone();
+            match rank {
+                None => FineTune::whole(unet, parts, options, &autodiff),
+                Some(rank) => FineTune::low_rank(unet, rank, parts, options, &autodiff).unwrap(),
+            }
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let mut whole = run(1);
+        losses(&mut whole, 2);
+        whole.checkpoint(folder.path()).unwrap();
+        let newest = || Checkpoint::newest(folder.path()).unwrap().unwrap();
+        let mut second = run(1);
+        second.resume(newest()).unwrap();
+        assert_eq!(second.steps(), 2);
+        assert_eq!(
+            losses(&mut whole, 3),
+            losses(&mut second, 3),
+            "rank {rank:?}"
+        );
+        assert!(run(2).resume(newest()).is_err());
+    }
 }
 
 #[test]

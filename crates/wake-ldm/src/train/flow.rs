@@ -4,15 +4,14 @@ use std::f32::consts::FRAC_PI_2;
 use std::ops::Range;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use wake_physics::Scene;
 
 use super::latents::LatentSet;
 use super::loss::noise_level;
 use super::order::{examples, noise_of};
 use super::run::{Task, Terms, number};
-use crate::conditioning::{Conditions, MapGrid};
+use crate::conditioning::Conditions;
 use crate::noise::NoiseSource;
-use crate::small::{Flow, Known, PatchTransform, in_parallel, sea_noise};
+use crate::small::{Flow, Known, PatchTransform, WakeModelConfig, in_parallel, sea_noise};
 
 /// Learning the velocity of the flow by its squared error.
 ///
@@ -32,10 +31,8 @@ pub struct FlowTask<'a> {
     pub set: &'a LatentSet,
     /// What they were encoded with, outside autodiff.
     pub patches: &'a PatchTransform,
-    /// What the numbers of an example are put into to make its scene.
-    pub base: &'a Scene,
-    /// Pixels of the images.
-    pub grid: MapGrid,
+    /// The model.
+    pub config: &'a WakeModelConfig,
     /// Seed of order, noise and noise levels.
     pub seed: u64,
 }
@@ -45,8 +42,9 @@ impl FlowTask<'_> {
     fn noise(&self, conditions: &[Conditions], positions: Range<u64>) -> Tensor<4> {
         let pairs: Vec<(&Conditions, u64)> = conditions.iter().zip(positions).collect();
         let [channels, rows, columns] = self.set.shape();
+        let base = self.config.base_scene();
         let noise = in_parallel(&pairs, |&(conditions, position)| {
-            let scene = conditions.onto(self.base);
+            let scene = conditions.onto(&base);
             sea_noise(&[scene], &[noise_of(self.seed, position)], self.patches).unwrap_or_else(
                 |_| Tensor::full([1, channels, rows, columns], f32::NAN, &Device::default()),
             )
@@ -79,7 +77,7 @@ impl Task<Flow> for FlowTask<'_> {
         let x = residual.clone() * cos.clone() + noise.clone() * sin.clone();
         let target = noise * cos - residual * sin;
         let wake = self.set.expected(&indices, device);
-        let known = model.prepared(&Known::new(&conditions, self.grid, wake));
+        let known = model.prepared(&Known::new(&conditions, self.config.grid(), wake));
         let error = model.velocity(x, tensor(levels), &known) - target;
         let loss = error.square().mean();
         let terms = vec![("flow", number(&loss))];

@@ -18,6 +18,7 @@ mod loss;
 mod metrics;
 mod order;
 mod rate;
+mod restore;
 mod run;
 mod tensors;
 mod trainer;

@@ -5,17 +5,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use serde_json::{Value, json};
 
-use super::checkpoint::{Checkpoint, Tensors};
-use super::tensors::names;
+use super::checkpoint::Checkpoint;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
 use crate::error::{Error, Result};
 use crate::small::WakeModelConfig;
-
-/// Groups of a checkpoint's tensors.
-const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
 
 /// Parts of a loss by name.
 pub type Terms = Vec<(&'static str, f64)>;
@@ -93,37 +89,7 @@ impl<M: Module> Run<M> {
     ///
     /// [`Error::InvalidOption`] for a checkpoint of another part or model, or another seed or batch.
     pub fn resume(&mut self, checkpoint: Checkpoint) -> Result<()> {
-        if checkpoint.state != self.state {
-            return Err(Error::InvalidOption {
-                option: "checkpoint".to_owned(),
-                value: checkpoint.state.to_string(),
-                expected: self.state.to_string(),
-            });
-        }
-        let mut tensors = checkpoint.tensors;
-        let device = self.device().inner();
-        let names = names(self.trainer.model());
-        let mut group = |group: &str| -> Result<Vec<Tensor<1>>> {
-            let take = |(name, shape): &(String, Vec<usize>)| {
-                let name = format!("{group}.{name}");
-                let found = tensors.remove(&name).filter(|(found, _)| found == shape);
-                let (_, numbers) = found.ok_or_else(|| Error::InvalidOption {
-                    option: "checkpoint".to_owned(),
-                    value: format!("without {name} {shape:?}"),
-                    expected: "all tensors of the model".to_owned(),
-                })?;
-                let length = numbers.len();
-                Ok(Tensor::from_data(
-                    TensorData::new(numbers, [length]),
-                    &device,
-                ))
-            };
-            names.iter().map(take).collect()
-        };
-        let [a, b, c, d] = GROUPS;
-        let state = [group(a)?, group(b)?, group(c)?, group(d)?];
-        self.trainer.resume(state, checkpoint.step);
-        Ok(())
+        self.trainer.restore(checkpoint, &self.state)
     }
 
     /// Writes a checkpoint.
@@ -132,20 +98,7 @@ impl<M: Module> Run<M> {
     ///
     /// As [`Checkpoint::write`].
     pub fn checkpoint(&self, folder: &Path) -> Result<PathBuf> {
-        let names = names(self.trainer.model());
-        let mut tensors = Tensors::new();
-        for (group, values) in GROUPS.iter().zip(self.trainer.state()) {
-            for ((name, shape), value) in names.iter().zip(values) {
-                let numbers = value.into_data().iter::<f32>().collect();
-                tensors.insert(format!("{group}.{name}"), (shape.clone(), numbers));
-            }
-        }
-        let checkpoint = Checkpoint {
-            step: self.steps(),
-            state: self.state.clone(),
-            tensors,
-        };
-        checkpoint.write(folder)
+        self.trainer.checkpoint(&self.state).write(folder)
     }
 
     /// Steps made so far.
@@ -156,12 +109,6 @@ impl<M: Module> Run<M> {
     /// The part with averaged weights, outside autodiff.
     pub fn averaged(&self) -> M {
         self.trainer.averaged()
-    }
-
-    /// The device of the model.
-    fn device(&self) -> Device {
-        let devices = self.trainer.model().devices();
-        devices.into_iter().next().unwrap_or_default()
     }
 
     /// One step on the next batch; the terms are means over the batch.

@@ -9,7 +9,7 @@ use burn::module::Module;
 use burn::tensor::{DType, Device, Tensor};
 
 use super::*;
-use crate::conditioning::{Conditions, MapGrid, Vocabulary};
+use crate::conditioning::{Conditions, Vocabulary};
 use crate::dataset::{Prompts, Recipe, Simulated};
 use crate::small::{Flow, PatchTransform, WakeModelConfig};
 
@@ -25,13 +25,6 @@ fn config() -> WakeModelConfig {
         map_channels: 8,
         norm_groups: 8,
         ..WakeModelConfig::standard(&Vocabulary::new([1, 2]))
-    }
-}
-
-fn grid() -> MapGrid {
-    MapGrid {
-        size: SIZE,
-        spacing: 4.0,
     }
 }
 
@@ -107,12 +100,10 @@ fn advance(
     (set, patches): &(LatentSet, PatchTransform),
     steps: usize,
 ) -> Vec<f64> {
-    let base = config().base_scene();
     let task = FlowTask {
         set,
         patches,
-        base: &base,
-        grid: grid(),
+        config: &config(),
         seed: 5,
     };
     (0..steps).map(|_| run.step(&task).0.loss).collect()
@@ -234,7 +225,7 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     .unwrap();
     let task = PriorTask {
         set: &set,
-        grid: grid(),
+        grid: config().grid(),
         seed: 5,
     };
     let steps: Vec<(StepReport, Terms)> = (0..300).map(|_| run.step(&task)).collect();
@@ -244,7 +235,7 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     assert!(late < 0.9, "{late}");
     let count = set.len();
     let done = AtomicUsize::new(0);
-    let residuals = set.residuals(&run.averaged(), grid(), |n| {
+    let residuals = set.residuals(&run.averaged(), config().grid(), |n| {
         done.fetch_add(n, Relaxed);
     });
     assert_eq!(done.into_inner(), count);
