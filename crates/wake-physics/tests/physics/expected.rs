@@ -234,9 +234,12 @@ fn simulated_seas_of_small_modulation_have_the_covariance_of_the_linear_sea() {
             like > 0.97 && (level - 1.0).abs() < 0.3,
             "{assignments:?}: {like} {level}"
         );
-        let mut turned = scene.clone();
-        turned.sea.wind_toward += 70.0;
-        let other = likeness(&LinearSea::new(&turned).unwrap().covariance());
-        assert!(other < like - 0.05, "{assignments:?}: {other} {like}");
+        // Where R/V is large, waves along range are all that is left, wherever the wind blows.
+        if scene.radar.range_to_velocity < 50.0 {
+            let mut turned = scene.clone();
+            turned.sea.wind_toward += 70.0;
+            let other = likeness(&LinearSea::new(&turned).unwrap().covariance());
+            assert!(other < like - 0.05, "{assignments:?}: {other} {like}");
+        }
     }
 }
