@@ -102,7 +102,8 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// [`Error::Text`] for a prompt whose numbers contradict each other or are out of range.
+    /// [`Error::Text`] for a prompt whose numbers contradict each other or are out of range, [`Error::Scene`] for a scene
+    /// that physics refuses.
     pub fn sample(&self, prompt: &str, seed: u64) -> Result<WakeImage> {
         let mut images = self.sample_many(&[prompt], seed)?;
         Ok(images.swap_remove(0))
@@ -112,7 +113,7 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// As [`sample`](Self::sample).
+    /// As [`sample`](Self::sample), and [`Error::InvalidOption`] for no prompt.
     pub fn sample_many(&self, prompts: &[&str], seed: u64) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
         let input = |(k, prompt): (u64, &&str)| -> Result<Input> {
@@ -150,7 +151,8 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for a scene whose grid is not the model's, [`Error::Text`] for one that is not valid.
+    /// [`Error::InvalidOption`] for no scene, or one whose grid is not the model's, [`Error::Text`] for one that is not
+    /// valid.
     pub fn sample_batch(&self, scenes: &[Scene], seed: u64) -> Result<(Tensor<4>, Vec<Labels>)> {
         let inputs = self.inputs(scenes, seed)?;
         let drawn = self.run(&inputs, Instant::now())?;
@@ -196,6 +198,13 @@ impl WakeSampler {
 
     /// From noise to grey, all images at once.
     fn run(&self, inputs: &[Input], begin: Instant) -> Result<Drawn> {
+        if inputs.is_empty() {
+            return Err(Error::InvalidOption {
+                option: "images".to_owned(),
+                value: "0".to_owned(),
+                expected: "at least one prompt or scene".to_owned(),
+            });
+        }
         let mut seconds = SampleSeconds::default();
         let conditions = self.told(inputs);
         seconds.text = begin.elapsed().as_secs_f64();

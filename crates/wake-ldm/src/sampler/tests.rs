@@ -93,6 +93,7 @@ fn what_cannot_be_drawn_is_refused() {
         .to_string();
     assert!(message.contains("512 × 512 pixels of 2.5 m"), "{message}");
     assert!(sampler.sample("a ship at 900 m/s", 0).is_err());
+    assert!(sampler.sample_many(&[], 0).is_err() && sampler.sample_batch(&[], 0).is_err());
     let nowhere = WakeSampler::from_folder("no/such/folder".as_ref(), &Device::flex());
     assert!(nowhere.is_err());
 }

@@ -26,9 +26,9 @@ const STEPS: f64 = 1000.0;
 ///
 /// # References
 ///
-/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants: A Unifying Framework for Flows and Diffusions", Eq.
-/// 4.9 (the trigonometric interpolant); Salimans & Ho (2022), "Progressive Distillation for Fast Sampling of Diffusion
-/// Models", appendix D (v in terms of an angle).
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants: A Unifying Framework for Flows and Diffusions"
+/// (the trigonometric interpolant); Salimans & Ho (2022), "Progressive Distillation for Fast Sampling of Diffusion Models"
+/// (v in terms of an angle).
 #[derive(Module, Debug)]
 pub struct Flow {
     maps: Conv2d,

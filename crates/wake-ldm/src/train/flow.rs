@@ -23,8 +23,8 @@ use crate::small::{Flow, Known, PatchTransform, WakeModelConfig, in_parallel, se
 ///
 /// # References
 ///
-/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants", Eq. 2.13; Salimans & Ho (2022), "Progressive
-/// Distillation for Fast Sampling of Diffusion Models", section 4 (v).
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants"; Salimans & Ho (2022), "Progressive
+/// Distillation for Fast Sampling of Diffusion Models" (v).
 #[derive(Debug)]
 pub struct FlowTask<'a> {
     /// The residuals.

@@ -30,7 +30,8 @@ use crate::setup::Setup;
 ///
 /// # References
 ///
-/// Hasselmann & Hasselmann (1991), J. Geophys. Res. 96(C6), 10713, Eq. 45 (the factor of the sea's displacement).
+/// Hasselmann & Hasselmann (1991), J. Geophys. Res. 96(C6), 10713 (the factor of the
+/// sea's displacement in the quasi-linear transform).
 pub fn expected_intensity(scene: &Scene) -> Result<Field> {
     scene.validate()?;
     memory::keep_large_blocks();

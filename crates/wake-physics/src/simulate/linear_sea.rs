@@ -30,7 +30,7 @@ const LEAST_SHARE: f64 = 1e-6;
 ///
 /// # References
 ///
-/// Hasselmann & Hasselmann (1991), J. Geophys. Res. 96(C6), 10713, Eq. 56.
+/// Hasselmann & Hasselmann (1991), J. Geophys. Res. 96(C6), 10713 (the quasi-linear transform).
 #[derive(Debug, Clone)]
 pub struct LinearSea {
     rows: usize,
@@ -96,7 +96,7 @@ impl LinearSea {
         2 * self.period * self.period
     }
 
-    /// One sea, `[rows, columns]` of the image; its opposite edges are independent.
+    /// One sea, relative intensity \[1\], `[rows, columns]` of the image; its opposite edges are independent.
     ///
     /// # Panics
     ///
@@ -109,7 +109,7 @@ impl LinearSea {
         self.sum(waves.collect(), [self.rows, self.columns])
     }
 
-    /// Covariance of two pixels by their distance in rows and columns, `[period, period]`, negative ones from the end.
+    /// Covariance \[1\] of two pixels by their distance in rows and columns, `[period, period]`, negative ones from the end.
     #[must_use]
     pub fn covariance(&self) -> Field {
         let waves = self.amplitudes.iter().map(|a| Complex32::new(a * a, 0.0));

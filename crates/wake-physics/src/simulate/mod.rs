@@ -1,4 +1,4 @@
-//! From a scene to a SAR image: the only file that knows the order of the stages.
+//! From a scene to a SAR image: this file and `expected` alone know the order of the stages.
 //!
 //! `stages` calls the method of each stage, `label` says what is where, `clock` times, `report` writes what came out.
 

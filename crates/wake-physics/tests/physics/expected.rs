@@ -92,6 +92,7 @@ fn the_mean_over_seas_is_the_expected_image() {
         let correlation = found.correlation() / reliable.sqrt();
         let slope = found.covariance / found.variance[0];
         let level = found.mean[0] / found.mean[1];
+        println!("{assignments:?}: correlation {correlation:.3} slope {slope:.3} level {level:.3}");
         // Neglected is what sea and wake do to each other: of second order in the sea's modulation, 0.1 to 0.2 here.
         assert!(
             correlation > 0.95 && (slope - 1.0).abs() < 0.05 && (level - 1.0).abs() < 0.03,
@@ -230,6 +231,7 @@ fn simulated_seas_of_small_modulation_have_the_covariance_of_the_linear_sea() {
         // Modulations of 0.05 to 0.25, so that the second order has up to a quarter of the first; imaging spreads a
         // source over two columns and at least a pixel of rows, which takes from the shortest waves.
         let (like, level) = (likeness(&stated), sums[0] / f64::from(stated.values[0]));
+        println!("{assignments:?}: likeness {like:.3} variance {level:.3}");
         assert!(
             like > 0.97 && (level - 1.0).abs() < 0.3,
             "{assignments:?}: {like} {level}"
