@@ -1,6 +1,7 @@
 //! What the image of a scene is on average, over all its seas.
 
 use super::Method;
+use super::clock::{Clock, Seconds};
 use super::stages::Run;
 use crate::error::Result;
 use crate::memory;
@@ -48,10 +49,6 @@ pub fn expected_intensity(scene: &Scene) -> Result<Field> {
         plan.change(&with, &[Term::Sea]);
     }
     let run = Run::new(scene, &setup, &plan, Method::Fast);
-    let (mut fields, _) = run.sea(&plan);
-    run.add_wake(&plan, &mut fields);
-    let damping = run.damping(&plan);
-    let (sigma0, _) = run.sigma0(&plan, &fields, damping.as_ref());
-    let radial_velocity = fields.radial_velocity(setup.incidence);
-    Ok(run.image(&plan, &sigma0, &radial_velocity, &fields))
+    let (mut clock, mut seconds) = (Clock::start(), Seconds::default());
+    Ok(run.draw(&plan, &mut clock, &mut seconds).intensity)
 }

@@ -1,6 +1,6 @@
-//! From a scene to a SAR image: this file and `expected` alone know the order of the stages.
+//! From a scene to a SAR image: `stages` alone knows the order of the stages.
 //!
-//! `stages` calls the method of each stage, `label` says what is where, `clock` times, `report` writes what came out.
+//! It calls the method of each stage, `label` says what is where, `clock` times, `report` writes what came out.
 
 use crate::error::Result;
 use crate::labels::Labels;
@@ -95,31 +95,18 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
     let mut plan = Plan::of(scene, &setup)?;
     let run = Run::new(scene, &setup, &plan, method);
     seconds.plan = clock.lap();
-    let (mut fields, lattice) = run.sea(&plan);
-    plan.sizes.sea_lattice = lattice;
-    seconds.sea = clock.lap();
-    run.add_wake(&plan, &mut fields);
-    seconds.kelvin = clock.lap();
-    let damping = run.damping(&plan);
-    seconds.turbulent = clock.lap();
-    let (sigma0, table) = run.sigma0(&plan, &fields, damping.as_ref());
-    plan.sizes.table = table;
-    seconds.backscatter = clock.lap();
-    let radial_velocity = fields.radial_velocity(setup.incidence);
-    let intensity = run.image(&plan, &sigma0, &radial_velocity, &fields);
-    seconds.imaging = clock.lap();
-    let speckled = run.speckle(&plan, &intensity);
+    let drawn = run.draw(&plan, &mut clock, &mut seconds);
+    [plan.sizes.sea_lattice, plan.sizes.table] = drawn.sizes;
+    let speckled = run.speckle(&plan, &drawn.intensity);
     seconds.speckle = clock.lap();
     let labels = labels_of(scene);
-    let [
-        elevation,
-        slope_x,
-        slope_y,
-        velocity_x,
-        velocity_y,
-        velocity_z,
-    ] = fields.outputs.map(|field| run.crop(field));
-    let (radial_velocity, sigma0) = (run.crop(radial_velocity), run.crop(sigma0));
+    let crop = |field| run.crop(field);
+    let (radial_velocity, sigma0) = (crop(drawn.radial_velocity), crop(drawn.sigma0));
+    let fields = drawn.fields;
+    let [elevation, slope_x, slope_y] =
+        [fields.elevation, fields.slope_x, fields.slope_y].map(crop);
+    let [velocity_x, velocity_y, velocity_z] =
+        [fields.velocity_x, fields.velocity_y, fields.velocity_z].map(crop);
     seconds.labels = clock.lap();
     seconds.total = clock.total();
     Ok(Simulation {
@@ -132,7 +119,7 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
         velocity_z,
         radial_velocity,
         sigma0,
-        intensity,
+        intensity: drawn.intensity,
         speckled,
         labels,
         plan,

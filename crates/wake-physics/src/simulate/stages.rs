@@ -1,6 +1,7 @@
 //! One function a stage: what it takes from the plan, and which method it calls.
 
 use super::Method;
+use super::clock::{Clock, Seconds};
 use super::label::echo_displacement;
 use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
@@ -50,12 +51,34 @@ pub(super) struct Run<'a> {
 
 /// Linear fields of the surface on the raster with its margin.
 pub(super) struct SurfaceFields {
-    /// In the order of [`OUTPUTS`].
-    pub(super) outputs: [Field; 6],
-    /// Acceleration toward the radar, where coherence counts.
+    /// ζ \[m\].
+    pub(super) elevation: Field,
+    /// ∂ζ/∂x \[1\].
+    pub(super) slope_x: Field,
+    /// ∂ζ/∂y \[1\].
+    pub(super) slope_y: Field,
+    /// Of the water along x [m/s].
+    pub(super) velocity_x: Field,
+    /// Of the water along y [m/s].
+    pub(super) velocity_y: Field,
+    /// Of the water upward [m/s].
+    pub(super) velocity_z: Field,
+    /// Acceleration toward the radar [m/s²], where coherence counts.
     acceleration: Option<Field>,
-    /// Hydrodynamic modulation, where it counts.
+    /// Hydrodynamic modulation \[1\], where it counts.
     modulation: Option<Field>,
+}
+
+/// What a scene looks like before speckle, on the raster with its margin but for the image.
+pub(super) struct Drawn {
+    pub(super) fields: SurfaceFields,
+    /// Velocity toward the radar [m/s].
+    pub(super) radial_velocity: Field,
+    pub(super) sigma0: Field,
+    /// Intensity of the image.
+    pub(super) intensity: Field,
+    /// Sizes of the lattice of the sea, and of the table of σ⁰.
+    pub(super) sizes: [[usize; 2]; 2],
 }
 
 impl<'a> Run<'a> {
@@ -78,12 +101,34 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// All stages up to the intensity before speckle, in their order; `clock` runs since the plan was made.
+    pub(super) fn draw(&self, plan: &Plan, clock: &mut Clock, seconds: &mut Seconds) -> Drawn {
+        let (mut fields, lattice) = self.sea(plan);
+        seconds.sea = clock.lap();
+        self.add_wake(plan, &mut fields);
+        seconds.kelvin = clock.lap();
+        let damping = self.damping(plan);
+        seconds.turbulent = clock.lap();
+        let (sigma0, table) = self.sigma0(plan, &fields, damping.as_ref());
+        seconds.backscatter = clock.lap();
+        let radial_velocity = fields.radial_velocity(self.setup.incidence);
+        let intensity = self.image(plan, &sigma0, &radial_velocity, &fields);
+        seconds.imaging = clock.lap();
+        Drawn {
+            fields,
+            radial_velocity,
+            sigma0,
+            intensity,
+            sizes: [lattice, table],
+        }
+    }
+
     fn field_tolerance(&self) -> f64 {
         (SHARE_OF_FIELDS * self.scene.model.tolerance).max(1e-6)
     }
 
     /// The sea, and the size of its lattice.
-    pub(super) fn sea(&self, plan: &Plan) -> (SurfaceFields, [usize; 2]) {
+    fn sea(&self, plan: &Plan) -> (SurfaceFields, [usize; 2]) {
         let flat = || vec![Field::constant(&self.raster, 0.0); self.quantities.len()];
         if !plan.uses(Term::Sea) {
             return (self.collect(flat(), plan), [0, 0]);
@@ -108,14 +153,19 @@ impl<'a> Run<'a> {
                 .unwrap_or_else(|| Field::constant(&self.raster, 0.0))
         };
         SurfaceFields {
-            outputs: std::array::from_fn(|_| next()),
+            elevation: next(),
+            slope_x: next(),
+            slope_y: next(),
+            velocity_x: next(),
+            velocity_y: next(),
+            velocity_z: next(),
             acceleration: plan.uses(Term::Coherence).then(&mut next),
             modulation: plan.uses(Term::Hydrodynamic).then(&mut next),
         }
     }
 
     /// Adds the Kelvin wake, faded over the hull.
-    pub(super) fn add_wake(&self, plan: &Plan, fields: &mut SurfaceFields) {
+    fn add_wake(&self, plan: &Plan, fields: &mut SurfaceFields) {
         let Some(wake) = self.setup.wake.as_ref().filter(|_| plan.uses(Term::Kelvin)) else {
             return;
         };
@@ -140,7 +190,7 @@ impl<'a> Run<'a> {
     }
 
     /// What the turbulent wake leaves of the short waves.
-    pub(super) fn damping(&self, plan: &Plan) -> Option<Field> {
+    fn damping(&self, plan: &Plan) -> Option<Field> {
         let wake = self
             .setup
             .wake
@@ -156,7 +206,7 @@ impl<'a> Run<'a> {
     }
 
     /// σ⁰, and the size of its table.
-    pub(super) fn sigma0(
+    fn sigma0(
         &self,
         plan: &Plan,
         fields: &SurfaceFields,
@@ -166,8 +216,8 @@ impl<'a> Run<'a> {
             .setup
             .backscatter(plan.uses(Term::TiltAverage), plan.uses(Term::Specular));
         let facets = FacetFields {
-            slope_x: &fields.outputs[1],
-            slope_y: &fields.outputs[2],
+            slope_x: &fields.slope_x,
+            slope_y: &fields.slope_y,
             modulation: fields.modulation.as_ref(),
             damping,
         };
@@ -180,7 +230,7 @@ impl<'a> Run<'a> {
     }
 
     /// Intensity of the image before speckle.
-    pub(super) fn image(
+    fn image(
         &self,
         plan: &Plan,
         sigma0: &Field,
@@ -192,7 +242,7 @@ impl<'a> Run<'a> {
             sigma0,
             radial_velocity: plan.uses(Term::Bunching).then_some(radial_velocity),
             radial_acceleration: fields.acceleration.as_ref(),
-            elevation: plan.uses(Term::RangeBunching).then_some(&fields.outputs[0]),
+            elevation: plan.uses(Term::RangeBunching).then_some(&fields.elevation),
         };
         let at_rest = AzimuthResolution::at_rest(self.setup.azimuth_resolution, 1);
         let imaging = Imaging {
@@ -248,17 +298,23 @@ impl<'a> Run<'a> {
 }
 
 impl SurfaceFields {
+    /// In the order of a run's quantities.
     fn all(&mut self) -> impl Iterator<Item = &mut Field> {
-        let more = self
-            .acceleration
-            .iter_mut()
-            .chain(self.modulation.iter_mut());
-        self.outputs.iter_mut().chain(more)
+        let outputs = [
+            &mut self.elevation,
+            &mut self.slope_x,
+            &mut self.slope_y,
+            &mut self.velocity_x,
+            &mut self.velocity_y,
+            &mut self.velocity_z,
+        ];
+        let more = self.acceleration.iter_mut().chain(&mut self.modulation);
+        outputs.into_iter().chain(more)
     }
 
     /// Velocity toward the radar.
-    pub(super) fn radial_velocity(&self, incidence: f64) -> Field {
-        let [vx, vz] = [&self.outputs[3], &self.outputs[5]];
+    fn radial_velocity(&self, incidence: f64) -> Field {
+        let [vx, vz] = [&self.velocity_x, &self.velocity_z];
         let (sin, cos) = (incidence.sin() as f32, incidence.cos() as f32);
         let values = vx.values.par_iter().zip(&vz.values).with_min_len(1 << 14);
         Field {
