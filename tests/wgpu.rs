@@ -14,10 +14,11 @@ use std::path::{Path, PathBuf};
 use burn::tensor::{Device, DeviceKind, Int, Tensor, TensorData};
 use golden::{Golden, difference, folder, json, largest, numbers};
 use serde_json::Value;
+use wake_ldm::autoencoder::AutoencoderKl;
 use wake_ldm::pipeline::{Pipeline, Request, to_bytes};
 use wake_ldm::scheduler::SchedulerConfig;
-use wake_ldm::unet::UNetInput;
-use wake_ldm::weights;
+use wake_ldm::text::ClipText;
+use wake_ldm::unet::{UNet, UNetInput};
 
 fn device() -> Device {
     Device::wgpu(DeviceKind::DefaultDevice)
@@ -50,7 +51,7 @@ fn smallest(class: &str) -> (PathBuf, Golden) {
 fn the_u_net_agrees_with_torch() {
     let device = device();
     let (path, golden) = smallest("UNet2DConditionModel");
-    let (unet, _) = weights::load_unet(&path, &device).unwrap();
+    let unet = UNet::from_folder(&path, &device).unwrap();
     let steps: Vec<f32> = golden.i64s("timestep").iter().map(|&t| t as f32).collect();
     let out = unet.forward(UNetInput {
         sample: golden.tensor("sample", &device),
@@ -65,7 +66,7 @@ fn the_u_net_agrees_with_torch() {
 fn the_autoencoder_agrees_with_torch() {
     let device = device();
     let (path, golden) = smallest("AutoencoderKL");
-    let (vae, _) = weights::load_autoencoder(&path, &device).unwrap();
+    let vae = AutoencoderKl::from_folder(&path, &device).unwrap();
     let moments = vae.moments(golden.tensor("image", &device));
     let decoded = vae.decode(golden.tensor("z_in", &device));
     expect("moments", &numbers(&moments), &golden.f32s("moments_ref"));
@@ -76,7 +77,7 @@ fn the_autoencoder_agrees_with_torch() {
 fn the_text_encoder_agrees_with_transformers() {
     let device = device();
     let (path, golden) = smallest("CLIPTextModel");
-    let (text, _) = weights::load_text_encoder(&path, &device).unwrap();
+    let text = ClipText::from_folder(&path, &device).unwrap();
     let ids = TensorData::new(golden.i64s("input_ids"), golden.shape("input_ids"));
     let output = text.forward(Tensor::<2, Int>::from_data(ids, &device));
     let last = golden.f32s("last_hidden_state_ref");

@@ -31,12 +31,12 @@ impl Model {
 impl ImageSource for Model {
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
         let (told, wording) = match told {
-            Told::Both => (sampler::Told::Both, Wording::Paper),
-            Told::Text => (sampler::Told::Words, Wording::Paper),
-            Told::Numbers => (sampler::Told::Numbers, Wording::Paper),
-            Told::Paraphrase => (sampler::Told::Words, Wording::WindFirst),
+            Told::Both => (sampler::Conditioning::Both, Wording::Paper),
+            Told::Text => (sampler::Conditioning::Words, Wording::Paper),
+            Told::Numbers => (sampler::Conditioning::Numbers, Wording::Paper),
+            Told::Paraphrase => (sampler::Conditioning::Words, Wording::WindFirst),
         };
-        let sampler = self.0.clone().with_told(told);
+        let sampler = self.0.clone().with_conditioning(told);
         let mut images = Vec::with_capacity(scenes.len());
         // The sampler counts seeds up within a batch.
         for batch in scenes.chunk_by(|one, next| next.seed == one.seed.wrapping_add(1)) {

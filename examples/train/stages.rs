@@ -10,9 +10,9 @@ use serde_json::{Map, Value, json};
 use wake_ldm::WakeSampler;
 use wake_ldm::conditioning::{Conditions, Vocabulary, tokens};
 use wake_ldm::dataset::{Pair, Prompts, Recipe, Simulated};
-use wake_ldm::small::{
-    Flow, Known, PatchTransform, Prior, Reader, Shares, WakeModel, WakeModelConfig, expected_grey,
-    expected_latents,
+use wake_ldm::network::{
+    Flow, Known, PatchTransform, Prior, PromptParser, Shares, WakeModel, WakeModelConfig,
+    expected_grey, expected_latents,
 };
 use wake_ldm::train::{
     Checkpoint, Example, FlowTask, LatentSet, Metrics, PriorTask, Run, Task, WordsTask,
@@ -64,14 +64,14 @@ pub(crate) fn words(options: &Options) -> Outcome<()> {
     let vocabulary = Vocabulary::new(config.vocabulary.iter().copied());
     let steps = options.steps(4000);
     let devices = options.learning_devices()?;
-    let init = |config: &WakeModelConfig, device: &Device| config.init_reader(device);
+    let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
     let mut run = Run::new("words", &config, init, options.run(steps, 128), devices)?;
     let task = WordsTask {
         prompts: &prompts,
         vocabulary: &vocabulary,
     };
     let file = options.out.join("reader.safetensors");
-    stage.train(&mut run, steps, &task, |_: &Run<Reader>| Ok(()))?;
+    stage.train(&mut run, steps, &task, |_: &Run<PromptParser>| Ok(()))?;
     Ok(keep(&run.averaged(), &file)?)
 }
 
@@ -111,7 +111,7 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
     let device = options.devices()?.remove(0);
     let model = WakeModel {
         patches: patches(options, &source, &config)?,
-        reader: part(config.init_reader(&device), options, "reader.safetensors")?,
+        parser: part(config.init_parser(&device), options, "reader.safetensors")?,
         prior: part(config.init_prior(&device), options, "prior.safetensors")?,
         flow: config.init_flow(&device),
     };

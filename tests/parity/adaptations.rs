@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use wake_ldm::Error;
-use wake_ldm::unet::{UNetConfig, UNetInput};
-use wake_ldm::weights::{self, Layout};
+use wake_ldm::lora::merge_lora;
+use wake_ldm::text::ClipText;
+use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
+use wake_ldm::weights::Layout;
 
 use crate::golden::{Golden, devices, expect, largest, numbers, own_folder};
 
@@ -43,9 +45,8 @@ fn adaptations_are_merged() {
             let file = folder.join("pytorch_lora_weights.safetensors");
             let golden = Golden::read(&folder.join("case.safetensors"));
             for (scale, name) in [(1.0, "out"), (0.5, "out_half"), (0.0, "out_plain")] {
-                let (unet, _) = weights::load_unet(&models.join("unet"), &device).unwrap();
-                let unet =
-                    weights::merge_lora(unet, Layout::Diffusers, "unet", &file, scale).unwrap();
+                let unet = UNet::from_folder(&models.join("unet"), &device).unwrap();
+                let unet = merge_lora(unet, Layout::Diffusers, "unet", &file, scale).unwrap();
                 let out = numbers(&unet.forward(input(&golden, &device)));
                 let what = format!("{backend} {} {name}", folder.display());
                 let expected = golden.f32s(name);
@@ -60,8 +61,8 @@ fn adaptations_are_merged() {
 }
 
 fn check_text(golden: &Golden, model: &std::path::Path, file: &std::path::Path, device: &Device) {
-    let (text, _) = weights::load_text_encoder(model, device).unwrap();
-    let text = weights::merge_lora(text, Layout::ClipText, "text_encoder", file, 1.0).unwrap();
+    let text = ClipText::from_folder(model, device).unwrap();
+    let text = merge_lora(text, Layout::ClipText, "text_encoder", file, 1.0).unwrap();
     let ids = TensorData::new(golden.i64s("text_ids"), golden.shape("text_ids"));
     let out = text.forward(Tensor::<2, Int>::from_data(ids, device));
     let expected = golden.f32s("text_out");
@@ -74,14 +75,15 @@ fn adaptations_of_other_models_are_refused() {
     let (_, models) = adaptations();
     let file = own_folder().join("lora/pytorch_lora_weights.safetensors");
     let (_, device) = devices().remove(0);
-    let (unet, config) = weights::load_unet(&models.join("unet"), &device).unwrap();
-    let absent = weights::merge_lora(unet, Layout::Diffusers, "text_encoder", &file, 1.0);
+    let unet = UNet::from_folder(&models.join("unet"), &device).unwrap();
+    let config = unet.config().clone();
+    let absent = merge_lora(unet, Layout::Diffusers, "text_encoder", &file, 1.0);
     assert!(matches!(absent, Err(Error::WeightsMismatch { .. })));
     let other = UNetConfig {
         cross_attention_dim: 5,
         ..config
     };
-    let misfit = weights::merge_lora(other.init(&device), Layout::Diffusers, "unet", &file, 1.0);
+    let misfit = merge_lora(other.init(&device), Layout::Diffusers, "unet", &file, 1.0);
     let Err(Error::WeightsMismatch { mismatch, .. }) = misfit else {
         panic!("it fitted")
     };

@@ -2,7 +2,7 @@
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Device, Gradients, Tensor};
-use wake_ldm::unet::UNetInput;
+use wake_ldm::unet::{UNet, UNetInput};
 use wake_ldm::weights::{self, Layout};
 
 use crate::golden::{Golden, devices, difference, folder, json, numbers};
@@ -70,7 +70,7 @@ fn gradients_agree_with_torch() {
 
 fn check(folder: &std::path::Path, what: &str, relative: f64, device: &Device) {
     let device = device.clone().autodiff();
-    let (unet, _) = weights::load_unet(folder, &device).unwrap();
+    let unet = UNet::from_folder(folder, &device).unwrap();
     let case = Golden::read(&folder.join("case00.safetensors"));
     let expected = Golden::read(&folder.join("grad_case00.safetensors"));
     let norms = json(&folder.join("grad_case00_norms.json"));

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use serde_json::Value;
-use wake_ldm::autoencoder::AutoencoderKlConfig;
-use wake_ldm::text::ClipTextConfig;
-use wake_ldm::unet::{UNetConfig, UNetInput};
+use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
+use wake_ldm::text::{ClipText, ClipTextConfig};
+use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
 use wake_ldm::weights::{self, Layout};
 
 use crate::golden::{Golden, devices, expect, folder, json, numbers};
@@ -26,7 +26,7 @@ fn ids(golden: &Golden, device: &Device) -> Tensor<2, Int> {
 }
 
 fn check_unet(folder: &Path, model: &Value, cases: &[(String, Golden)], device: &Device) {
-    let (unet, _) = weights::load_unet(folder, device).unwrap();
+    let unet = UNet::from_folder(folder, device).unwrap();
     for (name, golden) in cases {
         let timesteps: Vec<f32> = golden.i64s("timestep").iter().map(|&t| t as f32).collect();
         let count = timesteps.len();
@@ -46,7 +46,7 @@ fn check_unet(folder: &Path, model: &Value, cases: &[(String, Golden)], device: 
 }
 
 fn check_autoencoder(folder: &Path, model: &Value, cases: &[(String, Golden)], device: &Device) {
-    let (vae, _) = weights::load_autoencoder(folder, device).unwrap();
+    let vae = AutoencoderKl::from_folder(folder, device).unwrap();
     let [encode, decode] =
         ["encode", "decode"].map(|way| allowed(model, &format!("noise_floor_{way}")));
     for (name, golden) in cases {
@@ -90,7 +90,7 @@ fn check_autoencoder(folder: &Path, model: &Value, cases: &[(String, Golden)], d
 }
 
 fn check_text(folder: &Path, model: &Value, cases: &[(String, Golden)], device: &Device) {
-    let (text, _) = weights::load_text_encoder(folder, device).unwrap();
+    let text = ClipText::from_folder(folder, device).unwrap();
     let allowed = allowed(model, "noise_floor");
     for (name, golden) in cases {
         let output = text.forward(ids(golden, device));

@@ -2,6 +2,7 @@
 
 use burn::tensor::{DType, Tensor};
 use wake_ldm::Error;
+use wake_ldm::autoencoder::AutoencoderKl;
 use wake_ldm::unet::UNetInput;
 use wake_ldm::weights::{self, Layout, Precision};
 
@@ -65,8 +66,8 @@ fn weights_are_written_in_every_precision() {
             precision,
         )
         .unwrap();
-        let (back, again) = weights::load_autoencoder(&folder, &device).unwrap();
-        assert_eq!(again, config, "the configuration comes back");
+        let back = AutoencoderKl::from_folder(&folder, &device).unwrap();
+        assert_eq!(back.config(), &config, "the configuration comes back");
         assert_eq!(
             std::fs::read_dir(&folder).unwrap().count(),
             2,

@@ -18,6 +18,7 @@ use wake_ldm::nn::resample::{Downsample, Upsample};
 use wake_ldm::nn::resnet::{ResnetBlock, ResnetShape};
 use wake_ldm::nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
 use wake_ldm::nn::transformer::{Transformer2d, TransformerShape};
+use wake_ldm::text::ClipText;
 use wake_ldm::weights::{self, Layout};
 
 use crate::golden::{Golden, devices, expect, folder, json, largest, numbers};
@@ -256,7 +257,7 @@ impl Tap<'_> {
 
 /// The layers of a text encoder, one after the other: all that can be seen of it from outside.
 fn check_text(path: &Path, taps: &Golden, what: &str, device: &Device) -> usize {
-    let (text, _) = weights::load_text_encoder(path, device).unwrap();
+    let text = ClipText::from_folder(path, device).unwrap();
     let name = "text_model.embeddings::in_input_ids";
     let ids = || -> Tensor<2, Int> {
         Tensor::from_data(TensorData::new(taps.i64s(name), taps.shape(name)), device)

@@ -1,7 +1,6 @@
 //! Autoencoders run tile by tile, against diffusers.
 
-use wake_ldm::autoencoder::Tiling;
-use wake_ldm::weights;
+use wake_ldm::autoencoder::{AutoencoderKl, Tiling};
 
 use crate::golden::{Golden, devices, expect, json, numbers, own_folder};
 
@@ -16,7 +15,7 @@ fn tiles_are_cut_and_joined_as_diffusers_does() {
     let cases = manifest["cases"].as_object().unwrap();
     assert!(!cases.is_empty(), "no cases in {}", folder.display());
     for (backend, device) in devices() {
-        let (vae, _) = weights::load_autoencoder(&model, &device).unwrap();
+        let vae = AutoencoderKl::from_folder(&model, &device).unwrap();
         for (name, case) in cases {
             let golden = Golden::read(&folder.join(format!("{name}.safetensors")));
             let tiling = Tiling {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Tensor;
 use serde_json::{Map, Value, json};
-use wake_ldm::unet::{UNetConfig, UNetInput};
+use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
 use wake_ldm::weights::{self, Layout};
 use wake_ldm::{Error, Mismatch};
 
@@ -23,7 +23,7 @@ fn some_unet() -> PathBuf {
 fn what_is_written_is_what_was_read() {
     let folder = some_unet();
     let (_, device) = devices().remove(0);
-    let (unet, _) = weights::load_unet(&folder, &device).unwrap();
+    let unet = UNet::from_folder(&folder, &device).unwrap();
     let written = tempfile::tempdir().unwrap();
     let path = written.path().join("diffusion_pytorch_model.safetensors");
     weights::save(&unet, Layout::Diffusers, &path).unwrap();
@@ -184,7 +184,7 @@ fn shards_are_read_through_their_index() {
         path
     };
     let load = || weights::load(config.init(&device), Layout::Diffusers, temporary.path());
-    let whole = weights::load_unet(&folder, &device).unwrap().0;
+    let whole = UNet::from_folder(&folder, &device).unwrap();
     let input = |x: f64| UNetInput {
         sample: Tensor::full([1, config.in_channels, 8, 8], x, &device),
         timesteps: Tensor::full([1], 7.0, &device),

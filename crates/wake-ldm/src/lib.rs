@@ -3,25 +3,17 @@
 
 mod device;
 mod error;
+mod files;
 mod options;
 
+pub mod metrics;
 pub mod nn;
 pub mod noise;
-
-pub mod autoencoder;
-pub mod text;
 pub mod unet;
-
-pub mod scheduler;
 pub mod weights;
 
-pub mod conditioning;
-pub mod small;
-
-pub mod pipeline;
-pub mod sampler;
-
-pub mod metrics;
+mod stable_diffusion;
+mod wake_model;
 
 #[cfg(feature = "train")]
 pub mod dataset;
@@ -32,6 +24,8 @@ mod self_check;
 
 pub use device::device_named;
 pub use error::{Error, Mismatch, Misshapen, Result};
-pub use sampler::WakeSampler;
 #[cfg(feature = "flex")]
 pub use self_check::self_check;
+pub use stable_diffusion::{autoencoder, lora, pipeline, scheduler, text};
+pub use wake_model::sampler::WakeSampler;
+pub use wake_model::{conditioning, network, sampler};

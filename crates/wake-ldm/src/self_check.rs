@@ -3,10 +3,10 @@
 use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 
-use crate::autoencoder::AutoencoderKlConfig;
 use crate::error::{Error, Result};
 use crate::noise::{NoiseSource, normal_batch};
-use crate::text::ClipTextConfig;
+use crate::stable_diffusion::autoencoder::AutoencoderKlConfig;
+use crate::stable_diffusion::text::ClipTextConfig;
 use crate::unet::{UNetConfig, UNetInput};
 
 /// Allowed difference, relative to the largest value: what half-precision fragments in a GPU's matrix

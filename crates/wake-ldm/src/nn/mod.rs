@@ -9,6 +9,7 @@ mod kernels;
 pub mod norm;
 #[cfg(feature = "flex")]
 mod operation;
+pub mod patch;
 pub mod resample;
 pub mod resnet;
 pub mod timestep;

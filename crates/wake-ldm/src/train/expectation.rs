@@ -8,8 +8,8 @@ use super::latents::LatentSet;
 use super::order::examples;
 use super::run::{Task, Terms, number};
 use crate::conditioning::{Conditions, MapGrid, WEDGE, places};
+use crate::network::{Known, Prior};
 use crate::noise::NoiseSource;
-use crate::small::{Known, Prior};
 
 /// Stream that latent pixels are drawn from.
 const CELL_STREAM: u32 = 2001;

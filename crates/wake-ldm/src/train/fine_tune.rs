@@ -11,11 +11,12 @@ use super::loss::min_snr_weights;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
 use crate::autoencoder::AutoencoderKl;
 use crate::error::Result;
+use crate::lora::LowRank;
 use crate::noise::{NoiseSource, POSTERIOR_STREAM, normal_batch};
 use crate::scheduler::{NoiseLevel, NoiseSchedule, Prediction};
 use crate::text::ClipText;
 use crate::unet::{UNet, UNetInput};
-use crate::weights::{Layout, LowRank};
+use crate::weights::Layout;
 
 /// Streams of random numbers.
 const STEP_STREAM: u32 = 2100;

@@ -4,14 +4,15 @@ use std::f32::consts::FRAC_PI_2;
 use std::ops::Range;
 
 use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
 
 use super::latents::LatentSet;
 use super::loss::noise_level;
 use super::order::{examples, noise_of};
 use super::run::{Task, Terms, number};
 use crate::conditioning::Conditions;
+use crate::network::{Flow, Known, PatchTransform, WakeModelConfig, sea_noise};
 use crate::noise::NoiseSource;
-use crate::small::{Flow, Known, PatchTransform, WakeModelConfig, in_parallel, sea_noise};
 
 /// Learning the velocity of the flow by its squared error.
 ///
@@ -43,13 +44,13 @@ impl FlowTask<'_> {
         let pairs: Vec<(&Conditions, u64)> = conditions.iter().zip(positions).collect();
         let [channels, rows, columns] = self.set.shape();
         let base = self.config.base_scene();
-        let noise = in_parallel(&pairs, |&(conditions, position)| {
+        let noise = pairs.par_iter().map(|&(conditions, position)| {
             let scene = conditions.onto(&base);
             sea_noise(&[scene], &[noise_of(self.seed, position)], self.patches).unwrap_or_else(
                 |_| Tensor::full([1, channels, rows, columns], f32::NAN, &Device::default()),
             )
         });
-        Tensor::cat(noise, 0)
+        Tensor::cat(noise.collect(), 0)
     }
 }
 

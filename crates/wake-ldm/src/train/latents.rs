@@ -3,11 +3,12 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use half::f16;
+use rayon::prelude::*;
 
 use crate::conditioning::{Conditions, MapGrid};
 use crate::dataset::Pair;
 use crate::error::{Error, Result};
-use crate::small::{Known, PatchTransform, Prior, in_parallel};
+use crate::network::{Known, PatchTransform, Prior};
 
 /// Examples whose residuals are computed at once.
 const RESIDUALS: usize = 8;
@@ -54,7 +55,7 @@ pub struct LatentSet {
 impl LatentSet {
     /// Encodes an image and adds it.
     ///
-    /// - `images`: the image and the one expected of its scene, [`expected_grey`](crate::small::expected_grey), each
+    /// - `images`: the image and the one expected of its scene, [`expected_grey`](crate::network::expected_grey), each
     ///   `size × size` pixels in rows
     ///
     /// # Errors
@@ -95,11 +96,12 @@ impl LatentSet {
     pub fn residuals(self, prior: &Prior, grid: MapGrid, done: impl Fn(usize) + Sync) -> Self {
         let all: Vec<usize> = (0..self.len()).collect();
         let chunks: Vec<&[usize]> = all.chunks(RESIDUALS).collect();
-        let residuals = in_parallel(&chunks, |indices| {
+        let residuals = chunks.par_iter().map(|indices| {
             let residuals = self.residual(indices, prior, grid);
             done(indices.len());
             residuals
         });
+        let residuals: Vec<Vec<f16>> = residuals.collect();
         Self {
             latents: residuals.concat(),
             ..self

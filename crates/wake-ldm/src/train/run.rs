@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::checkpoint::Checkpoint;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
 use crate::error::{Error, Result};
-use crate::small::WakeModelConfig;
+use crate::network::WakeModelConfig;
 
 /// Parts of a loss by name.
 pub type Terms = Vec<(&'static str, f64)>;
@@ -36,7 +36,7 @@ pub struct RunOptions {
     pub trainer: TrainerOptions,
 }
 
-/// A run that trains one part of a [`WakeModel`](crate::small::WakeModel).
+/// A run that trains one part of a [`WakeModel`](crate::network::WakeModel).
 #[derive(Debug)]
 pub struct Run<M> {
     trainer: Trainer<M>,

@@ -11,7 +11,7 @@ use burn::tensor::{DType, Device, Tensor};
 use super::*;
 use crate::conditioning::{Conditions, Vocabulary};
 use crate::dataset::{Prompts, Recipe, Simulated};
-use crate::small::{Flow, PatchTransform, WakeModelConfig};
+use crate::network::{Flow, PatchTransform, WakeModelConfig};
 
 const SIZE: usize = 32;
 
@@ -254,7 +254,7 @@ fn a_reader_learns_to_tell_prompts_apart() {
         vocabulary: vocabulary.known().to_vec(),
         ..config()
     };
-    let init = |config: &WakeModelConfig, device: &Device| config.init_reader(device);
+    let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
     let devices = vec![Device::flex().autodiff()];
     let mut run = Run::new("words", &config, init, options(1), devices).unwrap();
     let task = WordsTask {

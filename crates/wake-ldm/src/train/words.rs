@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::run::{Task, Terms, number};
 use crate::conditioning::{QUANTITIES, Vocabulary, statement, tokens};
 use crate::dataset::Prompts;
-use crate::small::{Reader, windows};
+use crate::network::{PromptParser, windows};
 use burn::tensor::{Device, Tensor, TensorData};
 
 /// Reading what prompts state: squared error of each quantity, and of whether it is stated.
@@ -17,8 +17,13 @@ pub struct WordsTask<'a> {
     pub vocabulary: &'a Vocabulary,
 }
 
-impl Task<Reader> for WordsTask<'_> {
-    fn loss(&self, model: &Reader, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+impl Task<PromptParser> for WordsTask<'_> {
+    fn loss(
+        &self,
+        model: &PromptParser,
+        device: &Device,
+        positions: Range<u64>,
+    ) -> (Tensor<1>, Terms) {
         let drawn = positions.filter_map(|position| self.prompts.prompt(position).ok());
         let (prompts, said): (Vec<_>, Vec<_>) = drawn
             .map(|(text, conditions)| (tokens(&text), statement(&conditions)))

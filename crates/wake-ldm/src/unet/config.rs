@@ -97,7 +97,7 @@ impl UNetConfig {
     /// [`Error::Unsupported`] for an option that would change the numbers and that we lack, and what
     /// [`validate`](Self::validate) finds; [`Error::Io`], [`Error::Json`] for a bad file.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::from_json(&crate::weights::read_text(path)?, path)
+        Self::from_json(&crate::files::read_text(path)?, path)
     }
 
     /// Reads the text of a `config.json`; `path` only serves messages.

@@ -3,15 +3,19 @@
 mod blocks;
 mod config;
 
+use std::path::Path;
+
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::tensor::activation::silu;
 use burn::tensor::{Device, Tensor};
 
+use crate::error::Result;
 use crate::nn::cast_to;
 use crate::nn::conv::{conv3x3, convolve};
 use crate::nn::norm::GroupNorm;
 use crate::nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
+use crate::weights::{Layout, load};
 use blocks::{DownBlock, Levels, MidBlock, UpBlock};
 
 pub use config::UNetConfig;
@@ -87,6 +91,16 @@ impl UNetConfig {
 }
 
 impl UNet {
+    /// Reads a folder with `config.json` and weights, as f32.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`], and what [`UNetConfig::read`] finds.
+    pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
+        let config = UNetConfig::read(&folder.join("config.json"))?;
+        load(config.init(device), Layout::Diffusers, folder)
+    }
+
     /// What the model was built from.
     pub fn config(&self) -> &UNetConfig {
         &self.config

@@ -14,6 +14,7 @@ use super::header::{self, Header};
 use super::index::ShardIndex;
 use super::names::modern;
 use crate::error::{Error, Result};
+use crate::files::unreadable;
 
 /// File names of models, the preferred ones first, each with the names of the index that it may have
 /// instead, in shards.
@@ -80,20 +81,20 @@ impl Contents {
 }
 
 /// One tensor of a file, not read yet.
-pub(super) struct Stored<'a> {
+pub(crate) struct Stored<'a> {
     info: &'a TensorInfo,
     file: &'a WeightFile,
 }
 
 /// The files of one model.
 #[derive(Debug)]
-pub(super) struct WeightFiles {
+pub(crate) struct WeightFiles {
     files: Vec<WeightFile>,
 }
 
 impl WeightFiles {
     /// Opens a file, or the files of a folder.
-    pub(super) fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         if !path.is_dir() {
             return Self::whole(path);
         }
@@ -140,14 +141,14 @@ impl WeightFiles {
     }
 
     /// An entry of the headers' free text, where one of them has it.
-    pub(super) fn note(&self, key: &str) -> Option<&str> {
+    pub(crate) fn note(&self, key: &str) -> Option<&str> {
         let headers = self.files.iter().map(WeightFile::metadata);
         let mut notes = headers.filter_map(|header| header.metadata().as_ref());
         notes.find_map(|notes| notes.get(key)).map(String::as_str)
     }
 
     /// All tensors under their present names.
-    pub(super) fn tensors(&self) -> Result<BTreeMap<String, Stored<'_>>> {
+    pub(crate) fn tensors(&self) -> Result<BTreeMap<String, Stored<'_>>> {
         let mut tensors = BTreeMap::new();
         for file in &self.files {
             for (name, info) in file.metadata().tensors() {
@@ -203,7 +204,7 @@ impl WeightFile {
 }
 
 impl Stored<'_> {
-    pub(super) fn shape(&self) -> &[usize] {
+    pub(crate) fn shape(&self) -> &[usize] {
         &self.info.shape
     }
 
@@ -212,7 +213,7 @@ impl Stored<'_> {
     }
 
     /// Whether the numbers are of a kind that weights are stored in.
-    pub(super) fn is_float(&self) -> bool {
+    pub(crate) fn is_float(&self) -> bool {
         matches!(
             self.dtype(),
             Dtype::F32 | Dtype::F16 | Dtype::BF16 | Dtype::F64
@@ -220,7 +221,7 @@ impl Stored<'_> {
     }
 
     /// Reads the numbers, as f32.
-    pub(super) fn read(&self) -> Result<Vec<f32>> {
+    pub(crate) fn read(&self) -> Result<Vec<f32>> {
         match self.dtype() {
             Dtype::F16 => self.converted(|b: [u8; 2]| f16::from_le_bytes(b).to_f32()),
             Dtype::BF16 => self.converted(|b: [u8; 2]| bf16::from_le_bytes(b).to_f32()),
@@ -245,14 +246,5 @@ impl Stored<'_> {
 impl fmt::Debug for Stored<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:?} {:?}", self.dtype(), self.shape())
-    }
-}
-
-/// The error for a file that cannot be read.
-pub(super) fn unreadable(path: &Path, source: std::io::Error) -> Error {
-    Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
     }
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::read_text;
 use crate::error::{Error, Result};
+use crate::files::read_text;
 
 /// The files that an index names, each with its tensors.
 #[derive(Debug)]

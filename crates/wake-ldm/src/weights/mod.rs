@@ -1,13 +1,9 @@
 //! Weights in the files of diffusers and transformers: reading, checking by name, writing.
 
-mod atomic;
-mod files;
+pub(crate) mod files;
 mod header;
 mod index;
-mod lora;
-mod lora_strength;
-mod low_rank;
-mod names;
+pub(crate) mod names;
 mod precision;
 mod save;
 
@@ -15,78 +11,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Tensor, TensorData};
 
-use crate::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
 use crate::error::{Error, Mismatch, Misshapen, Result};
-use crate::text::{ClipText, ClipTextConfig};
-use crate::unet::{UNet, UNetConfig};
 use files::{Stored, WeightFiles};
-use names::Path as ModulePath;
+use names::ModulePath;
 
-pub(crate) use atomic::write_text;
-pub use lora::merge_lora;
-pub use low_rank::LowRank;
 pub use names::Layout;
 pub use precision::Precision;
 pub use save::{save_as, save_folder};
-
-/// No configuration file is longer than this.
-const LONGEST_TEXT: u64 = 16 << 20;
-
-/// Reads a configuration file.
-pub(crate) fn read_text(path: &Path) -> Result<String> {
-    let io = |source| Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    };
-    if std::fs::metadata(path).map_err(io)?.len() > LONGEST_TEXT {
-        return Err(io(std::io::Error::other(
-            "longer than 16 MiB, so no configuration",
-        )));
-    }
-    std::fs::read_to_string(path).map_err(io)
-}
-
-/// Reads the text encoder of a folder with `config.json` and weights, and its configuration.
-///
-/// # Errors
-///
-/// As [`load`], and what [`ClipTextConfig::read`] finds.
-pub fn load_text_encoder(folder: &Path, device: &Device) -> Result<(ClipText, ClipTextConfig)> {
-    let config = ClipTextConfig::read(&folder.join("config.json"))?;
-    Ok((load(config.init(device), Layout::ClipText, folder)?, config))
-}
-
-/// Reads the U-Net of a folder with `config.json` and weights, and its configuration.
-///
-/// # Errors
-///
-/// As [`load`], and what [`UNetConfig::read`] finds.
-pub fn load_unet(folder: &Path, device: &Device) -> Result<(UNet, UNetConfig)> {
-    let config = UNetConfig::read(&folder.join("config.json"))?;
-    Ok((
-        load(config.init(device), Layout::Diffusers, folder)?,
-        config,
-    ))
-}
-
-/// Reads the autoencoder of a folder with `config.json` and weights, and its configuration.
-///
-/// # Errors
-///
-/// As [`load`], and what [`AutoencoderKlConfig::read`] finds.
-pub fn load_autoencoder(
-    folder: &Path,
-    device: &Device,
-) -> Result<(AutoencoderKl, AutoencoderKlConfig)> {
-    let config = AutoencoderKlConfig::read(&folder.join("config.json"))?;
-    Ok((
-        load(config.init(device), Layout::Diffusers, folder)?,
-        config,
-    ))
-}
 
 /// Reads weights into a model, as f32; see [`load_as`].
 ///

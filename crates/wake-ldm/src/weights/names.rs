@@ -19,21 +19,21 @@ pub enum Layout {
 
 /// Where in a model a parameter lies.
 #[derive(Debug, Default)]
-pub(super) struct Path {
+pub(crate) struct ModulePath {
     segments: Vec<(String, String)>,
 }
 
-impl Path {
-    pub(super) fn enter(&mut self, name: &str, container: &str) {
+impl ModulePath {
+    pub(crate) fn enter(&mut self, name: &str, container: &str) {
         self.segments.push((name.to_owned(), container.to_owned()));
     }
 
-    pub(super) fn exit(&mut self) {
+    pub(crate) fn exit(&mut self) {
         self.segments.pop();
     }
 
     /// Whether a file holds the transpose: the matrices of linear layers.
-    pub(super) fn is_transposed(&self, rank: usize) -> bool {
+    pub(crate) fn is_transposed(&self, rank: usize) -> bool {
         let owner = self
             .segments
             .iter()
@@ -43,7 +43,7 @@ impl Path {
     }
 
     /// The name in a file.
-    pub(super) fn file_name(&self, layout: Layout) -> String {
+    pub(crate) fn file_name(&self, layout: Layout) -> String {
         // The variants of an enum of layers are no level of their own.
         let segments = self.segments.iter().map(|(name, _)| name.as_str());
         let segments: Vec<&str> = segments

@@ -9,9 +9,9 @@ use half::{bf16, f16};
 use serde_json::{Map, Value, json};
 
 use super::Precision;
-use super::atomic::{write_atomically, write_text};
-use super::names::{Layout, Path as ModulePath};
+use super::names::{Layout, ModulePath};
 use crate::error::Result;
+use crate::files::{write_atomically, write_text};
 
 /// Writes a model's weights into one safetensors file that diffusers or transformers read.
 ///

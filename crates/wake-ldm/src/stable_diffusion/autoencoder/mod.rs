@@ -1,0 +1,223 @@
+//! The autoencoder: from an image to a latent image a few times smaller, and back.
+
+mod blocks;
+mod config;
+mod gaussian;
+mod tiling;
+
+use std::path::Path;
+
+use burn::module::Module;
+use burn::nn::conv::Conv2d;
+use burn::tensor::{Device, Tensor};
+
+use crate::error::Result;
+use crate::nn::cast_to;
+use crate::nn::conv::{conv1x1, convolve};
+use crate::nn::patch::{depth_to_space, space_to_depth};
+use crate::weights::{Layout, load};
+use blocks::{Decoder, Encoder};
+
+pub use config::AutoencoderKlConfig;
+pub use gaussian::GaussianPosterior;
+pub use tiling::Tiling;
+
+/// A variational autoencoder of images.
+///
+/// ```text
+/// image ─► encoder ─► μ, ln σ² ─► z = μ + σ n          latent = (z − shift) · scale
+/// image ◄─ decoder ◄─ z                                z = latent / scale + shift
+/// ```
+///
+/// Images lie in [−1, 1]. `encode` and `decode` work on z; [`to_latents`](Self::to_latents) and
+/// [`from_latents`](Self::from_latents) convert to what the diffusion model sees.
+///
+/// # References
+///
+/// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models", section
+/// 3.1 and appendix G.
+#[derive(Module, Debug)]
+pub struct AutoencoderKl {
+    encoder: Encoder,
+    quant_conv: Option<Conv2d>,
+    post_quant_conv: Option<Conv2d>,
+    decoder: Decoder,
+    #[module(skip)]
+    config: AutoencoderKlConfig,
+}
+
+impl AutoencoderKlConfig {
+    /// An autoencoder with random weights; they are drawn when they are first used.
+    ///
+    /// # Panics
+    ///
+    /// When [`validate`](Self::validate) fails.
+    pub fn init(&self, device: &Device) -> AutoencoderKl {
+        if let Err(error) = self.validate() {
+            panic!("{error}");
+        }
+        let latent = self.latent_channels;
+        AutoencoderKl {
+            encoder: Encoder::new(self, device),
+            quant_conv: self
+                .quant_conv
+                .then(|| conv1x1(2 * latent, 2 * latent, device)),
+            post_quant_conv: self
+                .post_quant_conv
+                .then(|| conv1x1(latent, latent, device)),
+            decoder: Decoder::new(self, device),
+            config: self.clone(),
+        }
+    }
+}
+
+impl AutoencoderKl {
+    /// Reads a folder with `config.json` and weights, as f32.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`], and what [`AutoencoderKlConfig::read`] finds.
+    pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
+        let config = AutoencoderKlConfig::read(&folder.join("config.json"))?;
+        load(config.init(device), Layout::Diffusers, folder)
+    }
+
+    /// What the model was built from.
+    pub fn config(&self) -> &AutoencoderKlConfig {
+        &self.config
+    }
+
+    /// Encodes images in [−1, 1].
+    ///
+    /// # Shapes
+    ///
+    /// - `image`: `[batch, in_channels, rows, columns]`; rows and columns should be multiples of
+    ///   [`downsampling`](Self::downsampling), else the last ones are lost
+    /// - posterior: `[batch, latent_channels, rows / downsampling, columns / downsampling]`
+    pub fn encode(&self, image: Tensor<4>) -> GaussianPosterior {
+        GaussianPosterior::from_moments(self.moments(image))
+    }
+
+    /// Encodes one tile after the other.
+    ///
+    /// # Shapes
+    ///
+    /// As [`encode`](Self::encode).
+    ///
+    /// # Panics
+    ///
+    /// When the tile is no multiple of the downsampling, or the overlap outside 0…0.5.
+    pub fn encode_tiled(&self, image: Tensor<4>, tiling: Tiling) -> GaussianPosterior {
+        let [pixels, latents] = tiling.cuts(self.downsampling());
+        if fits(&image, pixels.tile) {
+            return self.encode(image);
+        }
+        let moments = tiling::in_tiles(image, pixels, latents, |tile| self.moments(tile));
+        GaussianPosterior::from_moments(moments)
+    }
+
+    /// Means and log-variances as the network gives them, side by side along the channels.
+    ///
+    /// # Shapes
+    ///
+    /// As [`encode`](Self::encode), with `2 · latent_channels` channels.
+    pub fn moments(&self, image: Tensor<4>) -> Tensor<4> {
+        let dtype = image.dtype();
+        let image = cast_to(image, self.decoder.dtype());
+        let encoded = self
+            .encoder
+            .forward(space_to_depth(image, self.config.patch_size));
+        let moments = match &self.quant_conv {
+            Some(conv) => convolve(conv, encoded),
+            None => encoded,
+        };
+        cast_to(moments, dtype)
+    }
+
+    /// Decodes z to images, about in [−1, 1].
+    ///
+    /// # Shapes
+    ///
+    /// - `z`: `[batch, latent_channels, rows, columns]`
+    /// - result: `[batch, out_channels, rows · downsampling, columns · downsampling]`
+    pub fn decode(&self, z: Tensor<4>) -> Tensor<4> {
+        let dtype = z.dtype();
+        let z = cast_to(z, self.decoder.dtype());
+        let z = match &self.post_quant_conv {
+            Some(conv) => convolve(conv, z),
+            None => z,
+        };
+        cast_to(
+            depth_to_space(self.decoder.forward(z), self.config.patch_size),
+            dtype,
+        )
+    }
+
+    /// Decodes one image of the batch after the other, in the memory of one.
+    ///
+    /// # Shapes
+    ///
+    /// As [`decode`](Self::decode).
+    pub fn decode_sliced(&self, z: Tensor<4>) -> Tensor<4> {
+        Tensor::cat(
+            z.clone()
+                .chunk(z.dims()[0], 0)
+                .into_iter()
+                .map(|z| self.decode(z))
+                .collect(),
+            0,
+        )
+    }
+
+    /// Decodes one tile after the other, in the memory of one.
+    ///
+    /// # Shapes
+    ///
+    /// As [`decode`](Self::decode).
+    ///
+    /// # Panics
+    ///
+    /// As [`encode_tiled`](Self::encode_tiled).
+    pub fn decode_tiled(&self, z: Tensor<4>, tiling: Tiling) -> Tensor<4> {
+        let [pixels, latents] = tiling.cuts(self.downsampling());
+        if fits(&z, latents.tile) {
+            return self.decode(z);
+        }
+        tiling::in_tiles(z, latents, pixels, |tile| self.decode(tile))
+    }
+
+    /// What the diffusion model sees of z: shifted and scaled to variance 1.
+    pub fn to_latents(&self, z: Tensor<4>) -> Tensor<4> {
+        (z - self.config.shift_factor) * self.config.scaling_factor
+    }
+
+    /// What the decoder sees of a latent image: the inverse of [`to_latents`](Self::to_latents).
+    pub fn from_latents(&self, latents: Tensor<4>) -> Tensor<4> {
+        latents / self.config.scaling_factor + self.config.shift_factor
+    }
+
+    /// What latents are multiplied with before diffusion.
+    pub fn scaling_factor(&self) -> f64 {
+        self.config.scaling_factor
+    }
+
+    /// How many pixels one latent pixel stands for, along each axis.
+    pub fn downsampling(&self) -> usize {
+        self.config.downsampling()
+    }
+
+    /// Channels of the image.
+    pub fn image_channels(&self) -> usize {
+        self.config.in_channels
+    }
+
+    /// Channels of the latent image.
+    pub fn latent_channels(&self) -> usize {
+        self.config.latent_channels
+    }
+}
+
+fn fits(x: &Tensor<4>, size: usize) -> bool {
+    let [_, _, rows, columns] = x.dims();
+    rows <= size && columns <= size
+}

@@ -1,0 +1,228 @@
+//! A low-rank adaptation as a module that can be trained, and its file in diffusers' format.
+
+use std::io::Write;
+use std::path::Path;
+
+use burn::module::{Initializer, Module, ModuleMapper, ModuleVisitor, Param};
+use burn::tensor::Tensor;
+use serde_json::{Map, json};
+
+use crate::error::{Result, check_range};
+use crate::files::write_atomically;
+use crate::weights::Layout;
+use crate::weights::names::ModulePath;
+
+/// Low-rank changes of some linear layers of a model.
+///
+/// ```text
+/// W' = W + B A
+/// ```
+///
+/// A is drawn at random and B starts at 0, so that nothing changes at first.
+///
+/// # References
+///
+/// Hu et al. (2022), "Low-Rank Adaptation of Large Language Models", section 4.1.
+#[derive(Module, Debug)]
+pub struct LowRank {
+    /// Aᵀ of each layer, `[in, rank]`.
+    down: Vec<Param<Tensor<2>>>,
+    /// Bᵀ of each layer, `[rank, out]`.
+    up: Vec<Param<Tensor<2>>>,
+    #[module(skip)]
+    layers: Vec<String>,
+    #[module(skip)]
+    layout: Layout,
+}
+
+impl LowRank {
+    /// Changes of rank `rank` of the attentions of a model.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for a rank of 0 or above 1024.
+    pub fn of_attentions<M: Module>(model: &M, layout: Layout, rank: usize) -> Result<Self> {
+        check_range("rank", rank as f64, 1.0, 1024.0)?;
+        let mut finder = Finder {
+            path: ModulePath::default(),
+            layout,
+            rank,
+            found: Self {
+                down: Vec::new(),
+                up: Vec::new(),
+                layers: Vec::new(),
+                layout,
+            },
+        };
+        model.visit(&mut finder);
+        Ok(finder.found)
+    }
+
+    /// Names of the changed layers in files.
+    pub fn layers(&self) -> &[String] {
+        &self.layers
+    }
+
+    /// A model with the changes added; gradients flow into the changes.
+    pub fn merged<M: Module>(&self, model: M) -> M {
+        model.map(&mut Adder {
+            path: ModulePath::default(),
+            changes: self,
+            next: 0,
+        })
+    }
+
+    /// Writes the file that diffusers' `load_lora_weights` and [`merge_lora`](super::merge_lora) read.
+    ///
+    /// - `prefix`: which model it is of, `unet` or `text_encoder`
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`](crate::Error::Io) when it cannot be written.
+    pub fn save(&self, prefix: &str, path: &Path) -> Result<()> {
+        let (mut header, mut data) = (Map::new(), Vec::new());
+        header.insert("__metadata__".to_owned(), json!({"format": "pt"}));
+        for (i, layer) in self.layers.iter().enumerate() {
+            for (name, factor) in [("lora_A", &self.down[i]), ("lora_B", &self.up[i])] {
+                let matrix = factor.val().transpose();
+                let (shape, start) = (matrix.dims(), data.len());
+                data.extend(matrix.into_data().iter::<f32>().flat_map(f32::to_le_bytes));
+                let entry =
+                    json!({"dtype": "F32", "shape": shape, "data_offsets": [start, data.len()]});
+                header.insert(format!("{prefix}.{layer}.{name}.weight"), entry);
+            }
+        }
+        let mut header = serde_json::Value::Object(header).to_string();
+        while !header.len().is_multiple_of(8) {
+            header.push(' ');
+        }
+        write_atomically(path, |writer| {
+            writer.write_all(&(header.len() as u64).to_le_bytes())?;
+            writer.write_all(header.as_bytes())?;
+            writer.write_all(&data)
+        })
+    }
+}
+
+/// The layer that a weight belongs to, if it is one that is changed.
+fn attention_layer(path: &ModulePath, rank: usize, layout: Layout) -> Option<String> {
+    const ENDS: [&str; 4] = ["to_q", "to_k", "to_v", "to_out.0"];
+    let name = path.file_name(layout);
+    let layer = name
+        .strip_suffix(".weight")
+        .filter(|_| path.is_transposed(rank))?;
+    let last = |end: &str| {
+        layer
+            .strip_suffix(end)
+            .is_some_and(|rest| rest.ends_with('.'))
+    };
+    ENDS.into_iter().any(last).then(|| layer.to_owned())
+}
+
+struct Finder {
+    path: ModulePath,
+    layout: Layout,
+    rank: usize,
+    found: LowRank,
+}
+
+impl ModuleVisitor for Finder {
+    fn enter_module(&mut self, name: &str, container: &str) {
+        self.path.enter(name, container);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container: &str) {
+        self.path.exit();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let Some(layer) = attention_layer(&self.path, D, self.layout) else {
+            return;
+        };
+        let (shape, device) = (param.lazy_shape().to_vec(), param.lazy_device());
+        let normal = Initializer::Normal {
+            mean: 0.0,
+            std: 1.0 / self.rank as f64,
+        };
+        let LowRank {
+            down, up, layers, ..
+        } = &mut self.found;
+        down.push(normal.init([shape[0], self.rank], &device));
+        up.push(Initializer::Zeros.init([self.rank, shape[1]], &device));
+        layers.push(layer);
+    }
+}
+
+struct Adder<'a> {
+    path: ModulePath,
+    changes: &'a LowRank,
+    next: usize,
+}
+
+impl ModuleMapper for Adder<'_> {
+    fn enter_module(&mut self, name: &str, container: &str) {
+        self.path.enter(name, container);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container: &str) {
+        self.path.exit();
+    }
+
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        if attention_layer(&self.path, D, self.changes.layout).is_none() {
+            return param;
+        }
+        let (down, up) = (&self.changes.down[self.next], &self.changes.up[self.next]);
+        self.next += 1;
+        let change = down.val().matmul(up.val());
+        param.map(|weight| {
+            let shape = weight.dims();
+            weight + change.reshape(shape)
+        })
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+mod tests {
+    use burn::tensor::Device;
+
+    use super::*;
+    use crate::nn::attention::CrossAttention;
+    use crate::stable_diffusion::lora::merge_lora;
+
+    #[derive(Module, Debug)]
+    struct Block {
+        attn1: CrossAttention,
+    }
+
+    #[test]
+    fn a_saved_change_does_what_the_module_did() {
+        let device = Device::flex();
+        let block = Block {
+            attn1: CrossAttention::new(6, 4, 2, false, &device),
+        };
+        let mut change = LowRank::of_attentions(&block, Layout::Diffusers, 2).unwrap();
+        let expected: Vec<String> = ["to_q", "to_k", "to_v", "to_out.0"]
+            .map(|end| format!("attn1.{end}"))
+            .into();
+        assert_eq!(change.layers(), expected);
+        let x = Tensor::<3>::from_floats([[[1.0, -0.5, 0.2, 0.0, 0.7, 0.1], [0.3; 6]]], &device);
+        let context = Tensor::<3>::from_floats([[[0.5, -1.0, 0.25, 2.0], [0.1; 4]]], &device);
+        let run = |block: &Block| block.attn1.forward(x.clone(), Some(context.clone()));
+        let distance = |a: Tensor<3>, b: Tensor<3>| (a - b).abs().max().into_scalar::<f32>();
+        // B = 0 changes nothing.
+        assert!(distance(run(&change.merged(block.clone())), run(&block)) < f32::MIN_POSITIVE);
+        for (i, up) in change.up.iter_mut().enumerate() {
+            *up = up.clone().map(|zero| zero + 0.1 * (i + 1) as f64);
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lora.safetensors");
+        change.save("unet", &path).unwrap();
+        let read = merge_lora(block.clone(), Layout::Diffusers, "unet", &path, 1.0).unwrap();
+        let merged = run(&change.merged(block.clone()));
+        assert!(distance(run(&block), merged.clone()) > 1e-3);
+        // The same sums in the same precision, in another order.
+        assert!(distance(run(&read), merged) < 1e-5);
+        assert!(LowRank::of_attentions(&block, Layout::Diffusers, 0).is_err());
+    }
+}

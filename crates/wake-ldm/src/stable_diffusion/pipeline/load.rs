@@ -1,0 +1,91 @@
+//! Reading a pipeline from a folder in diffusers layout.
+
+use std::path::Path;
+
+use burn::tensor::Device;
+use wake_text::{TOKENS, Tokenizer};
+
+use super::{Pipeline, PipelineParts};
+use crate::error::{Error, Result, check_range};
+use crate::stable_diffusion::autoencoder::AutoencoderKl;
+use crate::stable_diffusion::scheduler::SchedulerConfig;
+use crate::stable_diffusion::text::ClipText;
+use crate::unet::UNet;
+
+/// CLIP's vocabulary: the largest id that its tokenizer gives, and one.
+const CLIP_VOCABULARY: usize = 49408;
+
+impl Pipeline {
+    /// Reads a folder with `text_encoder`, `unet`, `vae`, `scheduler` and (else CLIP's own)
+    /// `tokenizer`, as diffusers writes it, to f32.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the file, option or tensors that do not fit, or with two models that do not fit
+    /// each other.
+    pub fn load(folder: &Path, device: &Device) -> Result<Self> {
+        let tokenizer = tokenizer(&folder.join("tokenizer"))?;
+        let scheduler = SchedulerConfig::read(&folder.join("scheduler/scheduler_config.json"))?;
+        let text_encoder = ClipText::from_folder(&folder.join("text_encoder"), device)?;
+        let text = text_encoder.config();
+        check_range(
+            "max_position_embeddings",
+            text.max_tokens as f64,
+            TOKENS as f64,
+            1e6,
+        )?;
+        if tokenizer.is_none() {
+            check_range(
+                "vocab_size",
+                text.vocab_size as f64,
+                CLIP_VOCABULARY as f64,
+                1e9,
+            )?;
+        }
+        let unet = UNet::from_folder(&folder.join("unet"), device)?;
+        let config = unet.config();
+        must_agree(
+            "cross_attention_dim",
+            config.cross_attention_dim,
+            text.hidden_size,
+        )?;
+        let autoencoder = AutoencoderKl::from_folder(&folder.join("vae"), device)?;
+        for (name, channels) in [
+            ("in_channels", config.in_channels),
+            ("out_channels", config.out_channels),
+        ] {
+            must_agree(name, channels, autoencoder.latent_channels())?;
+        }
+        let latent_size = config.sample_size;
+        let parts = PipelineParts {
+            tokenizer,
+            text_encoder,
+            unet,
+            autoencoder,
+            scheduler,
+            latent_size,
+        };
+        Ok(Self::new(parts, device))
+    }
+}
+
+/// The folder's tokenizer, or CLIP's where there is none.
+fn tokenizer(folder: &Path) -> Result<Option<Tokenizer>> {
+    if folder.is_dir() {
+        Ok(Some(Tokenizer::from_folder(folder)?))
+    } else {
+        Ok(None)
+    }
+}
+
+/// The error for a U-Net that does not fit the other models.
+fn must_agree(option: &str, value: usize, expected: usize) -> Result<()> {
+    if value == expected {
+        return Ok(());
+    }
+    Err(Error::InvalidOption {
+        option: format!("{option} of the U-Net"),
+        value: value.to_string(),
+        expected: format!("{expected}, as the other models have it"),
+    })
+}

@@ -1,0 +1,342 @@
+//! From a sentence to an image: the only file that knows the order of the stages.
+//!
+//! ```text
+//! prompt ─► token ids ─► embedding ─┐
+//!              noise ─► U-Net ⇄ scheduler ─► latents ─► decoder ─► image
+//! ```
+
+mod guidance;
+mod load;
+mod request;
+mod sampling;
+mod save;
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use burn::tensor::{Device, Int, Tensor, TensorData};
+use wake_text::Tokenizer;
+
+use crate::error::{Result, check_range};
+use crate::stable_diffusion::autoencoder::AutoencoderKl;
+use crate::stable_diffusion::lora::merge_lora;
+use crate::stable_diffusion::scheduler::SchedulerConfig;
+use crate::stable_diffusion::text::ClipText;
+use crate::unet::UNet;
+use crate::weights::{self, Layout};
+
+use request::invalid;
+pub use request::{Prompts, Request, StartImage};
+pub use sampling::{Progress, Sampling};
+
+/// How many prompts' embeddings are kept.
+const CACHED_PROMPTS: usize = 256;
+
+/// What a pipeline is made of.
+#[derive(Debug, Clone)]
+pub struct PipelineParts {
+    /// Turns prompts into token ids; `None`: CLIP's own.
+    pub tokenizer: Option<Tokenizer>,
+    /// Turns token ids into embeddings.
+    pub text_encoder: ClipText,
+    /// Predicts the noise.
+    pub unet: UNet,
+    /// Turns latents into images and back.
+    pub autoencoder: AutoencoderKl,
+    /// The scheduler of requests that name none.
+    pub scheduler: SchedulerConfig,
+    /// Rows and columns of the latent images of requests that give no size.
+    pub latent_size: usize,
+}
+
+/// Text-to-image and image-to-image with a latent diffusion model.
+///
+/// ```no_run
+/// use burn::tensor::Device;
+/// use wake_ldm::pipeline::{Pipeline, Request};
+///
+/// # fn main() -> Result<(), wake_ldm::Error> {
+/// let pipeline = Pipeline::load("stable-diffusion-v1-4".as_ref(), &Device::default())?;
+/// let request = Request::new("a ship and its wake, radar image").with_steps(20).with_seed(7);
+/// let mut sampling = pipeline.sample(&request)?;
+/// for progress in sampling.by_ref() {
+///     eprintln!("{} of {}", progress.done, progress.of);
+/// }
+/// let images = pipeline.decode(sampling.latents()); // [1, 3, 512, 512] in [0, 1]
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # References
+///
+/// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models".
+#[derive(Debug)]
+pub struct Pipeline {
+    tokenizer: Option<Tokenizer>,
+    text_encoder: ClipText,
+    unet: UNet,
+    autoencoder: AutoencoderKl,
+    scheduler: SchedulerConfig,
+    latent_size: usize,
+    embeddings: Mutex<HashMap<String, Tensor<3>>>,
+    device: Device,
+}
+
+impl Pipeline {
+    /// A pipeline of models that lie on `device`.
+    pub fn new(parts: PipelineParts, device: &Device) -> Self {
+        let PipelineParts {
+            tokenizer,
+            text_encoder,
+            unet,
+            autoencoder,
+            scheduler,
+            latent_size,
+        } = parts;
+        Self {
+            tokenizer,
+            text_encoder,
+            unet,
+            autoencoder,
+            scheduler,
+            latent_size,
+            embeddings: Mutex::default(),
+            device: device.clone(),
+        }
+    }
+
+    /// What the pipeline is made of.
+    pub fn into_parts(self) -> PipelineParts {
+        PipelineParts {
+            tokenizer: self.tokenizer,
+            text_encoder: self.text_encoder,
+            unet: self.unet,
+            autoencoder: self.autoencoder,
+            scheduler: self.scheduler,
+            latent_size: self.latent_size,
+        }
+    }
+
+    /// Merges a low-rank adaptation in diffusers' format into the U-Net, and into the text encoder where
+    /// the file has layers of it; `scale` is how much of it.
+    ///
+    /// # Errors
+    ///
+    /// As [`merge_lora`].
+    pub fn with_lora(mut self, path: &Path, scale: f64) -> Result<Self> {
+        self.unet = merge_lora(self.unet, Layout::Diffusers, "unet", path, scale)?;
+        if weights::has_prefix(path, "text_encoder")? {
+            let text = self.text_encoder;
+            self.text_encoder = merge_lora(text, Layout::ClipText, "text_encoder", path, scale)?;
+            self.embeddings = Mutex::default();
+        }
+        Ok(self)
+    }
+
+    /// The scheduler of requests that name none.
+    pub fn scheduler(&self) -> &SchedulerConfig {
+        &self.scheduler
+    }
+
+    /// The autoencoder, for tiled encoding and decoding of large images.
+    pub fn autoencoder(&self) -> &AutoencoderKl {
+        &self.autoencoder
+    }
+
+    /// Rows and columns of the images of requests that give no size.
+    pub fn image_size(&self) -> [usize; 2] {
+        [self.latent_size * self.autoencoder.downsampling(); 2]
+    }
+
+    /// The device that the models lie on.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Embeds prompts, one at a time; those seen before are remembered.
+    ///
+    /// # Shapes
+    ///
+    /// `[prompts, 77, width]`
+    ///
+    /// # Panics
+    ///
+    /// When there is no prompt.
+    pub fn embed<S: AsRef<str>>(&self, prompts: &[S]) -> Tensor<3> {
+        Tensor::cat(
+            prompts
+                .iter()
+                .map(|prompt| self.embed_one(prompt.as_ref()))
+                .collect(),
+            0,
+        )
+    }
+
+    fn embed_one(&self, prompt: &str) -> Tensor<3> {
+        let mut cache = self
+            .embeddings
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = cache.get(prompt) {
+            return known.clone();
+        }
+        let tokenizer = self.tokenizer.as_ref().unwrap_or_else(|| Tokenizer::clip());
+        let ids: Vec<i32> = tokenizer
+            .encode(prompt)
+            .ids
+            .iter()
+            .map(|&id| id as i32)
+            .collect();
+        let length = ids.len();
+        let ids: Tensor<2, Int> =
+            Tensor::from_data(TensorData::new(ids, [1, length]), &self.device);
+        let embedding = self.text_encoder.forward(ids).last_hidden_state;
+        if cache.len() >= CACHED_PROMPTS {
+            cache.clear();
+        }
+        cache.insert(prompt.to_owned(), embedding.clone());
+        embedding
+    }
+
+    /// Decodes latents to images in [0, 1], one at a time.
+    ///
+    /// # Shapes
+    ///
+    /// `[images, latent_channels, rows, columns]` to `[images, channels, …]`, larger by the
+    /// autoencoder's downsampling.
+    pub fn decode(&self, latents: Tensor<4>) -> Tensor<4> {
+        let z = self.autoencoder.from_latents(latents);
+        (self.autoencoder.decode_sliced(z) / 2.0 + 0.5).clamp(0.0, 1.0)
+    }
+
+    /// Encodes images in [0, 1] to latents, drawn with the given noise, one at a time.
+    ///
+    /// # Shapes
+    ///
+    /// `pixels`: `[images, channels, rows, columns]`; `noise` and result: as
+    /// [`decode`](Self::decode) takes them.
+    pub fn encode(&self, pixels: Tensor<4>, noise: Tensor<4>) -> Tensor<4> {
+        let images = pixels.dims()[0];
+        let one = |k: usize| {
+            let posterior = self
+                .autoencoder
+                .encode(pixels.clone().narrow(0, k, 1) * 2.0 - 1.0);
+            posterior.sample(noise.clone().narrow(0, k, 1))
+        };
+        self.autoencoder
+            .to_latents(Tensor::cat((0..images).map(one).collect(), 0))
+    }
+
+    /// Channels, rows and columns of the latent images of a request.
+    fn latent_shape(&self, request: &Request) -> Result<[usize; 3]> {
+        let down = self.autoencoder.downsampling();
+        let [rows, columns] = match (request.size, &request.start, &request.latents) {
+            (Some(size), _, _) => size,
+            (None, Some((StartImage::Pixels(pixels), _)), _) => last_two(pixels),
+            (None, Some((StartImage::Latents(x), _)), _) | (None, None, Some(x)) => {
+                last_two(x).map(|size| size * down)
+            }
+            (None, None, None) => self.image_size(),
+        };
+        for (name, size) in [("rows", rows), ("columns", columns)] {
+            check_range(name, size as f64, down as f64, 16384.0)?;
+            if !size.is_multiple_of(down) {
+                return Err(invalid(name, size, format!("a multiple of {down}")));
+            }
+        }
+        Ok([
+            self.autoencoder.latent_channels(),
+            rows / down,
+            columns / down,
+        ])
+    }
+
+    /// Embeddings of prompts, one per image.
+    fn contexts(&self, prompts: &Prompts, request: &Request) -> Result<Tensor<3>> {
+        let embeddings = match prompts {
+            Prompts::Texts(texts) => self.embed(texts),
+            Prompts::Embeddings(embeddings) => embeddings.clone(),
+        };
+        let [found, tokens, width] = embeddings.dims();
+        let expected = self.text_encoder.width();
+        if width != expected {
+            return Err(invalid("width of embeddings", width, expected.to_string()));
+        }
+        let images = request.images();
+        Ok(embeddings
+            .reshape([found, 1, tokens, width])
+            .repeat_dim(1, images / found)
+            .reshape([images, tokens, width]))
+    }
+
+    fn checked_condition(&self, request: &Request) -> Result<Option<Tensor<2>>> {
+        let found = request.condition.as_ref().map(Tensor::dims);
+        let channels = self.unet.condition_channels();
+        match (found, channels) {
+            (None, _) => Ok(None),
+            (Some([images, width]), Some(channels))
+                if images == request.images() && width == channels =>
+            {
+                Ok(request.condition.clone())
+            }
+            (Some(found), channels) => {
+                let expected = match channels {
+                    Some(channels) => format!("{:?}", [request.images(), channels]),
+                    None => "none, because this U-Net has no condition vector".to_owned(),
+                };
+                Err(invalid(
+                    "shape of condition",
+                    format!("{found:?}"),
+                    expected,
+                ))
+            }
+        }
+    }
+
+    /// Checks that pixels fit latent images of a shape.
+    fn check_pixels(&self, pixels: &Tensor<4>, [_, rows, columns]: [usize; 3]) -> Result<()> {
+        let [_, channels, pixel_rows, pixel_columns] = pixels.dims();
+        let down = self.autoencoder.downsampling();
+        let found = [channels, pixel_rows, pixel_columns];
+        let expected = [
+            self.autoencoder.image_channels(),
+            rows * down,
+            columns * down,
+        ];
+        if found == expected {
+            return Ok(());
+        }
+        Err(invalid(
+            "shape of the start image",
+            format!("{found:?}"),
+            format!("{expected:?}"),
+        ))
+    }
+}
+
+fn last_two(x: &Tensor<4>) -> [usize; 2] {
+    let [_, _, rows, columns] = x.dims();
+    [rows, columns]
+}
+
+/// Rounds images in [0, 1] to bytes, rows of interleaved channels, one vector per image.
+///
+/// # Shapes
+///
+/// `[images, channels, rows, columns]` to `rows · columns · channels` bytes each.
+pub fn to_bytes(images: Tensor<4>) -> Vec<Vec<u8>> {
+    let [count, channels, rows, columns] = images.dims();
+    let interleaved = images
+        .permute([0, 2, 3, 1])
+        .reshape([count * rows * columns * channels]);
+    let bytes: Vec<u8> = interleaved
+        .into_data()
+        .iter::<f32>()
+        .map(|x| (x * 255.0).round_ties_even().clamp(0.0, 255.0) as u8)
+        .collect();
+    bytes
+        .chunks(rows * columns * channels)
+        .map(<[u8]>::to_vec)
+        .collect()
+}

@@ -1,0 +1,76 @@
+//! Writing a pipeline as a folder in diffusers layout.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use wake_text::Tokenizer;
+
+use super::Pipeline;
+use crate::error::Result;
+use crate::files::write_text;
+use crate::weights::{Layout, Precision, save_folder};
+
+impl Pipeline {
+    /// Writes a folder that [`load`](Self::load) and diffusers' `StableDiffusionPipeline` read:
+    /// `tokenizer`, `text_encoder`, `unet`, `vae` and `scheduler`, and `model_index.json` last.
+    ///
+    /// An autoencoder with a `patch_size` above 1 is one that diffusers does not know as a whole; see
+    /// [`AutoencoderKlConfig::to_json`](crate::stable_diffusion::autoencoder::AutoencoderKlConfig::to_json).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`](crate::Error::Io) and [`Error::Text`](crate::Error::Text) when a file cannot be
+    /// written.
+    pub fn save(&self, folder: &Path, precision: Precision) -> Result<()> {
+        let tokenizer = self.tokenizer.as_ref().unwrap_or_else(|| Tokenizer::clip());
+        tokenizer.save(&folder.join("tokenizer"))?;
+        let text = self.text_encoder.config().to_json();
+        save_folder(
+            &self.text_encoder,
+            Layout::ClipText,
+            &text,
+            &folder.join("text_encoder"),
+            precision,
+        )?;
+        let unet = self.unet.config().clone();
+        let unet = unet.with_sample_size(self.latent_size).to_json();
+        save_folder(
+            &self.unet,
+            Layout::Diffusers,
+            &unet,
+            &folder.join("unet"),
+            precision,
+        )?;
+        let vae = self.autoencoder.config().to_json();
+        save_folder(
+            &self.autoencoder,
+            Layout::Diffusers,
+            &vae,
+            &folder.join("vae"),
+            precision,
+        )?;
+        let scheduler = folder.join("scheduler/scheduler_config.json");
+        write_json(&scheduler, &self.scheduler.to_json())?;
+        write_json(&folder.join("model_index.json"), &self.model_index())
+    }
+
+    /// What diffusers reads first: the library and class of each part.
+    fn model_index(&self) -> Value {
+        json!({
+            "_class_name": "StableDiffusionPipeline",
+            "feature_extractor": [null, null],
+            "image_encoder": [null, null],
+            "requires_safety_checker": false,
+            "safety_checker": [null, null],
+            "scheduler": ["diffusers", self.scheduler.class()],
+            "text_encoder": ["transformers", "CLIPTextModel"],
+            "tokenizer": ["transformers", "CLIPTokenizer"],
+            "unet": ["diffusers", "UNet2DConditionModel"],
+            "vae": ["diffusers", "AutoencoderKL"],
+        })
+    }
+}
+
+fn write_json(path: &Path, json: &Value) -> Result<()> {
+    write_text(path, &format!("{json:#}\n"))
+}

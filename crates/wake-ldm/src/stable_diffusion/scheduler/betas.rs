@@ -1,0 +1,185 @@
+//! Curves of the noise that training steps add, and what schedulers assume about them.
+
+use serde_json::Value;
+
+use crate::error::{Result, check_range};
+use crate::options::Options;
+
+/// The shape of the noise added per training step, βₜ.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BetaCurve {
+    /// Evenly spaced from the first number to the second.
+    Linear(f64, f64),
+    /// Squares of evenly spaced square roots: Stable Diffusion's.
+    ScaledLinear(f64, f64),
+    /// From a signal that falls as the square of a cosine, at most 0.999.
+    SquaredCosine,
+    /// From a signal that falls as exp(−12 t), at most 0.999.
+    Exponential,
+    /// A logistic curve from the first number to the second.
+    Sigmoid(f64, f64),
+    /// Numbers given one by one.
+    Trained(Vec<f64>),
+}
+
+impl BetaCurve {
+    pub(super) fn betas(&self, steps: usize) -> Result<Vec<f32>> {
+        if let Self::Linear(first, last)
+        | Self::ScaledLinear(first, last)
+        | Self::Sigmoid(first, last) = *self
+        {
+            check_range("beta_start", first, 1e-8, 0.9999)?;
+            check_range("beta_end", last, 1e-8, 0.9999)?;
+        }
+        Ok(match self {
+            Self::Linear(first, last) => linspace(*first, *last, steps),
+            Self::ScaledLinear(first, last) => linspace(first.sqrt(), last.sqrt(), steps)
+                .iter()
+                .map(|root| root * root)
+                .collect(),
+            Self::SquaredCosine => betas_of(squared_cosine, steps),
+            Self::Exponential => betas_of(|t| (-12.0 * t).exp(), steps),
+            Self::Sigmoid(first, last) => sigmoid_betas(*first, *last, steps),
+            Self::Trained(betas) => trained(betas, steps)?,
+        })
+    }
+
+    /// Reads `beta_schedule`, `beta_start`, `beta_end` and `trained_betas`.
+    pub(super) fn take(options: &mut Options, defaults: &ScheduleDefaults) -> Result<Self> {
+        let (first, last) = defaults.ends;
+        let ends = (
+            options.f64("beta_start", first)?,
+            options.f64("beta_end", last)?,
+        );
+        let name = options.string("beta_schedule", defaults.curve)?;
+        if let Some(list) = options.take("trained_betas") {
+            return trained_list(options, &list);
+        }
+        match name.as_str() {
+            "linear" => Ok(Self::Linear(ends.0, ends.1)),
+            "scaled_linear" => Ok(Self::ScaledLinear(ends.0, ends.1)),
+            "squaredcos_cap_v2" => Ok(Self::SquaredCosine),
+            other if defaults.further == Some(other) && other == "exp" => Ok(Self::Exponential),
+            other if defaults.further == Some(other) => Ok(Self::Sigmoid(ends.0, ends.1)),
+            other => {
+                let supported = "linear, scaled_linear, squaredcos_cap_v2";
+                Err(options.unsupported("beta_schedule", &other.into(), supported))
+            }
+        }
+    }
+}
+
+/// What becomes of the little signal that usually survives the last training step.
+///
+/// # References
+///
+/// Lin et al. (2024), "Common Diffusion Noise Schedules and Sample Steps are Flawed", algorithm 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TerminalSnr {
+    /// It stays.
+    Kept,
+    /// The schedule is stretched until none is left.
+    Zero,
+    /// As `Zero`, with 2⁻²⁴ kept in the last step, so that σ stays finite.
+    AlmostZero,
+}
+
+/// What a scheduler assumes about the schedule where its configuration is silent.
+#[derive(Debug)]
+pub(super) struct ScheduleDefaults {
+    /// Name of the curve.
+    pub(super) curve: &'static str,
+    /// First and last β.
+    pub(super) ends: (f64, f64),
+    /// The curve that only this scheduler knows.
+    pub(super) further: Option<&'static str>,
+    /// What rescaling to zero terminal signal means to it; `None`: it does not know it.
+    pub(super) rescaled: Option<TerminalSnr>,
+}
+
+/// The defaults that most schedulers share.
+pub(super) const DEFAULTS: ScheduleDefaults = ScheduleDefaults {
+    curve: "linear",
+    ends: (1e-4, 0.02),
+    further: None,
+    rescaled: Some(TerminalSnr::AlmostZero),
+};
+
+/// Evenly spaced f32 numbers, counted from both ends as PyTorch does.
+fn linspace(first: f64, last: f64, steps: usize) -> Vec<f32> {
+    let (first, last) = (first as f32, last as f32);
+    let step = (last - first) / (steps - 1) as f32;
+    let value = |i: usize| {
+        if i < steps / 2 {
+            first + step * i as f32
+        } else {
+            last - step * (steps - 1 - i) as f32
+        }
+    };
+    (0..steps).map(value).collect()
+}
+
+/// The β that make the signal fall as a function of t in [0, 1], at most 0.999.
+fn betas_of(signal: impl Fn(f64) -> f64, steps: usize) -> Vec<f32> {
+    let at = |i: usize| signal(i as f64 / steps as f64);
+    (0..steps)
+        .map(|i| (1.0 - at(i + 1) / at(i)).min(0.999) as f32)
+        .collect()
+}
+
+fn squared_cosine(t: f64) -> f64 {
+    ((t + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2)
+        .cos()
+        .powi(2)
+}
+
+fn sigmoid_betas(first: f64, last: f64, steps: usize) -> Vec<f32> {
+    let rise = (last - first) as f32;
+    let logistic = |x: f32| 1.0 / (1.0 + (-x).exp());
+    linspace(-6.0, 6.0, steps)
+        .into_iter()
+        .map(|x| logistic(x) * rise + first as f32)
+        .collect()
+}
+
+fn trained(betas: &[f64], steps: usize) -> Result<Vec<f32>> {
+    check_range(
+        "length of trained_betas",
+        betas.len() as f64,
+        steps as f64,
+        steps as f64,
+    )?;
+    for (i, &beta) in betas.iter().enumerate() {
+        let (min, max) = if i == 0 { (1e-8, 0.9999) } else { (0.0, 1.0) };
+        check_range("trained_betas", beta, min, max)?;
+    }
+    Ok(betas.iter().map(|&beta| beta as f32).collect())
+}
+
+fn trained_list(options: &Options, list: &Value) -> Result<BetaCurve> {
+    let numbers: Option<Vec<f64>> = list
+        .as_array()
+        .and_then(|list| list.iter().map(Value::as_f64).collect());
+    match numbers {
+        Some(betas) => Ok(BetaCurve::Trained(betas)),
+        None => Err(options.unsupported("trained_betas", list, "a list of numbers")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stable_diffusion::scheduler::NoiseSchedule;
+
+    /// The closed form of the cosine curve at both ends and in the middle: the famous integer
+    /// division makes all but the last of these zero.
+    #[test]
+    fn cosine_betas_match_their_closed_form() {
+        let schedule =
+            NoiseSchedule::new(&BetaCurve::SquaredCosine, 1000, TerminalSnr::Kept).unwrap();
+        let ratio = squared_cosine(0.5) / squared_cosine(0.0);
+        assert!((schedule.alpha_cumprod(499) / ratio - 1.0).abs() < 1e-5);
+        assert!((f64::from(schedule.betas()[0]) - 4.1284e-5).abs() < 1e-8);
+        assert!((schedule.betas()[999] - 0.999).abs() < 1e-7);
+    }
+}

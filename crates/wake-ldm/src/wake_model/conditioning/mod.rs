@@ -1,0 +1,30 @@
+//! What the small wake model is told about a scene: numbers, places in the ship's frame, and words.
+//!
+//! ```text
+//! prompt ─► token ids ─► compact ids ─► reader ─► numbers
+//! numbers ─┬─► Fourier features ──────────────┐
+//!          ├─► places in the ship's frame ────┼─► model
+//!          └─► scene ─► image expected of it ─┘
+//! ```
+//!
+//! Whatever is not known is left out: a number that no prompt states has the flag 0 and no value, and without
+//! speed, heading and place of the ship the maps are empty.
+
+mod conditions;
+mod features;
+mod position_maps;
+mod statement;
+mod vocabulary;
+
+use wake_text::Tokenizer;
+
+pub use conditions::Conditions;
+pub use features::{FEATURES, features};
+pub use position_maps::{MapGrid, PATCH, PLACES, WEDGE, places};
+pub use statement::{QUANTITIES, statement};
+pub use vocabulary::Vocabulary;
+
+/// CLIP's ids of a prompt, with marks and padding.
+pub fn tokens(prompt: &str) -> Vec<u32> {
+    Tokenizer::clip().encode(prompt).ids.to_vec()
+}

@@ -1,0 +1,88 @@
+//! From noise to what mean and spread leave open: the random sea.
+
+use burn::module::Module;
+use burn::nn::conv::Conv2d;
+use burn::tensor::activation::silu;
+use burn::tensor::{DType, Device, Tensor};
+
+use super::config::WakeModelConfig;
+use super::known::Known;
+use crate::nn::cast_to;
+use crate::nn::conv::{conv3x3, convolve};
+use crate::nn::patch::{depth_to_space, space_to_depth};
+use crate::unet::{UNet, UNetInput};
+use crate::wake_model::conditioning::PLACES;
+
+/// The steps that σ = 1 stands for in the embedding of the step.
+const STEPS: f64 = 1000.0;
+
+/// The flow that turns noise n into the residual r of a scene's latents, along x = cos φ r + sin φ n, φ = πσ/2.
+///
+/// The noise is [`SeaNoise`](super::SeaNoise). Were the residual like it, the velocity would be 0 everywhere: the flow only
+/// has to learn what tells the two apart.
+///
+/// The numbers enter every residual block, and every attention as its only token; the places in the ship's frame and
+/// the expected image are laid over the noisy one.
+///
+/// # References
+///
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants: A Unifying Framework for Flows and Diffusions"
+/// (the trigonometric interpolant); Salimans & Ho (2022), "Progressive Distillation for Fast Sampling of Diffusion Models"
+/// (v in terms of an angle).
+#[derive(Module, Debug)]
+pub struct Flow {
+    maps: Conv2d,
+    unet: UNet,
+    fold: usize,
+}
+
+/// What is known of some scenes, in the form that every step uses.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    numbers: Tensor<2>,
+    maps: Tensor<4>,
+}
+
+impl Flow {
+    pub(super) fn new(config: &WakeModelConfig, device: &Device) -> Self {
+        let folded = (PLACES + config.latent_channels) * config.fold * config.fold;
+        Self {
+            maps: conv3x3(folded, config.map_channels, device),
+            unet: config.unet().init(device),
+            fold: config.fold,
+        }
+    }
+
+    /// Type of the weights.
+    pub fn dtype(&self) -> DType {
+        self.maps.weight.val().dtype()
+    }
+
+    /// Puts what is known in the form that every step uses.
+    pub fn prepared(&self, known: &Known) -> Prepared {
+        let dtype = self.dtype();
+        let maps = Tensor::cat(vec![known.places.clone(), known.wake.clone()], 1);
+        let maps = space_to_depth(cast_to(maps, dtype), self.fold);
+        Prepared {
+            numbers: cast_to(known.numbers.clone(), dtype),
+            maps: silu(convolve(&self.maps, maps)),
+        }
+    }
+
+    /// The velocity ∂x/∂φ = cos φ n − sin φ r, on average over all r and n that make x.
+    ///
+    /// # Shapes
+    ///
+    /// `x` and result: `[batch, channels, rows, columns]`; `sigma`: 0 to 1, `[batch]`.
+    pub fn velocity(&self, x: Tensor<4>, sigma: Tensor<1>, known: &Prepared) -> Tensor<4> {
+        let maps = cast_to(known.maps.clone(), x.dtype());
+        let folded = space_to_depth(x, self.fold);
+        let velocity = self.unet.forward(UNetInput {
+            sample: Tensor::cat(vec![folded, maps], 1),
+            timesteps: sigma * STEPS,
+            context: known.numbers.clone().unsqueeze_dim(1),
+            condition: Some(known.numbers.clone()),
+        });
+        depth_to_space(velocity, self.fold)
+    }
+}

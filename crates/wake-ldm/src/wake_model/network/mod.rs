@@ -1,0 +1,19 @@
+//! The small wake model: a linear patch transform, a reader of prompts, mean and spread of the latents, and a flow.
+
+mod config;
+mod flow;
+mod known;
+mod model;
+mod patches;
+mod prior;
+mod prompt_parser;
+mod sea;
+
+pub use config::WakeModelConfig;
+pub use flow::{Flow, Prepared};
+pub use known::{Known, expected_grey, expected_latents};
+pub use model::WakeModel;
+pub use patches::{PatchTransform, Shares};
+pub use prior::{Expected, Prior};
+pub use prompt_parser::{PromptParser, windows};
+pub use sea::{SeaNoise, sea_noise};

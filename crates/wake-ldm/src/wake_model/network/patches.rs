@@ -1,0 +1,271 @@
+//! The autoencoder in closed form: squares of pixels as a few whitened principal components.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, TensorData};
+
+use crate::nn::patch::{depth_to_space, space_to_depth};
+use crate::wake_model::conditioning::PATCH;
+
+/// Pixels of a square.
+pub(super) const PIXELS: usize = PATCH * PATCH;
+
+/// A linear map between squares of 8 × 8 pixels and a few numbers, both ways.
+///
+/// ```text
+/// z = W p,    p ≈ V z,    W = Λ^(−1/2) Vᵀ,  V = E Λ^(1/2)
+/// ```
+///
+/// - p: the grey of a square of an image whose mean has been taken away
+/// - E, Λ: the first principal components of such squares and their variances
+///
+/// Each z has variance 1 over the data. No linear map of so many numbers loses less.
+///
+/// # References
+///
+/// Pearson (1901), "On Lines and Planes of Closest Fit to Systems of Points in Space".
+#[derive(Module, Debug)]
+pub struct PatchTransform {
+    encoder: Param<Tensor<2>>,
+    decoder: Param<Tensor<2>>,
+}
+
+/// How much of the variance each principal component holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shares {
+    /// Variances in grey², the largest first.
+    pub variances: Vec<f64>,
+}
+
+impl Shares {
+    /// Share of the variance that the first `channels` hold.
+    pub fn kept(&self, channels: usize) -> f64 {
+        let total: f64 = self.variances.iter().sum();
+        self.variances.iter().take(channels).sum::<f64>() / total
+    }
+
+    /// Peak signal-to-noise ratio \[dB\] of images decoded from the first `channels`; the peak is 1.
+    ///
+    /// ```text
+    /// PSNR = −10 log₁₀(Σ of the variances left out / 64)
+    /// ```
+    pub fn psnr(&self, channels: usize) -> f64 {
+        let lost: f64 = self.variances.iter().skip(channels).sum();
+        -10.0 * (lost / PIXELS as f64).log10()
+    }
+}
+
+impl PatchTransform {
+    /// A transform that still has to be fitted or loaded.
+    pub fn zeros(channels: usize, device: &Device) -> Self {
+        Self {
+            encoder: Param::from_tensor(Tensor::zeros([channels, PIXELS], device)),
+            decoder: Param::from_tensor(Tensor::zeros([PIXELS, channels], device)),
+        }
+    }
+
+    /// The transform of some images, fitted in closed form.
+    ///
+    /// - `images`: grey, each `size × size` pixels, in rows; `size` is a multiple of 8
+    pub fn fit<'a>(
+        images: impl Iterator<Item = &'a [f32]>,
+        size: usize,
+        channels: usize,
+        device: &Device,
+    ) -> (Self, Shares) {
+        let (values, vectors) = symmetric_eigen(covariance(images, size));
+        let mut encoder = vec![0.0; channels * PIXELS];
+        let mut decoder = vec![0.0; PIXELS * channels];
+        for (c, &value) in values.iter().take(channels).enumerate() {
+            let deviation = value.max(1e-12).sqrt();
+            for p in 0..PIXELS {
+                encoder[c * PIXELS + p] = (vectors[p][c] / deviation) as f32;
+                decoder[p * channels + c] = (vectors[p][c] * deviation) as f32;
+            }
+        }
+        let matrix = |numbers, shape: [usize; 2]| {
+            Param::from_tensor(Tensor::from_data(TensorData::new(numbers, shape), device))
+        };
+        let transform = Self {
+            encoder: matrix(encoder, [channels, PIXELS]),
+            decoder: matrix(decoder, [PIXELS, channels]),
+        };
+        (transform, Shares { variances: values })
+    }
+
+    /// Where the transform lies.
+    pub(super) fn device(&self) -> Device {
+        self.encoder.val().device()
+    }
+
+    /// What each channel weighs the pixels of a square with, `[channels, 64]`.
+    pub(super) fn encoder_rows(&self) -> Vec<f32> {
+        self.encoder.val().into_data().iter::<f32>().collect()
+    }
+
+    /// Encodes images.
+    ///
+    /// # Shapes
+    ///
+    /// - `images`: `[batch, 1, rows, columns]`, grey 0…1
+    /// - result: latents `[batch, channels, rows / 8, columns / 8]` and the mean grey `[batch, 1]`
+    pub fn encode(&self, images: Tensor<4>) -> (Tensor<4>, Tensor<2>) {
+        let [batch, _, rows, columns] = images.dims();
+        let mean = images.clone().reshape([batch, rows * columns]).mean_dim(1);
+        let squares = space_to_depth(images - mean.clone().reshape([batch, 1, 1, 1]), PATCH);
+        (mix(self.encoder.val(), squares), mean)
+    }
+
+    /// Decodes latents to grey; values may lie a little beyond 0…1.
+    ///
+    /// # Shapes
+    ///
+    /// - `latents`: `[batch, channels, rows, columns]`
+    /// - `mean`: mean grey of each image, `[batch, 1]`
+    /// - result: `[batch, 1, 8 rows, 8 columns]`
+    pub fn decode(&self, latents: Tensor<4>, mean: Tensor<2>) -> Tensor<4> {
+        let [batch, ..] = latents.dims();
+        depth_to_space(mix(self.decoder.val(), latents), PATCH) + mean.reshape([batch, 1, 1, 1])
+    }
+}
+
+/// A matrix applied to the channels of every pixel.
+fn mix(matrix: Tensor<2>, image: Tensor<4>) -> Tensor<4> {
+    let [batch, channels, rows, columns] = image.dims();
+    let [out, _] = matrix.dims();
+    let pixels = image.reshape([batch, channels, rows * columns]);
+    matrix
+        .unsqueeze::<3>()
+        .matmul(pixels)
+        .reshape([batch, out, rows, columns])
+}
+
+/// Covariance of the squares of images whose means have been taken away.
+fn covariance<'a>(images: impl Iterator<Item = &'a [f32]>, size: usize) -> Vec<Vec<f64>> {
+    let mut sums = vec![vec![0.0; PIXELS]; PIXELS];
+    let mut count = 0.0;
+    for image in images {
+        let mean = image.iter().sum::<f32>() / image.len() as f32;
+        for corner in 0..(size / PATCH) * (size / PATCH) {
+            let start = corner / (size / PATCH) * PATCH * size + corner % (size / PATCH) * PATCH;
+            let square: [f32; PIXELS] =
+                std::array::from_fn(|p| image[start + p / PATCH * size + p % PATCH] - mean);
+            for (row, &a) in sums.iter_mut().zip(&square) {
+                for (sum, &b) in row.iter_mut().zip(&square) {
+                    *sum += f64::from(a * b);
+                }
+            }
+            count += 1.0;
+        }
+    }
+    for value in sums.iter_mut().flatten() {
+        *value /= count;
+    }
+    sums
+}
+
+/// Eigenvalues of a symmetric matrix, the largest first, and its eigenvectors as columns, by Jacobi's rotations.
+///
+/// # References
+///
+/// Golub & Van Loan (2013), "Matrix Computations", section 8.5.
+fn symmetric_eigen(mut a: Vec<Vec<f64>>) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let n = a.len();
+    let mut vectors: Vec<Vec<f64>> = (0..n)
+        .map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect())
+        .collect();
+    let scale: f64 = a.iter().flatten().map(|x| x * x).sum();
+    for _ in 0..60 {
+        let off: f64 = (0..n)
+            .map(|i| a[i][..i].iter().map(|x| x * x).sum::<f64>())
+            .sum();
+        if off <= 1e-26 * scale {
+            break;
+        }
+        for p in 0..n {
+            for q in p + 1..n {
+                rotate(&mut a, &mut vectors, p, q);
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
+    let values = order.iter().map(|&i| a[i][i]).collect();
+    for row in &mut vectors {
+        *row = order.iter().map(|&i| row[i]).collect();
+    }
+    (values, vectors)
+}
+
+/// Makes a[p][q] zero.
+fn rotate(a: &mut [Vec<f64>], vectors: &mut [Vec<f64>], p: usize, q: usize) {
+    if a[p][q].abs() < 1e-300 {
+        return;
+    }
+    let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+    let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+    let c = 1.0 / (t * t + 1.0).sqrt();
+    let s = t * c;
+    for row in a.iter_mut().chain(vectors.iter_mut()) {
+        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+    }
+    let (first, second) = (a[p].clone(), a[q].clone());
+    for (k, (x, y)) in first.into_iter().zip(second).enumerate() {
+        (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+mod tests {
+    use super::*;
+
+    /// Waves of two directions: two components hold almost all of it.
+    fn images() -> Vec<Vec<f32>> {
+        let wave = |k: [f64; 2], phase: f64| -> Vec<f32> {
+            (0..64 * 64)
+                .map(|i| {
+                    let (y, x) = ((i / 64) as f64, (i % 64) as f64);
+                    (0.5 + 0.1 * (k[0] * x + k[1] * y + phase).sin()) as f32
+                })
+                .collect()
+        };
+        (0..8).map(|i| wave([0.7, 0.05], f64::from(i))).collect()
+    }
+
+    #[test]
+    fn eigenvalues_are_those_of_a_matrix_worked_out_by_hand() {
+        let (values, vectors) = symmetric_eigen(vec![
+            vec![2.0, 1.0, 0.0],
+            vec![1.0, 2.0, 0.0],
+            vec![0.0, 0.0, 5.0],
+        ]);
+        for (value, expected) in values.iter().zip([5.0, 3.0, 1.0]) {
+            assert!((value - expected).abs() < 1e-14);
+        }
+        assert!((vectors[0][1] / vectors[1][1] - 1.0).abs() < 1e-14);
+        assert!((vectors[0][2] / vectors[1][2] + 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn decoding_loses_what_the_variances_say() {
+        let images = images();
+        let device = Device::flex();
+        for channels in [1, 2] {
+            let (transform, shares) =
+                PatchTransform::fit(images.iter().map(Vec::as_slice), 64, channels, &device);
+            let data = TensorData::new(images.concat(), [8, 1, 64, 64]);
+            let batch = Tensor::<4>::from_data(data, &device);
+            let (latents, mean) = transform.encode(batch.clone());
+            let lost = (transform.decode(latents.clone(), mean) - batch)
+                .square()
+                .mean();
+            let psnr = -10.0 * f64::from(lost.into_scalar::<f32>()).log10();
+            // Two components leave 60 dB and more, far above the rounding of f32 at 150 dB.
+            assert!(
+                (psnr - shares.psnr(channels)).abs() < 0.01,
+                "{psnr} {shares:?}"
+            );
+            let variance = latents.square().mean().into_scalar::<f32>();
+            assert!((variance - 1.0).abs() < 1e-3, "{variance}");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Mean and spread of the latents of a scene, from its numbers and the image expected of it.
+
+use burn::module::Module;
+use burn::nn::conv::Conv2d;
+use burn::nn::{Linear, LinearConfig};
+use burn::tensor::activation::silu;
+use burn::tensor::{Device, Tensor};
+
+use super::config::WakeModelConfig;
+use super::known::Known;
+use crate::nn::cast_to;
+use crate::nn::conv::{conv1x1, convolve};
+use crate::wake_model::conditioning::{FEATURES, PLACES};
+
+/// Largest |ln s|.
+const LARGEST_LOG_SPREAD: f64 = 3.0;
+/// Layers after the first.
+const LAYERS: usize = 3;
+/// Width of the network of the mean grey.
+const GREY_WIDTH: usize = 128;
+
+/// Mean and spread of the latents of a scene, over all seas that it can have.
+///
+/// ```text
+/// mean μ = (1 + a) w + m,    spread s
+/// ```
+///
+/// - w: latents of the image that physics expects, [`expected_latents`](super::expected_latents)
+/// - a, m, ln s: of a network that sees one latent pixel, its place in the ship's frame and the numbers: what the
+///   formula of w neglects, and the roughness of the sea
+///
+/// What is left, (z − μ)/s, has mean 0 and variance 1 at every pixel; the flow draws it.
+///
+/// # References
+///
+/// Lee et al. (2022), "`PriorGrad`: Improving Conditional Denoising Diffusion Models with Data-Dependent Adaptive
+/// Prior"; Han, Zheng & Zhou (2022), "CARD: Classification and Regression Diffusion Models" (a regression first, then a
+/// diffusion about it); Nix & Weigend (1994), "Estimating the Mean and Variance of the Target Probability Distribution".
+#[derive(Module, Debug)]
+pub struct Prior {
+    places: Conv2d,
+    wake: Conv2d,
+    layers: Vec<Conv2d>,
+    numbers: Vec<Linear>,
+    gain: Conv2d,
+    mean: Conv2d,
+    spread: Conv2d,
+    grey_in: Linear,
+    grey_out: Linear,
+}
+
+/// What a [`Prior`] says of the images of a batch.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// μ, `[batch, channels, rows, columns]`.
+    pub mean: Tensor<4>,
+    /// ln s, `[batch, channels, rows, columns]`.
+    pub log_spread: Tensor<4>,
+    /// Mean grey of each image, `[batch, 1]`.
+    pub grey: Tensor<2>,
+}
+
+impl Prior {
+    pub(super) fn new(config: &WakeModelConfig, device: &Device) -> Self {
+        let (width, channels) = (config.prior_width, config.latent_channels);
+        let linear = |from, to| LinearConfig::new(from, to).init(device);
+        Self {
+            places: conv1x1(PLACES, width, device),
+            wake: conv1x1(channels, width, device),
+            layers: (0..LAYERS).map(|_| conv1x1(width, width, device)).collect(),
+            numbers: (0..=LAYERS).map(|_| linear(FEATURES, width)).collect(),
+            gain: conv1x1(width, channels, device),
+            mean: conv1x1(width, channels, device),
+            spread: conv1x1(width, channels, device),
+            grey_in: linear(FEATURES, GREY_WIDTH),
+            grey_out: linear(GREY_WIDTH, 1),
+        }
+    }
+
+    /// Mean, spread and brightness at the latent pixels of `known`, of its type.
+    pub fn forward(&self, known: &Known) -> Expected {
+        let (dtype, wide) = (self.mean.weight.val().dtype(), known.wake.dtype());
+        let numbers = cast_to(known.numbers.clone(), dtype);
+        let told = |layer: &Linear| {
+            let told = layer.forward(numbers.clone());
+            let [batch, width] = told.dims();
+            told.reshape([batch, width, 1, 1])
+        };
+        let seen = convolve(&self.places, cast_to(known.places.clone(), dtype))
+            + convolve(&self.wake, cast_to(known.wake.clone(), dtype));
+        let mut x = silu(seen + told(&self.numbers[0]));
+        for (layer, numbers) in self.layers.iter().zip(&self.numbers[1..]) {
+            x = silu(convolve(layer, x.clone()) + told(numbers)) + x;
+        }
+        let out = |layer: &Conv2d| cast_to(convolve(layer, x.clone()), wide);
+        let hidden = silu(self.grey_in.forward(numbers.clone()));
+        Expected {
+            mean: known.wake.clone() * (out(&self.gain) + 1.0) + out(&self.mean),
+            log_spread: (out(&self.spread) / LARGEST_LOG_SPREAD).tanh() * LARGEST_LOG_SPREAD,
+            grey: cast_to(self.grey_out.forward(hidden), wide),
+        }
+    }
+}
+
+impl Expected {
+    /// What the flow draws: (z − μ)/s.
+    pub fn residual(&self, latents: Tensor<4>) -> Tensor<4> {
+        (latents - self.mean.clone()) * self.log_spread.clone().neg().exp()
+    }
+
+    /// The latents z = μ + s r of a residual r.
+    pub fn latents(&self, residual: Tensor<4>) -> Tensor<4> {
+        residual * self.log_spread.clone().exp() + self.mean.clone()
+    }
+}

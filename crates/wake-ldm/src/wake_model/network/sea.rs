@@ -1,0 +1,244 @@
+//! The noise that a flow starts from: seas to first order.
+
+use burn::tensor::{Tensor, TensorData};
+use wake_physics::{LinearSea, Scene};
+
+use super::known::runs_of_equals;
+use super::patches::{PIXELS, PatchTransform};
+use crate::error::Result;
+use crate::noise::{INITIAL_STREAM, NoiseSource, normal_batch};
+use crate::wake_model::conditioning::PATCH;
+
+/// Share of the noise that is white in every channel: what the image has beyond the first order needs some to start from.
+const WHITE: f64 = 0.2;
+/// Stream of the white share.
+const WHITE_STREAM: u32 = 2;
+/// A channel has at least this share of the variance that it would have of a white field.
+const LEAST_SHARE: f64 = 1e-5;
+
+/// Gaussian noise in the latents of a scene, of variance 1 in every channel, correlated as its sea is.
+///
+/// ```text
+/// n = √(1 − ε) f/√(var f) + √ε g
+/// ```
+///
+/// - f: latents of a [`LinearSea`] of the scene, with their variance in each channel
+/// - g: white noise; alone where the sea has no waves
+///
+/// # References
+///
+/// Lee et al. (2022), "`PriorGrad`", section 3 (noise with the variance that the data have); Kollovieh et al. (2024), "Flow
+/// Matching with Gaussian Process Priors for Probabilistic Time Series Forecasting".
+#[derive(Debug, Clone)]
+pub struct SeaNoise {
+    sea: LinearSea,
+    /// Factors of f, and of g, in each channel.
+    shares: Vec<[f32; 2]>,
+}
+
+impl SeaNoise {
+    /// The noise of a scene, with or without its ship.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
+    pub fn new(scene: &Scene, patches: &PatchTransform) -> Result<Self> {
+        let sea = LinearSea::new(scene)?;
+        let variances = variances(&sea, &patches.encoder_rows());
+        let share = |variance: f64| match variance {
+            0.0 => [0.0, 1.0],
+            _ => [((1.0 - WHITE) / variance).sqrt(), WHITE.sqrt()].map(|x| x as f32),
+        };
+        Ok(Self {
+            shares: variances.into_iter().map(share).collect(),
+            sea,
+        })
+    }
+
+    /// Noise of a source.
+    ///
+    /// # Shapes
+    ///
+    /// `[1, channels, rows / 8, columns / 8]` of the scene, on the device of `patches`
+    pub fn draw(&self, source: NoiseSource, patches: &PatchTransform) -> Tensor<4> {
+        let device = patches.device();
+        let field = self
+            .sea
+            .field(&source.normal(INITIAL_STREAM, self.sea.normals()));
+        let shape = [1, 1, field.rows, field.columns];
+        let field = Tensor::from_data(TensorData::new(field.values, shape), &device);
+        let (waves, _) = patches.encode(field);
+        let [_, channels, rows, columns] = waves.dims();
+        let white = normal_batch(&[source], WHITE_STREAM, [channels, rows, columns], &device);
+        let factor = |which: usize| -> Tensor<4> {
+            let factors: Vec<f32> = self.shares.iter().map(|share| share[which]).collect();
+            Tensor::from_data(TensorData::new(factors, [1, channels, 1, 1]), &device)
+        };
+        waves * factor(0) + white * factor(1)
+    }
+}
+
+/// The noise of some scenes, each from its own source; scenes that follow on their equal are looked at once.
+///
+/// # Shapes
+///
+/// `[scenes, channels, rows / 8, columns / 8]`, on the device of `patches`
+///
+/// # Errors
+///
+/// As [`SeaNoise::new`].
+pub fn sea_noise(
+    scenes: &[Scene],
+    sources: &[NoiseSource],
+    patches: &PatchTransform,
+) -> Result<Tensor<4>> {
+    let seas = runs_of_equals(scenes, |scene| SeaNoise::new(scene, patches))?;
+    let drawn = seas.iter().zip(sources);
+    let drawn = drawn.map(|(sea, &source)| sea.draw(source, patches));
+    Ok(Tensor::cat(drawn.collect(), 0))
+}
+
+/// Variance of each channel: wᵀ C w with C the covariance of the pixels of a square; 0 where there are no waves.
+fn variances(sea: &LinearSea, encoder: &[f32]) -> Vec<f64> {
+    let covariance = sea.covariance();
+    let lag = |a: usize, b: usize, n: usize| (n + a - b) % n;
+    let between = |p: usize, q: usize| {
+        let row = lag(p / PATCH, q / PATCH, covariance.rows);
+        f64::from(covariance.at(row, lag(p % PATCH, q % PATCH, covariance.columns)))
+    };
+    let matrix: Vec<f64> = (0..PIXELS * PIXELS)
+        .map(|i| between(i / PIXELS, i % PIXELS))
+        .collect();
+    let of_channel = |weights: &[f32]| {
+        let weights: Vec<f64> = weights.iter().map(|&w| f64::from(w)).collect();
+        let rows = matrix.chunks_exact(PIXELS).zip(&weights);
+        let sum: f64 = rows
+            .map(|(row, w)| w * row.iter().zip(&weights).map(|(c, v)| c * v).sum::<f64>())
+            .sum();
+        let white = matrix[0] * weights.iter().map(|w| w * w).sum::<f64>();
+        sum.max(LEAST_SHARE * white)
+    };
+    encoder.chunks_exact(PIXELS).map(of_channel).collect()
+}
+
+#[cfg(all(test, feature = "flex"))]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+    use burn::tensor::Device;
+    use wake_physics::grey::GreyScale;
+    use wake_physics::simulate;
+
+    fn scene(seed: u64) -> Scene {
+        let mut scene = Scene::default();
+        (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (128, 128, 4.0);
+        scene.sea.wind_speed = 5.0;
+        scene.ship = None;
+        scene.seed = seed;
+        scene
+    }
+
+    /// Grey of simulated open sea.
+    fn grey(scene: &Scene) -> Vec<f32> {
+        let scale = GreyScale::default();
+        let values = simulate(scene).unwrap().intensity.values;
+        values
+            .iter()
+            .map(|&v| scale.grey(f64::from(v)) as f32)
+            .collect()
+    }
+
+    fn patches(images: &[Vec<f32>]) -> PatchTransform {
+        let pixels = images.iter().map(Vec::as_slice);
+        PatchTransform::fit(pixels, 128, 16, &Device::flex()).0
+    }
+
+    fn numbers(tensor: Tensor<4>) -> Vec<f32> {
+        tensor.into_data().iter::<f32>().collect()
+    }
+
+    #[test]
+    fn every_channel_has_variance_one() {
+        let patches = patches(&[grey(&scene(1)), grey(&scene(2))]);
+        let sea = SeaNoise::new(&scene(0), &patches).unwrap();
+        let mut sums = [0.0; 16];
+        let draws = 40;
+        for seed in 0..draws {
+            let noise = numbers(sea.draw(NoiseSource::new(seed), &patches));
+            for (channel, pixels) in noise.chunks(256).enumerate() {
+                sums[channel] += pixels.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>();
+            }
+        }
+        for sum in sums {
+            let variance = sum / (draws * 256) as f64;
+            // 10,240 numbers, correlated over a few: half a thousand independent ones at least, so 6 % each way, 4 times.
+            assert!((variance - 1.0).abs() < 0.25, "{variance}");
+        }
+        let again = sea_noise(
+            &[scene(5), scene(6)],
+            &[3, 4].map(NoiseSource::new),
+            &patches,
+        );
+        let one = sea.draw(NoiseSource::new(4), &patches);
+        let second = again.unwrap().narrow(0, 1, 1);
+        assert_eq!(numbers(second), numbers(one));
+    }
+
+    /// Neighbouring latents of the simulator's seas: the noise has their correlations but for its white share.
+    #[test]
+    fn noise_is_correlated_as_the_sea_is() {
+        let seas: Vec<Vec<f32>> = (1..25).map(|seed| grey(&scene(seed))).collect();
+        let patches = patches(&seas);
+        let sea = SeaNoise::new(&scene(0), &patches).unwrap();
+        // Covariances of channels 0…5 of a pixel with those of the pixel to its right, of the pixel below it.
+        let correlations = |images: &[Vec<f32>]| -> Vec<f64> {
+            let at = |z: &[f32], c: usize, i: usize, j: usize| f64::from(z[(c * 16 + i) * 16 + j]);
+            let mut all = Vec::new();
+            for (down, right) in [(0, 1), (1, 0), (1, 1)] {
+                for (a, b) in (0..36).map(|n| (n / 6, n % 6)) {
+                    let mut sums = [0.0; 3];
+                    for z in images {
+                        for (i, j) in (0..225).map(|n| (n / 15, n % 15)) {
+                            let (x, y) = (at(z, a, i, j), at(z, b, i + down, j + right));
+                            sums[0] += x * y;
+                            sums[1] += x * x;
+                            sums[2] += y * y;
+                        }
+                    }
+                    all.push(sums[0] / (sums[1] * sums[2]).sqrt());
+                }
+            }
+            all
+        };
+        let encoded = |image: &Vec<f32>| {
+            let data = TensorData::new(image.clone(), [1, 1, 128, 128]);
+            numbers(patches.encode(Tensor::from_data(data, &Device::flex())).0)
+        };
+        let simulated = correlations(&seas.iter().map(encoded).collect::<Vec<_>>());
+        let drawn = |seed| numbers(sea.draw(NoiseSource::new(seed), &patches));
+        let drawn = correlations(&(0..24).map(drawn).collect::<Vec<_>>());
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let slope = dot(&simulated, &drawn) / dot(&simulated, &simulated);
+        let likeness =
+            dot(&simulated, &drawn) / (dot(&simulated, &simulated) * dot(&drawn, &drawn)).sqrt();
+        assert!(likeness > 0.9, "{likeness} {slope}");
+        // Four fifths of the linear sea's, which are a little stronger than those of the image.
+        assert!((0.75..1.25).contains(&slope), "{slope}");
+    }
+
+    #[test]
+    fn noise_of_a_flat_sea_is_white() {
+        let patches = patches(&[grey(&scene(1))]);
+        let mut calm = scene(0);
+        calm.sea.wind_speed = 0.0;
+        let noise = SeaNoise::new(&calm, &patches).unwrap();
+        let drawn = noise.draw(NoiseSource::new(1), &patches);
+        let white = normal_batch(
+            &[NoiseSource::new(1)],
+            WHITE_STREAM,
+            [16, 16, 16],
+            &Device::flex(),
+        );
+        assert_eq!(numbers(drawn), numbers(white));
+    }
+}

@@ -1,0 +1,215 @@
+//! The architecture page holds: every room stands in it, imports point up its lists and never round in a circle, its
+//! picture is that of the code, and files stay small.
+//!
+//! `DRAW=1 cargo test --test tidy` draws the picture anew.
+
+mod imports;
+mod picture;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
+
+use imports::{Crate, Names};
+use picture::Column;
+
+/// The crates, in the order in which they import each other.
+const CRATES: [&str; 3] = ["wake-physics", "wake-text", "wake-ldm"];
+
+/// Longest source file [lines]: tests are not counted.
+const LONGEST_FILE: usize = 450;
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(name: &str) -> Crate {
+    Crate::read(&root().join("crates").join(name).join("src"))
+}
+
+fn page() -> String {
+    fs::read_to_string(root().join("docs/architecture.md")).expect("the page")
+}
+
+/// The rooms of a crate in the fenced list of the page, in the order of the data flow: a file, a folder, or the path of
+/// one such as `wake_model/sampler`.
+fn rooms(page: &str, name: &str) -> Vec<Names> {
+    let fence = format!("```text {name}\n");
+    let start = page
+        .find(&fence)
+        .unwrap_or_else(|| panic!("no list of {name}"));
+    let body = &page[start + fence.len()..];
+    let lines = body[..body.find("```").expect("an end of the list")].lines();
+    let names = lines.filter_map(|line| line.split_whitespace().next());
+    names
+        .map(|room| room.split('/').map(str::to_owned).collect())
+        .collect()
+}
+
+/// The room that a file lies in.
+fn room_of(rooms: &[Names], module: &Names) -> Option<usize> {
+    rooms.iter().position(|room| module.starts_with(room))
+}
+
+/// The edges between rooms: (importing, imported); files without a room are only folders of rooms.
+fn edges(code: &Crate, rooms: &[Names]) -> BTreeSet<(usize, usize)> {
+    let mut edges = BTreeSet::new();
+    for module in code.files.keys() {
+        let Some(here) = room_of(rooms, module) else {
+            continue;
+        };
+        let there = code
+            .imports(module)
+            .into_iter()
+            .filter_map(|other| room_of(rooms, &other));
+        edges.extend(
+            there
+                .filter(|&there| there != here)
+                .map(|there| (here, there)),
+        );
+    }
+    edges
+}
+
+#[test]
+fn every_file_has_its_room_and_every_room_its_files() {
+    let page = page();
+    let mut wrong = Vec::new();
+    for name in CRATES {
+        let (code, rooms) = (read(name), rooms(&page, name));
+        assert!(code.files.len() > 1, "{name} has no sources");
+        for (module, file) in &code.files {
+            let holds_rooms = rooms.iter().any(|room| room.starts_with(module));
+            if room_of(&rooms, module).is_none() && !holds_rooms {
+                wrong.push(format!(
+                    "{}: not in the list of {name}",
+                    file.path.display()
+                ));
+            }
+        }
+        for room in &rooms {
+            if !code.files.contains_key(room) {
+                wrong.push(format!("{name}: {} is listed but gone", room.join("/")));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn imports_point_up_the_lists() {
+    let page = page();
+    let mut wrong = Vec::new();
+    for name in CRATES {
+        let (code, rooms) = (read(name), rooms(&page, name));
+        for module in code.files.keys() {
+            let Some(here) = room_of(&rooms, module) else {
+                continue;
+            };
+            for other in code.imports(module) {
+                if room_of(&rooms, &other).is_some_and(|there| there > here) {
+                    wrong.push(format!(
+                        "{name}: {} imports {} from below",
+                        module.join("/"),
+                        other.join("/")
+                    ));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let mut wrong = Vec::new();
+    for name in ["wake-text", "wake-ldm"] {
+        for circle in read(name).circles() {
+            let files: Vec<String> = circle.iter().map(|module| module.join("/")).collect();
+            wrong.push(format!("{name}: {}", files.join(", ")));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Stable Diffusion and the wake model share rooms, and nothing of each other; other crates are met in few files.
+#[test]
+fn rooms_meet_only_where_they_may() {
+    let code = read("wake-ldm");
+    let mut wrong = Vec::new();
+    let models = ["stable_diffusion", "wake_model"];
+    let foreign: [(&str, &[&str]); 2] = [
+        ("wake_physics", &["error", "wake_model", "dataset", "train"]),
+        (
+            "wake_text",
+            &["error", "stable_diffusion", "wake_model", "dataset"],
+        ),
+    ];
+    for module in code.files.keys().filter(|module| !module.is_empty()) {
+        for other in code.imports(module) {
+            let two = [&module[0], other.first().unwrap_or(&module[0])];
+            if two[0] != two[1] && two.iter().all(|room| models.contains(&room.as_str())) {
+                wrong.push(format!("{} imports {}", module.join("/"), other.join("/")));
+            }
+        }
+        for (name, rooms) in foreign {
+            if code.names_crate(module, name) && !rooms.contains(&module[0].as_str()) {
+                wrong.push(format!("{} names {name}", module.join("/")));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_picture_is_that_of_the_code() {
+    let page = page();
+    let columns = CRATES.map(|name| {
+        let (code, rooms) = (read(name), rooms(&page, name));
+        Column {
+            title: name.to_owned(),
+            edges: edges(&code, &rooms),
+            rooms: rooms.iter().map(|room| room.join("/")).collect(),
+        }
+    });
+    let drawn = picture::draw(&columns);
+    let path = root().join("docs/architecture.svg");
+    if std::env::var_os("DRAW").is_some() {
+        fs::write(&path, &drawn).expect("a writable picture");
+    }
+    let kept = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        kept == drawn,
+        "docs/architecture.svg is old: `DRAW=1 cargo test --test tidy` draws it"
+    );
+}
+
+#[test]
+fn files_stay_small() {
+    let mut wrong = Vec::new();
+    for name in CRATES {
+        for file in read(name)
+            .files
+            .values()
+            .filter(|file| file.lines > LONGEST_FILE)
+        {
+            wrong.push(format!("{}: {} lines", file.path.display(), file.lines));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The default scene file is the default scene, and every scene file is valid.
+#[test]
+fn scene_files_are_valid() {
+    let folder = root().join("assets/scenes");
+    let default = wake_physics::Scene::read(&folder.join("default.toml")).expect("the default");
+    assert_eq!(default, wake_physics::Scene::default());
+    let mut count = 0;
+    for entry in fs::read_dir(folder).expect("the folder") {
+        let path = entry.expect("an entry").path();
+        wake_physics::Scene::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        count += 1;
+    }
+    assert!(count >= 5, "only {count} scene files");
+}
