@@ -38,7 +38,7 @@ impl ImageSource for Model {
         };
         let sampler = self.0.clone().with_conditioning(told);
         let mut images = Vec::with_capacity(scenes.len());
-        // The sampler counts seeds up within a batch.
+        // Image k of a call has the first seed plus k.
         for batch in scenes.chunk_by(|one, next| next.seed == one.seed.wrapping_add(1)) {
             let prompts: Vec<String> = batch
                 .iter()

@@ -10,7 +10,7 @@ use image::codecs::png::PngEncoder;
 use serde_json::{Value, json};
 use wake_ldm::device_named;
 use wake_ldm::pipeline::{Pipeline, Request, to_bytes};
-use wake_ldm::scheduler::SchedulerConfig;
+use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
 use wake_physics::{Scene, output};
 
 use super::{Arguments, finish, image_name, progress, prompt};
@@ -59,7 +59,9 @@ fn scheduler(arguments: &Arguments, pipeline: &Pipeline) -> wake_ldm::Result<Sch
     match &arguments.scheduler {
         None => Ok(own),
         // A model's file may leave clipping to the default, which latents must not have.
-        Some(name) => own.with("clip_sample", false)?.with_class(name),
+        Some(name) => own
+            .with(SchedulerOption::ClipSample(false))?
+            .with_class(name),
     }
 }
 

@@ -7,14 +7,15 @@
 //! ```
 //!
 //! Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and
-//! `report.json`; the model that lies in `wake-ldm` also writes `labels.json`.
+//! `report.json`; the model that lies in `wake-ldm` also writes `labels.json`, and says which scene it drew: what the
+//! prompt states, and the default values of what it leaves open. A prompt that states nothing of a scene is an error.
 
 mod diffusers;
 #[path = "../common/exit.rs"]
 mod exit;
 #[path = "../common/progress.rs"]
 mod progress;
-mod small;
+mod wake_model;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -72,8 +73,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     match arguments.weights.as_deref() {
-        None => small::run(arguments),
-        Some(folder) if folder.join("config.json").is_file() => small::run(arguments),
+        None => wake_model::run(arguments),
+        Some(folder) if folder.join("config.json").is_file() => wake_model::run(arguments),
         Some(folder) if folder.join("unet").is_dir() => diffusers::run(arguments, folder),
         Some(folder) => Err(format!(
             "--weights {}: no model there; a folder that `train` wrote holds config.json, one in diffusers layout unet/",

@@ -97,10 +97,17 @@ fn scenes(sampler: &WakeSampler) -> Vec<Scene> {
 /// Draws the scenes, again from the first where a batch has more; image k has the seed k, whatever the batch.
 fn draw(sampler: &WakeSampler, scenes: &[Scene], batch: usize) -> wake_ldm::Result<Vec<Field>> {
     let count = scenes.len().max(batch);
-    let all: Vec<Scene> = scenes.iter().cycle().take(count).cloned().collect();
+    let seeded = |(seed, scene): (u64, &Scene)| Scene {
+        seed,
+        ..scene.clone()
+    };
+    let all: Vec<Scene> = (0..)
+        .zip(scenes.iter().cycle().take(count))
+        .map(seeded)
+        .collect();
     let mut images = Vec::with_capacity(count);
-    for (k, scenes) in all.chunks(batch).enumerate() {
-        let drawn = sampler.sample_scenes(scenes, (k * batch) as u64)?;
+    for scenes in all.chunks(batch) {
+        let drawn = sampler.sample_scenes(scenes)?;
         images.extend(drawn.into_iter().map(|image| image.grey));
     }
     Ok(images)

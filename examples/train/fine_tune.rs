@@ -179,7 +179,7 @@ fn save(options: &Options, run: &FineTune, parts: &PipelineParts, device: &Devic
         unet: run.unet(),
         ..parts.clone()
     };
-    Pipeline::new(parts, device).save(&options.out, Precision::F32)?;
+    Pipeline::new(parts, device)?.save(&options.out, Precision::F32)?;
     if let Some(changes) = run.changes() {
         changes.save(
             "unet",

@@ -142,7 +142,7 @@ pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
             },
             config.clone(),
         )?;
-        let drawn = sampler.sample_scenes(&scenes_of(&examples, &config), 0)?;
+        let drawn = sampler.sample_scenes(&scenes_of(&examples, &config))?;
         let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
         sheet(&examples, &drawn, &options.out.join("sheet.png"))
     })

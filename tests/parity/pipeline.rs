@@ -45,13 +45,17 @@ fn all_runs() -> Vec<Runs> {
     found
 }
 
+/// One text, or a list of them.
 fn texts(value: &Value) -> Vec<String> {
-    value
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|text| text.as_str().unwrap().to_owned())
-        .collect()
+    match value {
+        Value::String(text) => vec![text.clone()],
+        list => list
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|text| text.as_str().unwrap().to_owned())
+            .collect(),
+    }
 }
 
 /// The scheduler of a run, or the option that is refused.
@@ -97,6 +101,7 @@ fn request(run: &Value, config: SchedulerConfig, golden: &Golden, pipeline: &Pip
         request = match key.as_str() {
             "prompt" | "eta" => request,
             "negative_prompt" => request.with_negative(texts(value)),
+            "num_images_per_prompt" => request.with_count(value.as_u64().unwrap() as usize),
             "guidance_scale" => request.with_guidance(value.as_f64().unwrap()),
             "guidance_rescale" => request.with_guidance_rescale(value.as_f64().unwrap()),
             "strength" => {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use burn::tensor::Tensor;
 use wake_ldm::Error;
 use wake_ldm::pipeline::{Pipeline, Prompts, Request, StartImage};
-use wake_ldm::scheduler::SchedulerConfig;
+use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
 
 use crate::golden::{devices, difference, folder, numbers};
 
@@ -31,7 +31,7 @@ fn pipelines() -> Vec<(&'static str, Pipeline)> {
 fn noisy(prompts: impl Into<Prompts>) -> Request {
     let scheduler = SchedulerConfig::stable_diffusion("ddim")
         .unwrap()
-        .with("eta", 1.0)
+        .with(SchedulerOption::Eta(1.0))
         .unwrap();
     Request::new(prompts)
         .with_scheduler(scheduler)
@@ -171,7 +171,8 @@ fn hard_prompts_give_finite_images() {
 #[test]
 fn a_start_image_steers_the_result() {
     for (_, pipeline) in pipelines() {
-        let pixels = Tensor::<4>::full([1, 3, 16, 24], 0.8, pipeline.device());
+        let channels = pipeline.autoencoder().image_channels();
+        let pixels = Tensor::<4>::full([1, channels, 16, 24], 0.8, pipeline.device());
         let at = |strength: f64| {
             let request = Request::new("a ship")
                 .with_steps(10)
@@ -206,6 +207,10 @@ fn a_start_image_steers_the_result() {
 fn requests_that_make_no_sense_are_refused_by_name() {
     let (_, pipeline) = pipelines().remove(0);
     let device = pipeline.device().clone();
+    let [latent, channels] = {
+        let autoencoder = pipeline.autoencoder();
+        [autoencoder.latent_channels(), autoencoder.image_channels()]
+    };
     let zeros = |shape: [usize; 4]| Tensor::<4>::zeros(shape, &device);
     let none: Vec<String> = vec![];
     let start = |shape| StartImage::Pixels(zeros(shape));
@@ -229,23 +234,23 @@ fn requests_that_make_no_sense_are_refused_by_name() {
         ("rows", noisy("a").with_size(usize::MAX, 16)),
         (
             "shape of latents",
-            noisy("a").with_latents(zeros([1, 3, 8, 12])),
+            noisy("a").with_latents(zeros([1, latent + 1, 8, 12])),
         ),
         (
             "strength",
-            noisy("a").with_start(start([1, 3, 16, 24]), 0.0),
+            noisy("a").with_start(start([1, channels, 16, 24]), 0.0),
         ),
         (
             "shape of the start image",
-            noisy("a").with_start(start([1, 1, 16, 24]), 1.0),
+            noisy("a").with_start(start([1, channels + 1, 16, 24]), 1.0),
         ),
         (
             "shape of the start image",
-            noisy("a").with_start(start([1, 3, 16, 16]), 1.0),
+            noisy("a").with_start(start([1, channels, 16, 16]), 1.0),
         ),
         (
             "number of start images",
-            noisy("a").with_start(start([3, 3, 16, 24]), 1.0),
+            noisy("a").with_start(start([3, channels, 16, 24]), 1.0),
         ),
         (
             "width of embeddings",

@@ -103,7 +103,7 @@ fn small(device: &Device) -> Pipeline {
         scheduler: SchedulerConfig::stable_diffusion("dpm++").unwrap(),
         latent_size: 4,
     };
-    Pipeline::new(parts, device)
+    Pipeline::new(parts, device).unwrap()
 }
 
 /// Our own small models with random weights, the vocabulary from the crate. In f32 the image is the same but

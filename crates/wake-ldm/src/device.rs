@@ -56,6 +56,17 @@ pub fn device_named(name: &str) -> Result<Device> {
     }
 }
 
+/// Whether a device is a CPU, where compilers, not drivers, make the code.
+#[cfg(feature = "flex")]
+pub(crate) fn is_cpu(device: &Device) -> bool {
+    #[cfg(feature = "ndarray")]
+    #[allow(deprecated, reason = "kept until burn drops it")]
+    if *device == Device::ndarray() {
+        return true;
+    }
+    *device == Device::flex()
+}
+
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;

@@ -64,6 +64,14 @@ pub enum Error {
     #[error("{} is not a valid safetensors file: {reason}", path.display())]
     InvalidSafetensors { path: PathBuf, reason: String },
 
+    /// A weight that no training gives.
+    #[error("{} is damaged: tensor {tensor} holds {value}; all weights must be finite", path.display())]
+    InvalidWeight {
+        path: PathBuf,
+        tensor: String,
+        value: f64,
+    },
+
     /// The tensors of a file are not those of the model; nothing was loaded.
     #[error("{} does not fit the model: {mismatch}", path.display())]
     WeightsMismatch {
@@ -108,6 +116,18 @@ pub enum Error {
         line: usize,
         message: String,
     },
+
+    /// A prompt from which no scene follows.
+    #[error(
+        "the prompt {} states nothing of a scene; say, for example, whether there is a ship, its speed and heading, the \
+         wind, or the incidence",
+        quoted(prompt)
+    )]
+    NothingStated { prompt: String },
+
+    /// A model's numbers have overflowed, or are none.
+    #[error("{what} holds numbers that are not finite: the weights do not fit, or are damaged")]
+    NotFinite { what: String },
 
     /// The system gave no thread.
     #[error("cannot start a thread: {source}; use fewer threads")]
@@ -190,6 +210,15 @@ fn shorten(names: &[String]) -> String {
         text.push_str(&format!(" and {} more", names.len() - SHOWN));
     }
     text
+}
+
+/// A text in quotation marks, escaped and cut to 80 characters.
+fn quoted(text: &str) -> String {
+    let mut shown: String = text.chars().take(80).flat_map(char::escape_debug).collect();
+    if text.chars().nth(80).is_some() {
+        shown.push('…');
+    }
+    format!("'{shown}'")
 }
 
 /// Checks that a number lies in a closed range.

@@ -102,6 +102,8 @@ impl CrossAttention {
 
     /// Attends from `x` to `context`, or to `x` itself where there is none.
     ///
+    /// The softmax over a single token is 1: all of `x` then sees its value, and nothing else is computed.
+    ///
     /// # Shapes
     ///
     /// - `x`: `[batch, tokens, channels]`
@@ -109,6 +111,10 @@ impl CrossAttention {
     /// - result: as `x`
     pub fn forward(&self, x: Tensor<3>, context: Option<Tensor<3>>) -> Tensor<3> {
         let context = context.unwrap_or_else(|| x.clone());
+        if context.dims()[1] == 1 {
+            let seen = self.to_out.forward(self.to_v.forward(context));
+            return seen.repeat_dim(1, x.dims()[1]);
+        }
         let key = self.to_k.forward(context.clone());
         let value = self.to_v.forward(context);
         let query = self.to_q.forward(x);
@@ -165,5 +171,28 @@ mod native {
         ) -> [Vec<f32>; 3] {
             attention::gradients(inputs, gradient, self)
         }
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+mod tests {
+    use super::*;
+    use crate::noise::{NoiseSource, normal_batch};
+
+    /// A token beside its copy shares its weight, whatever the queries: the same numbers by the long way.
+    #[test]
+    fn a_single_token_is_seen_as_two_of_it_are() {
+        let device = Device::flex();
+        let layer = CrossAttention::new(8, 6, 2, true, &device);
+        let noise = |seed, [tokens, channels]: [usize; 2]| -> Tensor<3> {
+            normal_batch(&[NoiseSource::new(seed)], 0, [1, tokens, channels], &device)
+                .reshape([1, tokens, channels])
+        };
+        let (x, token) = (noise(1, [5, 8]), noise(2, [1, 6]));
+        let one = layer.forward(x.clone(), Some(token.clone()));
+        let two = layer.forward(x, Some(token.repeat_dim(1, 2)));
+        assert_eq!(one.dims(), [1, 5, 8]);
+        // Numbers around 1, a few roundings of 6e-8 each.
+        assert!((one - two).abs().max().into_scalar::<f32>() < 1e-6);
     }
 }

@@ -11,7 +11,7 @@ use burn::tensor::{Device, Tensor};
 /// ω_i = 10000^(−i / (n/2 − s)),   e(t) = [cos(t ω_0…), sin(t ω_0…)]
 /// ```
 ///
-/// - `channels` n, even
+/// - `channels` n; of an odd number the last is 0
 /// - `frequency_shift` s: 0 in Stable Diffusion
 /// - `cos_first`: else the sines come first
 ///
@@ -37,11 +37,16 @@ pub fn sinusoidal_embedding(
     );
     let angles = timesteps.unsqueeze_dim::<2>(1) * frequencies.unsqueeze::<2>();
     let (cos, sin) = (angles.clone().cos(), angles.sin());
-    if cos_first {
-        Tensor::cat(vec![cos, sin], 1)
+    let mut waves = if cos_first {
+        vec![cos, sin]
     } else {
-        Tensor::cat(vec![sin, cos], 1)
+        vec![sin, cos]
+    };
+    if !channels.is_multiple_of(2) {
+        let [batch, _] = waves[0].dims();
+        waves.push(Tensor::zeros([batch, 1], &waves[0].device()));
     }
+    Tensor::cat(waves, 1)
 }
 
 #[expect(
@@ -77,5 +82,25 @@ impl TimestepEmbedding {
     /// `[batch, channels_in]` to `[batch, channels_out]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
         self.linear_2.forward(silu(self.linear_1.forward(x)))
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+mod tests {
+    use super::*;
+
+    /// Diffusers' `get_timestep_embedding` pads odd widths with a zero on the right.
+    #[test]
+    fn an_odd_width_ends_with_a_zero() {
+        let steps = || Tensor::<1>::from_floats([3.0, 700.0], &Device::flex());
+        for cos_first in [true, false] {
+            let odd = sinusoidal_embedding(steps(), 7, cos_first, 0.0);
+            assert_eq!(odd.dims(), [2, 7]);
+            let even = sinusoidal_embedding(steps(), 6, cos_first, 0.0);
+            let same = (odd.clone().narrow(1, 0, 6) - even).abs().max();
+            assert!(same.into_scalar::<f32>() < f32::MIN_POSITIVE);
+            let last = odd.narrow(1, 6, 1).abs().max().into_scalar::<f32>();
+            assert!(last < f32::MIN_POSITIVE);
+        }
     }
 }

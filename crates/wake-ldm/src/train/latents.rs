@@ -4,6 +4,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use half::f16;
 use rayon::prelude::*;
+use wake_physics::scene::Ship;
 
 use crate::conditioning::{Conditions, MapGrid};
 use crate::dataset::Pair;
@@ -28,6 +29,8 @@ impl Example {
         let values = &pair.parameters;
         let conditions = Conditions {
             ship: Some(values.ship),
+            ship_length: values.ship.then(|| Ship::default().length),
+            depth: Some(f64::INFINITY),
             ship_speed: values.ship_speed,
             ship_heading: values.ship_heading,
             ship_position: values.ship_x.zip(values.ship_y).map(|(x, y)| [x, y]),

@@ -82,6 +82,7 @@ impl Contents {
 
 /// One tensor of a file, not read yet.
 pub(crate) struct Stored<'a> {
+    name: String,
     info: &'a TensorInfo,
     file: &'a WeightFile,
 }
@@ -152,8 +153,12 @@ impl WeightFiles {
         let mut tensors = BTreeMap::new();
         for file in &self.files {
             for (name, info) in file.metadata().tensors() {
-                let name = modern(&name);
-                let stored = Stored { info, file };
+                let stored = Stored {
+                    name: modern(&name),
+                    info,
+                    file,
+                };
+                let name = stored.name.clone();
                 if tensors.insert(name.clone(), stored).is_some() {
                     return Err(Error::InvalidSafetensors {
                         path: file.path.clone(),
@@ -220,13 +225,21 @@ impl Stored<'_> {
         )
     }
 
-    /// Reads the numbers, as f32.
+    /// Reads the numbers, as f32; all must be finite.
     pub(crate) fn read(&self) -> Result<Vec<f32>> {
-        match self.dtype() {
+        let numbers = match self.dtype() {
             Dtype::F16 => self.converted(|b: [u8; 2]| f16::from_le_bytes(b).to_f32()),
             Dtype::BF16 => self.converted(|b: [u8; 2]| bf16::from_le_bytes(b).to_f32()),
             Dtype::F64 => self.converted(|b: [u8; 8]| f64::from_le_bytes(b) as f32),
             _ => self.converted(f32::from_le_bytes),
+        }?;
+        match numbers.iter().find(|x| !x.is_finite()) {
+            None => Ok(numbers),
+            Some(x) => Err(Error::InvalidWeight {
+                path: self.file.path.clone(),
+                tensor: self.name.clone(),
+                value: f64::from(*x),
+            }),
         }
     }
 

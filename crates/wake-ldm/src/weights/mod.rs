@@ -40,7 +40,8 @@ pub fn load<M: Module>(model: M, layout: Layout, path: &Path) -> Result<M> {
 /// # Errors
 ///
 /// [`Error::MissingFile`], [`Error::Io`] and [`Error::InvalidSafetensors`] for files that are not there
-/// or not to be trusted; [`Error::WeightsMismatch`] with every tensor that is missing, unexpected or of
+/// or not to be trusted; [`Error::InvalidWeight`] for a number that is infinite or none;
+/// [`Error::WeightsMismatch`] with every tensor that is missing, unexpected or of
 /// another shape; [`Error::UnsupportedPrecision`] where the device cannot compute with it.
 pub fn load_as<M: Module>(
     model: M,
@@ -216,5 +217,40 @@ impl ModuleMapper for Loader<'_> {
         }
         let id = param.id;
         param.transform_for_load(value, id)
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+mod tests {
+    use burn::nn::{Linear, LinearConfig};
+    use burn::tensor::Device;
+
+    use super::*;
+
+    #[derive(Module, Debug)]
+    struct Two {
+        good: Linear,
+        bad: Linear,
+    }
+
+    #[test]
+    fn a_weight_that_is_not_finite_is_refused_with_the_name_of_its_tensor() {
+        let device = Device::flex();
+        let layer = || LinearConfig::new(3, 2).init(&device);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("two.safetensors");
+        for value in [f32::NAN, f32::INFINITY] {
+            let mut bad = layer();
+            bad.weight = bad.weight.map(|weight| weight * 0.0 + value);
+            let model = Two { good: layer(), bad };
+            for precision in [Precision::F32, Precision::F16, Precision::BF16] {
+                save_as(&model, Layout::Diffusers, &path, precision).unwrap();
+                let refused = load(model.clone(), Layout::Diffusers, &path);
+                let Err(Error::InvalidWeight { tensor, .. }) = refused else {
+                    panic!("{value} in {precision:?} was accepted")
+                };
+                assert_eq!(tensor, "bad.weight");
+            }
+        }
     }
 }

@@ -1,14 +1,16 @@
 //! A low-rank adaptation as a module that can be trained, and its file in diffusers' format.
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
 use burn::module::{Initializer, Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::Tensor;
-use serde_json::{Map, json};
+use burn::tensor::{DType, Tensor};
+use safetensors::tensor::{Dtype, TensorView};
 
 use crate::error::{Result, check_range};
 use crate::files::write_atomically;
+use crate::nn::cast_to;
 use crate::weights::Layout;
 use crate::weights::names::ModulePath;
 
@@ -80,26 +82,30 @@ impl LowRank {
     ///
     /// [`Error::Io`](crate::Error::Io) when it cannot be written.
     pub fn save(&self, prefix: &str, path: &Path) -> Result<()> {
-        let (mut header, mut data) = (Map::new(), Vec::new());
-        header.insert("__metadata__".to_owned(), json!({"format": "pt"}));
-        for (i, layer) in self.layers.iter().enumerate() {
-            for (name, factor) in [("lora_A", &self.down[i]), ("lora_B", &self.up[i])] {
-                let matrix = factor.val().transpose();
-                let (shape, start) = (matrix.dims(), data.len());
-                data.extend(matrix.into_data().iter::<f32>().flat_map(f32::to_le_bytes));
-                let entry =
-                    json!({"dtype": "F32", "shape": shape, "data_offsets": [start, data.len()]});
-                header.insert(format!("{prefix}.{layer}.{name}.weight"), entry);
-            }
-        }
-        let mut header = serde_json::Value::Object(header).to_string();
-        while !header.len().is_multiple_of(8) {
-            header.push(' ');
-        }
+        let factors = (self.layers.iter().enumerate()).flat_map(|(i, layer)| {
+            let both = [("lora_A", &self.down[i]), ("lora_B", &self.up[i])];
+            both.map(|(name, factor)| (format!("{prefix}.{layer}.{name}.weight"), factor))
+        });
+        let tensors = factors.map(|(name, factor)| {
+            let matrix = factor.val().transpose();
+            let shape = matrix.dims();
+            let bytes: Vec<u8> = matrix
+                .into_data()
+                .iter::<f32>()
+                .flat_map(f32::to_le_bytes)
+                .collect();
+            (name, shape, bytes)
+        });
+        let tensors: Vec<_> = tensors.collect();
+        let views = tensors.iter().map(|(name, shape, bytes)| {
+            TensorView::new(Dtype::F32, shape.to_vec(), bytes).map(|view| (name, view))
+        });
+        let format = HashMap::from([("format".to_owned(), "pt".to_owned())]);
+        let file = views
+            .collect::<Result<Vec<_>, _>>()
+            .and_then(|views| safetensors::serialize(views, Some(format)));
         write_atomically(path, |writer| {
-            writer.write_all(&(header.len() as u64).to_le_bytes())?;
-            writer.write_all(header.as_bytes())?;
-            writer.write_all(&data)
+            writer.write_all(&file.map_err(std::io::Error::other)?)
         })
     }
 }
@@ -174,10 +180,11 @@ impl ModuleMapper for Adder<'_> {
         }
         let (down, up) = (&self.changes.down[self.next], &self.changes.up[self.next]);
         self.next += 1;
-        let change = down.val().matmul(up.val());
+        let change = cast_to(down.val().matmul(up.val()), DType::F32);
         param.map(|weight| {
-            let shape = weight.dims();
-            weight + change.reshape(shape)
+            // Summed in f32 and rounded once, whatever weights and factors are held in.
+            let (shape, dtype) = (weight.dims(), weight.dtype());
+            cast_to(cast_to(weight, DType::F32) + change.reshape(shape), dtype)
         })
     }
 }
@@ -224,5 +231,55 @@ mod tests {
         // The same sums in the same precision, in another order.
         assert!(distance(run(&read), merged) < 1e-5);
         assert!(LowRank::of_attentions(&block, Layout::Diffusers, 0).is_err());
+    }
+
+    /// Factors and weights may be held in other kinds of number; the weights keep theirs.
+    #[test]
+    fn narrow_weights_take_wide_changes() {
+        let device = Device::flex();
+        let attn1 = CrossAttention::new(6, 4, 2, false, &device);
+        let block = Block { attn1 };
+        let mut change = LowRank::of_attentions(&block, Layout::Diffusers, 2).unwrap();
+        for up in &mut change.up {
+            *up = up.clone().map(|zero| zero + 0.25);
+        }
+        let narrow = block.clone().map(&mut Narrow);
+        let wide = change.merged(block);
+        let merged = change.merged(narrow);
+        let weights = |block: Block| {
+            let mut all = All(Vec::new());
+            block.visit(&mut all);
+            all.0
+        };
+        for ((a, kind), (b, _)) in weights(merged).into_iter().zip(weights(wide)) {
+            assert_eq!(kind, DType::BF16);
+            // The weight and the sum are rounded once each, to 8 bits.
+            let near = |(a, b): (&f32, &f32)| (a - b).abs() <= 2.0 / 256.0 * (b.abs() + 1.0);
+            assert!(a.iter().zip(&b).all(near));
+        }
+    }
+
+    /// Holds weights in 16 bits.
+    struct Narrow;
+
+    impl ModuleMapper for Narrow {
+        fn map_float<const D: usize>(&mut self, weight: Param<Tensor<D>>) -> Param<Tensor<D>> {
+            weight.map(|weight| cast_to(weight, DType::BF16))
+        }
+    }
+
+    /// Every weight and its kind of number.
+    struct All(Vec<(Vec<f32>, DType)>);
+
+    impl ModuleVisitor for All {
+        fn visit_float<const D: usize>(&mut self, weight: &Param<Tensor<D>>) {
+            let weight = weight.val();
+            let kind = weight.dtype();
+            let values = cast_to(weight, DType::F32)
+                .into_data()
+                .iter::<f32>()
+                .collect();
+            self.0.push((values, kind));
+        }
     }
 }

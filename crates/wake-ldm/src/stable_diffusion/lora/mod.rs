@@ -10,6 +10,7 @@ use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
 use crate::error::{Error, Mismatch, Misshapen, Result};
+use crate::nn::cast_to;
 use crate::weights::files::{Stored, WeightFiles};
 use crate::weights::names::ModulePath;
 use crate::weights::{Layout, shapes};
@@ -212,9 +213,9 @@ impl ModuleMapper for Merger<'_> {
             change = change.swap_dims(0, 1);
         }
         param.map(|weight| {
-            let dtype: burn::tensor::FloatDType = weight.dtype().into();
-            let dims = weight.dims();
-            weight + change.reshape(dims).cast(dtype)
+            // Summed in f32 and rounded once, whatever the weights are held in.
+            let (dims, dtype) = (weight.dims(), weight.dtype());
+            cast_to(cast_to(weight, DType::F32) + change.reshape(dims), dtype)
         })
     }
 }

@@ -65,7 +65,7 @@ impl Pipeline {
             scheduler,
             latent_size,
         };
-        Ok(Self::new(parts, device))
+        Self::new(parts, device)
     }
 }
 

@@ -19,6 +19,8 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use wake_text::Tokenizer;
 
 use crate::error::{Result, check_range};
+#[cfg(feature = "flex")]
+use crate::self_check::check_once;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;
 use crate::stable_diffusion::lora::merge_lora;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
@@ -85,7 +87,14 @@ pub struct Pipeline {
 
 impl Pipeline {
     /// A pipeline of models that lie on `device`.
-    pub fn new(parts: PipelineParts, device: &Device) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::WrongNumbers`](crate::Error::WrongNumbers) for a device that is no CPU and fails
+    /// [`self_check`](crate::self_check).
+    pub fn new(parts: PipelineParts, device: &Device) -> Result<Self> {
+        #[cfg(feature = "flex")]
+        check_once(device)?;
         let PipelineParts {
             tokenizer,
             text_encoder,
@@ -94,7 +103,7 @@ impl Pipeline {
             scheduler,
             latent_size,
         } = parts;
-        Self {
+        Ok(Self {
             tokenizer,
             text_encoder,
             unet,
@@ -103,7 +112,7 @@ impl Pipeline {
             latent_size,
             embeddings: Mutex::default(),
             device: device.clone(),
-        }
+        })
     }
 
     /// What the pipeline is made of.

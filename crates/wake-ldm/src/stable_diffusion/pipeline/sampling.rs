@@ -1,11 +1,14 @@
 //! The loop over the steps, as an iterator.
 
+use std::fmt;
+
 use burn::tensor::Tensor;
 
 use super::Pipeline;
 use super::guidance::Guidance;
 use super::request::{Request, StartImage, invalid};
 use crate::error::Result;
+use crate::nn::check_finite;
 use crate::noise::{INITIAL_STREAM, NoiseSource, POSTERIOR_STREAM, STEP_STREAM, normal_batch};
 use crate::stable_diffusion::scheduler::{Scheduler, StepInput};
 use crate::unet::UNetInput;
@@ -28,7 +31,6 @@ pub struct Progress {
 /// A run of the sampler, one step per item.
 ///
 /// Stop asking for items to stop or cancel the run; [`latents`](Self::latents) has what was reached.
-#[derive(Debug)]
 pub struct Sampling<'a> {
     pipeline: &'a Pipeline,
     scheduler: Box<dyn Scheduler>,
@@ -62,9 +64,11 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// As [`sample`](Self::sample).
+    /// As [`sample`](Self::sample), and [`Error::NotFinite`](crate::Error::NotFinite) for a model whose numbers overflow.
     pub fn generate(&self, request: &Request) -> Result<Tensor<4>> {
-        Ok(self.decode(self.sample(request)?.finish()))
+        let latents = self.sample(request)?.finish();
+        check_finite("the latents of the image", &latents)?;
+        Ok(self.decode(latents))
     }
 }
 
@@ -189,6 +193,19 @@ impl<'a> Sampling<'a> {
             shape,
             &self.pipeline.device,
         ))
+    }
+}
+
+impl fmt::Debug for Sampling<'_> {
+    /// How far the run is, without the models and their vocabulary.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Sampling")
+            .field("scheduler", &self.scheduler)
+            .field("guidance", &self.guidance)
+            .field("images", &self.sources.len())
+            .field("latents", &self.latents.dims())
+            .field("next", &self.next)
+            .finish_non_exhaustive()
     }
 }
 

@@ -18,7 +18,7 @@ use super::lms::Lms;
 use super::pndm::PndmConfig;
 use super::sigma_sampler::SigmaConfig;
 use super::unipc::UniPcConfig;
-use super::{Method, NoiseSchedule, Scheduler};
+use super::{Method, NoiseSchedule, Scheduler, SchedulerOption};
 use crate::error::{Error, Result};
 use crate::options::Options;
 
@@ -56,10 +56,10 @@ static CLASSES: [Class; 11] = [
 /// A scheduler and its options, in diffusers' words.
 ///
 /// ```
-/// use wake_ldm::scheduler::SchedulerConfig;
+/// use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
 ///
 /// # fn main() -> Result<(), wake_ldm::Error> {
-/// let config = SchedulerConfig::stable_diffusion("dpm++")?.with("use_karras_sigmas", true)?;
+/// let config = SchedulerConfig::stable_diffusion("dpm++")?.with(SchedulerOption::KarrasSigmas(true))?;
 /// let scheduler = config.scheduler(10)?;
 /// assert_eq!(scheduler.timesteps()[0], 999.0);
 /// # Ok(())
@@ -126,15 +126,19 @@ impl SchedulerConfig {
         Self::from_options(options)
     }
 
-    /// The same with one option changed, for example `"prediction_type"`, `"timestep_spacing"` or
-    /// the arguments of diffusers' steps, `"eta"` (DDIM) and `"order"` (LMS).
+    /// The same with one option changed.
     ///
     /// # Errors
     ///
     /// [`Error::Unsupported`] for an option or value that would change the numbers and is not
     /// implemented, [`Error::OutOfRange`] or [`Error::InvalidOption`] for one that makes no sense.
-    pub fn with(mut self, option: &str, value: impl Into<Value>) -> Result<Self> {
-        self.options.insert(option.to_owned(), value.into());
+    pub fn with(self, option: SchedulerOption) -> Result<Self> {
+        let (key, value) = option.entry();
+        self.with_entry(key, value)
+    }
+
+    fn with_entry(mut self, key: &str, value: Value) -> Result<Self> {
+        self.options.insert(key.to_owned(), value);
         Self::from_options(self.options)
     }
 
@@ -144,7 +148,8 @@ impl SchedulerConfig {
     ///
     /// As [`with`](Self::with).
     pub fn with_class(self, name: &str) -> Result<Self> {
-        self.with("_class_name", class_of(name)?.name)
+        let class = class_of(name)?.name;
+        self.with_entry("_class_name", class.into())
     }
 
     /// The class name in diffusers.
@@ -216,6 +221,7 @@ fn finite(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Prediction, Spacing};
     use super::*;
 
     fn read(text: &str) -> Result<SchedulerConfig> {
@@ -264,7 +270,7 @@ mod tests {
         assert!(matches!(&error, Error::OutOfRange { name, .. } if name.contains("steps_offset")));
         assert!(
             config
-                .with("steps_offset", 0)
+                .with(SchedulerOption::StepsOffset(0))
                 .unwrap()
                 .scheduler(1000)
                 .is_ok()
@@ -275,16 +281,16 @@ mod tests {
     fn noise_prediction_without_any_signal_is_refused() {
         let zero = SchedulerConfig::stable_diffusion("ddim")
             .unwrap()
-            .with("rescale_betas_zero_snr", true)
+            .with(SchedulerOption::ZeroTerminalSnr(true))
             .unwrap()
-            .with("timestep_spacing", "trailing")
+            .with(SchedulerOption::Spacing(Spacing::Trailing))
             .unwrap();
         assert!(matches!(
             zero.scheduler(4),
             Err(Error::InvalidOption { .. })
         ));
         assert!(
-            zero.with("prediction_type", "v_prediction")
+            zero.with(SchedulerOption::Prediction(Prediction::Velocity))
                 .unwrap()
                 .scheduler(4)
                 .is_ok()

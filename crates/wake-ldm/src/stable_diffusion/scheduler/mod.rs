@@ -25,6 +25,7 @@ mod known_options;
 mod lcm;
 mod lms;
 mod log_snr_path;
+mod option;
 mod pndm;
 mod prediction;
 mod schedule;
@@ -42,8 +43,10 @@ use crate::options::Options;
 
 pub use betas::{BetaCurve, TerminalSnr};
 pub use config::SchedulerConfig;
+pub use option::SchedulerOption;
 pub use prediction::{Clipping, NoiseLevel, Prediction};
 pub use schedule::NoiseSchedule;
+pub use spacing::Spacing;
 
 /// One call of the model, and what a scheduler needs to move on.
 #[derive(Debug)]

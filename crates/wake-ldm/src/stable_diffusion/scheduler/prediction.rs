@@ -103,7 +103,8 @@ impl Prediction {
         Err(options.unsupported("prediction_type", &name.into(), &names.join(", ")))
     }
 
-    fn name(self) -> &'static str {
+    /// Its name in diffusers.
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Epsilon => "epsilon",
             Self::Sample => "sample",

@@ -9,13 +9,26 @@ use crate::options::Options;
 ///
 /// Lin et al. (2024), "Common Diffusion Noise Schedules and Sample Steps are Flawed", table 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Spacing {
+pub enum Spacing {
     /// Multiples of T/n from 0 up; the noisiest step is left out.
     Leading,
     /// Multiples of T/n from the end down; the cleanest steps are left out.
     Trailing,
     /// Evenly from the first to the last.
     Linspace,
+}
+
+impl Spacing {
+    const ALL: [Self; 3] = [Self::Leading, Self::Trailing, Self::Linspace];
+
+    /// Its name in diffusers.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Leading => "leading",
+            Self::Trailing => "trailing",
+            Self::Linspace => "linspace",
+        }
+    }
 }
 
 /// Spacing and offset of the visited steps.
@@ -33,14 +46,10 @@ impl Steps {
     /// Reads `timestep_spacing` and `steps_offset`.
     pub(super) fn take(options: &mut Options, train: usize, default: &str) -> Result<Self> {
         let name = options.string("timestep_spacing", default)?;
-        let spacing = match name.as_str() {
-            "leading" => Spacing::Leading,
-            "trailing" => Spacing::Trailing,
-            "linspace" => Spacing::Linspace,
-            other => {
-                let supported = "leading, trailing, linspace";
-                return Err(options.unsupported("timestep_spacing", &other.into(), supported));
-            }
+        let known = Spacing::ALL.into_iter().find(|known| known.name() == name);
+        let Some(spacing) = known else {
+            let supported = Spacing::ALL.map(Spacing::name).join(", ");
+            return Err(options.unsupported("timestep_spacing", &name.into(), &supported));
         };
         let offset = options.usize("steps_offset", 0)?;
         check_range("steps_offset", offset as f64, 0.0, train as f64)?;

@@ -4,9 +4,6 @@ use wake_physics::Scene;
 use wake_physics::scene::Ship;
 use wake_text::PartialScene;
 
-/// Length of the ship that the small model knows \[m\]: the one of the paper's grid.
-pub(super) const SHIP_LENGTH: f64 = 195.0;
-
 /// What is known of a scene; `None` is left open.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Conditions {
@@ -18,21 +15,26 @@ pub struct Conditions {
     pub ship_heading: Option<f64>,
     /// Midship (x, y) \[m\].
     pub ship_position: Option<[f64; 2]>,
+    /// Ship length \[m\]; no prompt states it.
+    pub ship_length: Option<f64>,
     /// Wind speed at 10 m height [m/s].
     pub wind_speed: Option<f64>,
     /// Where the wind blows to [deg clockwise from azimuth].
     pub wind_toward: Option<f64>,
     /// Fetch \[m\].
     pub fetch: Option<f64>,
+    /// Water depth \[m\], may be infinite; no prompt states it.
+    pub depth: Option<f64>,
     /// Incidence angle \[deg\].
     pub incidence: Option<f64>,
 }
 
 impl Conditions {
-    /// What a prompt states; its ship, if any, is in the middle of the image.
+    /// What a prompt states; its ship, if any, is in the middle of the image. A stated speed or heading is one of a ship.
     pub fn of_prompt(said: &PartialScene) -> Self {
+        let moves = said.ship_speed.or(said.ship_heading).is_some();
         Self {
-            ship: said.ship,
+            ship: said.ship.or(moves.then_some(true)),
             ship_speed: said.ship_speed,
             ship_heading: said.ship_heading,
             ship_position: said.ship_speed.and(Some([0.0, 0.0])),
@@ -40,6 +42,7 @@ impl Conditions {
             wind_toward: said.wind_toward,
             fetch: said.fetch,
             incidence: said.incidence,
+            ..Self::default()
         }
     }
 
@@ -52,6 +55,8 @@ impl Conditions {
             ship_speed: ship.map(|ship| ship.speed),
             ship_heading: ship.map(|ship| ship.heading),
             ship_position: ship.map(|ship| ship.position),
+            ship_length: ship.map(|ship| ship.length),
+            depth: Some(scene.sea.depth),
             wind_speed: Some(scene.sea.wind_speed),
             wind_toward: windy.then_some(scene.sea.wind_toward),
             fetch: windy.then_some(scene.sea.fetch),
@@ -72,17 +77,20 @@ impl Conditions {
             speed,
             heading,
             position,
+            length,
             ..
         }) = &mut scene.ship
         {
             *speed = self.ship_speed.unwrap_or(*speed);
             *heading = self.ship_heading.unwrap_or(*heading);
             *position = self.ship_position.unwrap_or(*position);
+            *length = self.ship_length.unwrap_or(*length);
         }
         let sea = &mut scene.sea;
         sea.wind_speed = self.wind_speed.unwrap_or(sea.wind_speed);
         sea.wind_toward = self.wind_toward.unwrap_or(sea.wind_toward);
         sea.fetch = self.fetch.unwrap_or(sea.fetch);
+        sea.depth = self.depth.unwrap_or(sea.depth);
         scene.radar.incidence = self.incidence.unwrap_or(scene.radar.incidence);
         scene
     }

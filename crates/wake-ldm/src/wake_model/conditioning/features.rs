@@ -117,6 +117,7 @@ mod tests {
             wind_toward: Some(90.0),
             fetch: Some(4e4),
             incidence: Some(32.0),
+            ..Conditions::default()
         }
     }
 

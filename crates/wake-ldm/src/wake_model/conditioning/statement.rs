@@ -69,6 +69,7 @@ impl Conditions {
             wind_toward: direction(4),
             fetch: number(5, LOG_FETCH).map(|log| 10f64.powf(log)),
             incidence: number(6, INCIDENCE),
+            ..Self::default()
         }
     }
 
@@ -77,23 +78,18 @@ impl Conditions {
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         let ship = self.ship.or(other.ship);
-        let other = match ship {
-            Some(false) => Self {
-                ship_speed: None,
-                ship_heading: None,
-                ship_position: None,
-                ..other
-            },
-            _ => other,
-        };
+        let there = ship != Some(false);
+        let either = |ours: Option<f64>, theirs: Option<f64>| ours.or(theirs).filter(|_| there);
         Self {
             ship,
-            ship_speed: self.ship_speed.or(other.ship_speed),
-            ship_heading: self.ship_heading.or(other.ship_heading),
-            ship_position: self.ship_position.or(other.ship_position),
+            ship_speed: either(self.ship_speed, other.ship_speed),
+            ship_heading: either(self.ship_heading, other.ship_heading),
+            ship_position: self.ship_position.or(other.ship_position).filter(|_| there),
+            ship_length: either(self.ship_length, other.ship_length),
             wind_speed: self.wind_speed.or(other.wind_speed),
             wind_toward: self.wind_toward.or(other.wind_toward),
             fetch: self.fetch.or(other.fetch),
+            depth: self.depth.or(other.depth),
             incidence: self.incidence.or(other.incidence),
         }
     }
@@ -113,6 +109,7 @@ mod tests {
             wind_toward: Some(90.0),
             fetch: Some(4e4),
             incidence: Some(32.0),
+            ..Conditions::default()
         }
     }
 

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use wake_physics::Scene;
+use wake_physics::scene::Ship;
 
 use crate::error::{Error, Result, check_range};
 use crate::unet::UNetConfig;
@@ -33,8 +35,12 @@ pub struct WakeModelConfig {
     pub map_channels: usize,
     /// Groups of every group normalisation.
     pub norm_groups: usize,
-    /// CLIP's ids that the reader knows.
+    /// CLIP's ids that the parser knows.
     pub vocabulary: Vec<u32>,
+    /// The scene of all training images but for what the model is told: radar, hull, depth, spectrum. Its grid is not
+    /// looked at.
+    #[serde(default)]
+    pub scene: Scene,
 }
 
 impl WakeModelConfig {
@@ -52,6 +58,7 @@ impl WakeModelConfig {
             map_channels: 32,
             norm_groups: 16,
             vocabulary: vocabulary.known().to_vec(),
+            scene: Scene::default(),
         }
     }
 
@@ -103,12 +110,58 @@ impl WakeModelConfig {
         self.unet().validate()
     }
 
-    /// The default scene on the pixels of the model: what the model knows nothing of has its values.
+    /// The training scene on the pixels of the model: what the model knows nothing of has its values.
     pub fn base_scene(&self) -> Scene {
-        let mut scene = Scene::default();
+        let mut scene = self.scene.clone();
         (scene.grid.rows, scene.grid.columns) = (self.image_size, self.image_size);
         scene.grid.spacing = self.spacing;
         scene
+    }
+
+    /// Checks that a scene is one that the model was trained for: all that the model is not told is as in training.
+    ///
+    /// It is told of the ship, its speed, heading and place, of wind, fetch and incidence; seed, time, number of looks and
+    /// the simulation's own accuracy may be any.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidOption`] with the first value that differs, named as in a scene file.
+    pub fn check_scene(&self, scene: &Scene) -> Result<()> {
+        let (grid, size, spacing) = (&scene.grid, self.image_size, self.spacing);
+        if [grid.rows, grid.columns] != [size, size] || (grid.spacing - spacing).abs() > 1e-9 {
+            let [rows, columns] = [grid.rows, grid.columns];
+            return Err(Error::InvalidOption {
+                option: "grid".to_owned(),
+                value: format!("{rows} × {columns} pixels of {} m", grid.spacing),
+                expected: format!("{size} × {size} pixels of {spacing} m, as the model draws them"),
+            });
+        }
+        let expected = as_json(&self.as_trained(scene))?;
+        match first_difference("", &as_json(scene)?, &expected) {
+            None => Ok(()),
+            Some((option, value, trained)) => Err(Error::InvalidOption {
+                option,
+                value,
+                expected: format!("{trained}, as in all images that the model was trained with"),
+            }),
+        }
+    }
+
+    /// The training scene with what the model is told of a scene, or need not know.
+    fn as_trained(&self, scene: &Scene) -> Scene {
+        let mut same = self.base_scene();
+        let ship = same.ship.take().unwrap_or_default();
+        same.ship = scene.ship.as_ref().map(|told| Ship {
+            speed: told.speed,
+            heading: told.heading,
+            position: told.position,
+            ..ship
+        });
+        (same.seed, same.grid, same.model) = (scene.seed, scene.grid.clone(), scene.model.clone());
+        (same.sea.wind_speed, same.sea.wind_toward) = (scene.sea.wind_speed, scene.sea.wind_toward);
+        (same.sea.fetch, same.sea.time) = (scene.sea.fetch, scene.sea.time);
+        (same.radar.incidence, same.radar.looks) = (scene.radar.incidence, scene.radar.looks);
+        same
     }
 
     /// The pixels of an image.
@@ -141,5 +194,88 @@ impl WakeModelConfig {
             )
             .with_norm_groups(self.norm_groups)
             .with_sample_size(self.latent_size() / self.fold)
+    }
+}
+
+fn as_json(scene: &Scene) -> Result<Value> {
+    serde_json::to_value(scene).map_err(|source| Error::Json {
+        path: "scene".into(),
+        source,
+    })
+}
+
+/// Where two scenes differ first, and what each has there.
+fn first_difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
+    let (Value::Object(entries), Value::Object(others)) = (a, b) else {
+        return (a != b).then(|| (name.to_owned(), a.to_string(), b.to_string()));
+    };
+    let keys = entries.keys().chain(others.keys());
+    keys.into_iter().find_map(|key| {
+        let name = match name {
+            "" => key.clone(),
+            _ => format!("{name}.{key}"),
+        };
+        let at = |map: &serde_json::Map<String, Value>| map.get(key).cloned().unwrap_or_default();
+        first_difference(&name, &at(entries), &at(others))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use wake_physics::scene::Polarization;
+
+    use super::*;
+
+    #[test]
+    fn what_the_model_was_not_trained_for_is_refused_by_name() {
+        let config = WakeModelConfig::standard(&Vocabulary::new([1]));
+        let base = config.base_scene();
+        let refused = |change: &dyn Fn(&mut Scene)| {
+            let mut scene = base.clone();
+            change(&mut scene);
+            config.check_scene(&scene).err().map(|e| e.to_string())
+        };
+        let told = refused(&|scene| {
+            let ship = scene.ship.as_mut().unwrap();
+            (ship.speed, ship.heading, ship.position) = (7.0, 200.0, [50.0, -20.0]);
+            (scene.sea.wind_speed, scene.sea.fetch) = (7.0, 2e4);
+            (scene.radar.incidence, scene.radar.looks, scene.seed) = (25.0, 9, 77);
+            scene.model.tolerance = 1e-2;
+        });
+        assert_eq!(told, None);
+        assert_eq!(refused(&|scene| scene.ship = None), None);
+        let other = match base.radar.polarization {
+            Polarization::VV => Polarization::HH,
+            _ => Polarization::VV,
+        };
+        let cases: [(&str, &dyn Fn(&mut Scene)); 5] = [
+            ("grid", &|scene| scene.grid.rows = 128),
+            ("radar.polarization", &|scene| {
+                scene.radar.polarization = other
+            }),
+            ("radar.frequency", &|scene| scene.radar.frequency = 1.27e9),
+            ("sea.depth", &|scene| scene.sea.depth = 10.0),
+            ("ship.length", &|scene| {
+                scene.ship.as_mut().unwrap().length = 80.0
+            }),
+        ];
+        for (name, change) in cases {
+            let message = refused(change).unwrap_or_default();
+            assert!(
+                message.starts_with(&format!("{name} is ")),
+                "{name}: {message}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_configuration_without_a_scene_is_one_of_the_default_scene() {
+        let config = WakeModelConfig::standard(&Vocabulary::new([1]));
+        let mut json = serde_json::to_value(&config).unwrap();
+        let again = WakeModelConfig::from_json(&json.to_string(), Path::new("a")).unwrap();
+        assert_eq!(again, config);
+        json.as_object_mut().unwrap().remove("scene");
+        let old = WakeModelConfig::from_json(&json.to_string(), Path::new("a")).unwrap();
+        assert_eq!(old, config);
     }
 }

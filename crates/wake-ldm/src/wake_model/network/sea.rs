@@ -6,13 +6,11 @@ use wake_physics::{LinearSea, Scene};
 use super::known::runs_of_equals;
 use super::patches::{PIXELS, PatchTransform};
 use crate::error::Result;
-use crate::noise::{INITIAL_STREAM, NoiseSource, normal_batch};
+use crate::noise::{INITIAL_STREAM, NoiseSource, WHITE_STREAM, normal_batch};
 use crate::wake_model::conditioning::PATCH;
 
 /// Share of the noise that is white in every channel: what the image has beyond the first order needs some to start from.
 const WHITE: f64 = 0.2;
-/// Stream of the white share.
-const WHITE_STREAM: u32 = 2;
 /// A channel has at least this share of the variance that it would have of a white field.
 const LEAST_SHARE: f64 = 1e-5;
 

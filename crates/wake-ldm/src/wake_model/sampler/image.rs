@@ -29,16 +29,16 @@ pub struct WakeImage {
     pub intensity: Field,
     /// Intensity with speckle of the scene's number of looks.
     pub speckled: Field,
-    /// Where ship and wake are.
+    /// Where ship and wake are in [`scene`](Self::scene).
     pub labels: Labels,
-    /// The scene that the prompt describes; what it leaves open has its default value.
+    /// What was drawn: the scene that was told, and the default values of what was left open.
     pub scene: Scene,
     /// Seconds by stage.
     pub seconds: SampleSeconds,
 }
 
 impl WakeImage {
-    pub(super) fn new(grey: Field, scene: &Scene, seconds: SampleSeconds) -> Self {
+    pub(super) fn new(grey: Field, scene: Scene, seconds: SampleSeconds) -> Self {
         let scale = GreyScale::default();
         let intensity = Field {
             values: grey
@@ -54,8 +54,8 @@ impl WakeImage {
             grey,
             intensity,
             speckled,
-            labels: labels_of(scene),
-            scene: scene.clone(),
+            labels: labels_of(&scene),
+            scene,
             seconds,
         }
     }

@@ -8,13 +8,15 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use wake_physics::Scene;
 use wake_physics::labels::Labels;
-use wake_physics::{Field, labels_of};
+use wake_physics::{Field, Scene, labels_of};
 use wake_text::{PartialScene, Wording};
 
 use crate::error::{Error, Result, check_range};
+use crate::nn::check_finite;
 use crate::noise::NoiseSource;
+#[cfg(feature = "flex")]
+use crate::self_check::check_once;
 use crate::wake_model::conditioning::{Conditions, Vocabulary};
 use crate::wake_model::network::{
     Expected, Known, WakeModel, WakeModelConfig, expected_latents, sea_noise,
@@ -38,8 +40,12 @@ pub enum Conditioning {
 
 /// Draws radar images of ship wakes.
 ///
+/// What is told becomes one scene, which the result keeps: image, labels and speckle all follow from it, and
+/// [`sample_scenes`](Self::sample_scenes) of it draws the same image again. Its seed is the image's seed.
+///
 /// Images are grey, [`GreyScale::default`](wake_physics::grey::GreyScale), free of speckle as the model makes them.
-/// The sampler holds no gradients and may be given to another thread, for instance to a data loader.
+/// The sampler holds no gradients, whatever device its model was made on, and may be given to another thread, for
+/// instance to a data loader.
 ///
 /// # References
 ///
@@ -59,10 +65,15 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// As [`WakeModelConfig::validate`].
+    /// As [`WakeModelConfig::validate`]; [`Error::WrongNumbers`] for a device that is no CPU and fails
+    /// [`self_check`](crate::self_check).
     pub fn new(model: WakeModel, config: WakeModelConfig) -> Result<Self> {
         config.validate()?;
+        #[cfg(feature = "train")]
+        let model = model.valid();
         let device = model.devices().into_iter().next().unwrap_or_default();
+        #[cfg(feature = "flex")]
+        check_once(&device)?;
         Ok(Self {
             vocabulary: Vocabulary::new(config.vocabulary.iter().copied()),
             device,
@@ -103,18 +114,22 @@ impl WakeSampler {
         self.config.base_scene()
     }
 
-    /// An image of a prompt, with labels that follow from the numbers it states.
+    /// An image of a prompt, with the scene that was drawn and its labels.
     ///
     /// # Errors
     ///
-    /// [`Error::Text`] for a prompt whose numbers contradict each other or are out of range, [`Error::Scene`] for a scene
-    /// that physics refuses.
+    /// [`Error::NothingStated`] for a prompt that states nothing of a scene, [`Error::Text`] for one whose numbers
+    /// contradict each other or are out of range, [`Error::Scene`] for a scene that physics refuses,
+    /// [`Error::NotFinite`] for a model whose numbers overflow.
     pub fn sample(&self, prompt: &str, seed: u64) -> Result<WakeImage> {
         let mut images = self.sample_many(&[prompt], seed)?;
         Ok(images.swap_remove(0))
     }
 
     /// An image of each prompt; image k has the seed `seed + k`.
+    ///
+    /// Calls whose seeds are closer than their prompts are many share seas: a loop counts its seed up by the number of
+    /// prompts.
     ///
     /// # Errors
     ///
@@ -123,6 +138,11 @@ impl WakeSampler {
         let begin = Instant::now();
         let input = |(k, prompt): (u64, &&str)| -> Result<Input> {
             let said = PartialScene::read(prompt)?;
+            if said.is_empty() {
+                return Err(Error::NothingStated {
+                    prompt: (*prompt).to_owned(),
+                });
+            }
             let mut scene = said.onto(&self.base_scene())?;
             scene.seed = seed.wrapping_add(k);
             Ok(Input {
@@ -133,22 +153,21 @@ impl WakeSampler {
         };
         let inputs = (0..).zip(prompts).map(input);
         let inputs: Vec<Input> = inputs.collect::<Result<_>>()?;
-        Ok(self.run(&inputs, begin)?.images(&inputs))
+        Ok(self.run(&inputs, begin)?.images())
     }
 
-    /// An image of each scene; image k has the seed `seed + k`.
+    /// An image of each scene.
     ///
     /// # Errors
     ///
     /// As [`sample_batch`](Self::sample_batch).
-    pub fn sample_scenes(&self, scenes: &[Scene], seed: u64) -> Result<Vec<WakeImage>> {
+    pub fn sample_scenes(&self, scenes: &[Scene]) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
-        let inputs = self.inputs(scenes, seed)?;
-        Ok(self.run(&inputs, begin)?.images(&inputs))
+        let inputs = self.inputs(scenes)?;
+        Ok(self.run(&inputs, begin)?.images())
     }
 
-    /// An image of each scene, in one batch on the device, without speckle, and its labels; image k has the seed
-    /// `seed + k`.
+    /// An image of each scene, in one batch on the device, without speckle, and the labels of what was drawn.
     ///
     /// # Shapes
     ///
@@ -156,49 +175,26 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for no scene, or one whose grid is not the model's, [`Error::Text`] for one that is not
-    /// valid.
-    pub fn sample_batch(&self, scenes: &[Scene], seed: u64) -> Result<(Tensor<4>, Vec<Labels>)> {
-        let inputs = self.inputs(scenes, seed)?;
-        let drawn = self.run(&inputs, Instant::now())?;
-        Ok((drawn.grey, scenes.iter().map(labels_of).collect()))
+    /// [`Error::InvalidOption`] for no scene, or one that the model was not trained for, see
+    /// [`WakeModelConfig::check_scene`]; [`Error::Text`] for one that is not valid; [`Error::NotFinite`] for a model
+    /// whose numbers overflow.
+    pub fn sample_batch(&self, scenes: &[Scene]) -> Result<(Tensor<4>, Vec<Labels>)> {
+        let drawn = self.run(&self.inputs(scenes)?, Instant::now())?;
+        let labels = drawn.scenes.iter().map(labels_of).collect();
+        Ok((drawn.grey, labels))
     }
 
-    fn inputs(&self, scenes: &[Scene], seed: u64) -> Result<Vec<Input>> {
-        let seeds = (0..).map(|k| seed.wrapping_add(k));
-        let inputs = scenes.iter().zip(seeds);
-        inputs
-            .map(|(scene, seed)| self.input(scene, seed))
-            .collect()
-    }
-
-    /// Numbers and words of a scene.
-    fn input(&self, scene: &Scene, seed: u64) -> Result<Input> {
-        let grid = &scene.grid;
-        let size = self.config.image_size;
-        if [grid.rows, grid.columns] != [size, size]
-            || (grid.spacing - self.config.spacing).abs() > 1e-9
-        {
-            return Err(Error::InvalidOption {
-                option: "grid".to_owned(),
-                value: format!(
-                    "{} × {} pixels of {} m",
-                    grid.rows, grid.columns, grid.spacing
-                ),
-                expected: format!(
-                    "{size} × {size} pixels of {} m, as the model draws them",
-                    self.config.spacing
-                ),
-            });
-        }
-        Ok(Input {
-            known: Conditions::of_scene(scene),
-            words: Wording::Paper.prompt(scene)?,
-            scene: Scene {
-                seed,
-                ..scene.clone()
-            },
-        })
+    /// Numbers and words of some scenes.
+    fn inputs(&self, scenes: &[Scene]) -> Result<Vec<Input>> {
+        let input = |scene: &Scene| {
+            self.config.check_scene(scene)?;
+            Ok(Input {
+                known: Conditions::of_scene(scene),
+                words: Wording::Paper.prompt(scene)?,
+                scene: scene.clone(),
+            })
+        };
+        scenes.iter().map(input).collect()
     }
 
     /// From noise to grey, all images at once.
@@ -211,48 +207,60 @@ impl WakeSampler {
             });
         }
         let mut seconds = SampleSeconds::default();
-        let conditions = self.told(inputs);
+        let scenes = self.resolved(inputs)?;
         seconds.text = begin.elapsed().as_secs_f64();
-        let told = conditions.iter().zip(inputs);
-        let scenes: Vec<Scene> = told.map(|(told, input)| told.onto(&input.scene)).collect();
+        let base = Conditions::of_scene(&self.base_scene());
+        let conditions: Vec<Conditions> = scenes
+            .iter()
+            .map(|scene| Conditions::of_scene(scene).or(base))
+            .collect();
         let wake = expected_latents(&scenes, &self.model.patches)?;
         let known = Known::new(&conditions, self.config.grid(), wake);
         let expected = self.model.prior.forward(&known);
-        wait_for(&expected.mean);
+        check_finite("the mean of the image", &expected.mean)?;
         seconds.expect = begin.elapsed().as_secs_f64() - seconds.text;
-        let sources = inputs
+        let sources: Vec<NoiseSource> = scenes
             .iter()
-            .map(|input| NoiseSource::new(input.scene.seed));
-        let noise = sea_noise(&scenes, &sources.collect::<Vec<_>>(), &self.model.patches)?;
+            .map(|scene| NoiseSource::new(scene.seed))
+            .collect();
+        let noise = sea_noise(&scenes, &sources, &self.model.patches)?;
         let latents = self.denoise(&known, &expected, noise);
-        wait_for(&latents);
+        check_finite("the latents of the image", &latents)?;
         seconds.denoise = begin.elapsed().as_secs_f64() - seconds.text - seconds.expect;
         let grey = self.model.decode(latents, &expected);
+        check_finite("the image", &grey)?;
         let pixels: Vec<f32> = grey.to_data().iter::<f32>().collect();
         seconds.total = begin.elapsed().as_secs_f64();
         seconds.decode = seconds.total - seconds.text - seconds.expect - seconds.denoise;
         Ok(Drawn {
+            scenes,
             grey,
             pixels,
             seconds,
         })
     }
 
-    /// The numbers that images are drawn from; what is told of none is that of the base scene.
-    fn told(&self, inputs: &[Input]) -> Vec<Conditions> {
+    /// The scenes that are drawn: what is told, in the place of the input's own values; of what is told of none, those
+    /// of the base scene.
+    fn resolved(&self, inputs: &[Input]) -> Result<Vec<Scene>> {
         let base = Conditions::of_scene(&self.base_scene());
-        if self.conditioning == Conditioning::Numbers {
-            return inputs.iter().map(|input| input.known.or(base)).collect();
-        }
-        let prompts: Vec<&str> = inputs.iter().map(|input| input.words.as_str()).collect();
-        let read = self.model.read(&prompts, &self.vocabulary, &self.device);
-        let pairs = inputs.iter().zip(read);
-        pairs
-            .map(|(input, read)| match self.conditioning {
-                Conditioning::Words => read.or(base),
-                _ => input.known.or(read).or(base),
-            })
-            .collect()
+        let read = match self.conditioning {
+            Conditioning::Numbers => vec![Conditions::default(); inputs.len()],
+            _ => {
+                let prompts: Vec<&str> = inputs.iter().map(|input| input.words.as_str()).collect();
+                self.model.read(&prompts, &self.vocabulary, &self.device)
+            }
+        };
+        let scene = |(input, read): (&Input, Conditions)| {
+            let told = match self.conditioning {
+                Conditioning::Words => read,
+                _ => input.known.or(read),
+            };
+            let scene = told.or(base).onto(&input.scene);
+            scene.validate()?;
+            Ok(scene)
+        };
+        inputs.iter().zip(read).map(scene).collect()
     }
 
     /// Euler's steps along the flow, equal in the angle, from noise to latents.
@@ -270,11 +278,6 @@ impl WakeSampler {
     }
 }
 
-/// Waits until a device has computed a tensor, by reading one number of it.
-fn wait_for(tensor: &Tensor<4>) {
-    tensor.clone().slice([0..1, 0..1, 0..1, 0..1]).into_data();
-}
-
 /// What an image is drawn from.
 struct Input {
     known: Conditions,
@@ -285,6 +288,8 @@ struct Input {
 
 /// Images as they come from the model.
 struct Drawn {
+    /// What they show.
+    scenes: Vec<Scene>,
     grey: Tensor<4>,
     pixels: Vec<f32>,
     seconds: SampleSeconds,
@@ -292,17 +297,17 @@ struct Drawn {
 
 impl Drawn {
     /// The images with their speckle and labels.
-    fn images(&self, inputs: &[Input]) -> Vec<WakeImage> {
+    fn images(self) -> Vec<WakeImage> {
         let [_, _, rows, columns] = self.grey.dims();
-        let images = self.pixels.chunks(rows * columns).zip(inputs);
+        let images = self.pixels.chunks(rows * columns).zip(self.scenes);
         images
-            .map(|(pixels, input)| {
+            .map(|(pixels, scene)| {
                 let grey = Field {
                     rows,
                     columns,
                     values: pixels.to_vec(),
                 };
-                WakeImage::new(grey, &input.scene, self.seconds)
+                WakeImage::new(grey, scene, self.seconds)
             })
             .collect()
     }

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use burn::module::Param;
 use burn::tensor::Device;
-use wake_physics::Scene;
 
 use super::*;
 
@@ -46,19 +46,197 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
     assert!(seconds.total >= seconds.text.max(seconds.denoise).max(seconds.decode));
 }
 
+/// Seas that differ by their seeds.
+fn scenes(sampler: &WakeSampler, seeds: &[u64]) -> Vec<Scene> {
+    let base = sampler.base_scene();
+    let scene = |&seed: &u64| Scene {
+        seed,
+        ..base.clone()
+    };
+    seeds.iter().map(scene).collect()
+}
+
+/// Largest difference of two images.
+fn distance(a: &[f32], b: &[f32]) -> f32 {
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.fold(0.0, f32::max)
+}
+
+/// Matrix products of another size may sum in another order.
+const SAME: f32 = 1e-4;
+/// Two seas differ by more than this in some pixel.
+const OTHER: f32 = 1e-2;
+
+/// A loop that counts its seeds up by one must not get a sea of the batch before.
 #[test]
-fn an_image_is_the_same_alone_and_in_a_batch_and_differs_by_seed() {
+fn the_seed_of_a_scene_is_its_own_in_every_batch() {
     let sampler = sampler();
-    let scenes = vec![sampler.base_scene(); 2];
-    let (batch, labels) = sampler.sample_batch(&scenes, 3).unwrap();
-    assert_eq!((batch.dims(), labels.len()), ([2, 1, 256, 256], 2));
+    let draw = |seeds: &[u64]| -> Vec<Vec<f32>> {
+        let images = sampler.sample_scenes(&scenes(&sampler, seeds)).unwrap();
+        assert!(
+            images
+                .iter()
+                .zip(seeds)
+                .all(|(image, &seed)| image.scene.seed == seed)
+        );
+        images.into_iter().map(|image| image.grey.values).collect()
+    };
+    let (first, second) = (draw(&[3, 9]), draw(&[4, 3]));
+    assert!(distance(&first[0], &second[1]) < SAME);
+    for (a, b) in [
+        (&first[0], &first[1]),
+        (&first[1], &second[0]),
+        (&first[0], &second[0]),
+    ] {
+        assert!(distance(a, b) > OTHER);
+    }
+    let (batch, labels) = sampler.sample_batch(&scenes(&sampler, &[9])).unwrap();
+    assert_eq!((batch.dims(), labels.len()), ([1, 1, 256, 256], 1));
+    let pixels: Vec<f32> = batch.into_data().iter::<f32>().collect();
+    assert!(distance(&pixels, &first[1]) < SAME);
+    let prompts = sampler.sample_many(&[PROMPT, PROMPT], u64::MAX).unwrap();
+    assert_eq!(
+        [u64::MAX, 0],
+        [prompts[0].scene.seed, prompts[1].scene.seed]
+    );
+}
+
+/// What the result says is what was drawn: drawing it again from its numbers gives the same image and labels.
+#[test]
+fn image_labels_and_scene_are_one() {
+    let sampler = sampler();
+    let only_in_words = "a ship steaming at 8 mps due north, 4 mps wind toward 90 degrees";
+    let no_ship = "Simulated SAR image without any ship. Ocean waves are shaped by 3 mps wind directing toward 90 \
+                   degrees and 10000 meter fetch. Captured at 32 degree incidence.";
+    let mut elsewhere = sampler.base_scene();
+    elsewhere.ship.as_mut().unwrap().position = [150.0, -100.0];
+    for conditioning in [
+        Conditioning::Both,
+        Conditioning::Words,
+        Conditioning::Numbers,
+    ] {
+        let told = sampler.clone().with_conditioning(conditioning);
+        let mut images = vec![
+            told.sample_scenes(std::slice::from_ref(&elsewhere))
+                .unwrap()
+                .remove(0),
+        ];
+        images.extend(
+            told.sample_many(&[PROMPT, only_in_words, no_ship], 5)
+                .unwrap(),
+        );
+        let drawn: Vec<Scene> = images.iter().map(|image| image.scene.clone()).collect();
+        let numbers = sampler.clone().with_conditioning(Conditioning::Numbers);
+        let again = numbers.sample_scenes(&drawn).unwrap();
+        for (image, again) in images.iter().zip(&again) {
+            let far = distance(&image.grey.values, &again.grey.values);
+            assert!(far < SAME, "{conditioning:?} {far}: {:?}", image.scene);
+            assert_eq!(image.labels, labels_of(&image.scene));
+            assert_eq!(image.scene, again.scene);
+        }
+        let position = drawn[0].ship.as_ref().unwrap().position;
+        let expected = match conditioning {
+            Conditioning::Words => [0.0, 0.0],
+            _ => [150.0, -100.0],
+        };
+        assert_eq!(position, expected, "{conditioning:?}");
+        let ship = conditioning != Conditioning::Numbers || drawn[3].ship.is_some();
+        assert!(ship || drawn[3].ship.is_none());
+    }
+}
+
+/// With words alone the parser says whether there is a ship, and labels and image follow it.
+#[test]
+fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
+    let sampler = sampler().with_conditioning(Conditioning::Words);
+    let mut scene = sampler.base_scene();
+    scene.ship = None;
+    let mut told = Input {
+        known: Conditions::of_scene(&sampler.base_scene()),
+        words: Wording::Paper.prompt(&scene).unwrap(),
+        scene: sampler.base_scene(),
+    };
+    let open = sampler
+        .run(&[told], Instant::now())
+        .unwrap()
+        .images()
+        .remove(0);
+    assert!(open.scene.ship.is_none());
+    assert_eq!(open.labels, labels_of(&open.scene));
+    told = Input {
+        known: Conditions::default(),
+        words: PROMPT.to_owned(),
+        scene,
+    };
+    let with_ship = sampler
+        .run(&[told], Instant::now())
+        .unwrap()
+        .images()
+        .remove(0);
+    assert!(with_ship.scene.ship.is_some());
+    assert_eq!(with_ship.labels, labels_of(&with_ship.scene));
+}
+
+#[test]
+fn a_prompt_that_states_nothing_is_refused_before_drawing() {
+    for prompt in ["a photo of a cat", ""] {
+        let refused = sampler().sample(prompt, 0);
+        assert!(
+            matches!(&refused, Err(Error::NothingStated { .. })),
+            "{prompt}"
+        );
+    }
+}
+
+#[test]
+fn a_model_with_a_number_that_is_none_says_so() {
+    let good = sampler();
+    let mut model = good.model.clone();
+    let broken = good.config.init_prior(&Device::flex());
+    model.prior = broken.map(&mut Poison);
+    let sampler = WakeSampler::new(model, good.config.clone()).unwrap();
+    let refused = sampler.sample(PROMPT, 0);
+    assert!(
+        matches!(&refused, Err(Error::NotFinite { .. })),
+        "{refused:?}"
+    );
+}
+
+/// Makes every weight infinite.
+struct Poison;
+
+impl burn::module::ModuleMapper for Poison {
+    fn map_float<const D: usize>(&mut self, weight: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        weight.map(|weight| weight * f64::INFINITY)
+    }
+}
+
+#[cfg(feature = "train")]
+#[test]
+fn a_sampler_made_for_training_holds_no_gradients() {
+    let device = Device::flex().autodiff();
+    let good = sampler();
+    let model = good.model.clone().map(&mut Tracked);
+    assert!(model.devices().iter().all(Device::is_autodiff));
+    let tracked = WakeSampler::new(model, good.config.clone()).unwrap();
+    assert!(!tracked.device.is_autodiff());
+    let one = scenes(&good, &[1]);
+    let (batch, _) = tracked.sample_batch(&one).unwrap();
     assert!(!batch.is_autodiff());
-    let (alone, _) = sampler.sample_batch(&scenes[..1], 4).unwrap();
-    let second = batch.clone().narrow(0, 1, 1);
-    let distance = |a: Tensor<4>, b: Tensor<4>| (a - b).abs().max().into_scalar::<f32>();
-    // Matrix products of another size may sum in another order.
-    assert!(distance(second.clone(), alone) < 1e-4);
-    assert!(distance(second, batch.narrow(0, 0, 1)) > 1e-2);
+    let read = WakeSampler::pretrained(&device).unwrap();
+    let (batch, _) = read.with_steps(1).unwrap().sample_batch(&one).unwrap();
+    assert!(!batch.is_autodiff());
+}
+
+/// Puts every weight on an autodiff device.
+#[cfg(feature = "train")]
+struct Tracked;
+
+#[cfg(feature = "train")]
+impl burn::module::ModuleMapper for Tracked {
+    fn map_float<const D: usize>(&mut self, weight: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        weight.map(|weight| Tensor::from_inner(weight).require_grad())
+    }
 }
 
 #[test]
@@ -92,12 +270,12 @@ fn what_cannot_be_drawn_is_refused() {
     let sampler = sampler();
     assert!(sampler.clone().with_steps(0).is_err() && sampler.clone().with_steps(1001).is_err());
     let message = sampler
-        .sample_batch(&[Scene::default()], 0)
+        .sample_batch(&[Scene::default()])
         .unwrap_err()
         .to_string();
     assert!(message.contains("512 × 512 pixels of 2.5 m"), "{message}");
     assert!(sampler.sample("a ship at 900 m/s", 0).is_err());
-    assert!(sampler.sample_many(&[], 0).is_err() && sampler.sample_batch(&[], 0).is_err());
+    assert!(sampler.sample_many(&[], 0).is_err() && sampler.sample_batch(&[]).is_err());
     let nowhere = WakeSampler::from_folder("no/such/folder".as_ref(), &Device::flex());
     assert!(nowhere.is_err());
 }

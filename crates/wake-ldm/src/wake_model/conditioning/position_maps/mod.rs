@@ -1,6 +1,6 @@
 //! Where the pixels of the latents lie in the ship's frame.
 
-use super::conditions::{Conditions, SHIP_LENGTH};
+use super::conditions::Conditions;
 
 /// Side of the squares of pixels that become one latent pixel.
 pub const PATCH: usize = 8;
@@ -20,17 +20,25 @@ pub struct MapGrid {
     pub spacing: f64,
 }
 
+fn half_angle(_speed: f64, _depth: f64) -> f64 {
+    (1.0f64 / 3.0).asin()
+}
+
 /// The ship's own axes.
 struct Frame {
     forward: [f64; 2],
     position: [f64; 2],
+    /// From midship to bow or stern \[m\].
+    half_length: f64,
+    /// How far the wedge reaches astern where it is 1 m wide on one side \[m\].
+    slope: f64,
 }
 
 /// Where some latent pixels lie in the ship's frame; all zero where the track of the ship is not known, or there is no
 /// ship that moves.
 ///
-/// Distances along and across the track, in the image's axes and from the ship, in Kelvin's wedge x² > 8 y² of the bow
-/// or not, how far from its edge, and a band behind the stern.
+/// Distances along and across the track, in the image's axes and from the ship, in the wedge of the bow's waves or not, how
+/// far from its edge, and a band behind the stern. The wedge opens as the wake does at this speed and depth.
 ///
 /// `cells`: squares of [`PATCH`] × [`PATCH`] pixels, counted in rows.
 ///
@@ -79,9 +87,13 @@ impl Frame {
     fn of(conditions: &Conditions) -> Option<Self> {
         let (speed, heading, position) = conditions.track()?;
         let (sin, cos) = heading.to_radians().sin_cos();
-        (speed > 0.0).then_some(Self {
+        let depth = conditions.depth.unwrap_or(f64::INFINITY);
+        let length = conditions.ship_length?;
+        (speed > 0.0).then(|| Self {
             forward: [sin, cos],
             position,
+            half_length: 0.5 * length,
+            slope: half_angle(speed, depth).tan().recip(),
         })
     }
 
@@ -96,8 +108,8 @@ impl Frame {
     fn places(&self, [along, across]: [f64; 2]) -> [f64; PLACES] {
         let [fx, fy] = self.forward;
         // Negative inside the wedge.
-        let outside = 8f64.sqrt() * across.abs() + along - 0.5 * SHIP_LENGTH;
-        let astern = along < -0.5 * SHIP_LENGTH;
+        let outside = self.slope * across.abs() + along - self.half_length;
+        let astern = along < -self.half_length;
         let band = (-0.5 * (across / BAND).powi(2)).exp();
         [
             (along / 200.0).tanh(),

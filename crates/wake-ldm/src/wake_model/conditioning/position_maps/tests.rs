@@ -8,12 +8,16 @@ const GRID: MapGrid = MapGrid {
     spacing: 4.0,
 };
 
+/// The ship of the paper's grid.
+const SHIP_LENGTH: f64 = 195.0;
+
 fn known(speed: f64, heading: f64, position: [f64; 2]) -> Conditions {
     Conditions {
         ship: Some(true),
         ship_speed: Some(speed),
         ship_heading: Some(heading),
         ship_position: Some(position),
+        ship_length: Some(SHIP_LENGTH),
         ..Conditions::default()
     }
 }
@@ -78,5 +82,24 @@ fn the_wedge_is_that_of_the_simulators_measurements() {
                 assert_eq!(ours, count > 0, "heading {heading}, square {cell}");
             }
         }
+    }
+}
+
+/// The bow of a short ship lies nearer, and the wedge begins there.
+#[test]
+fn the_wedge_begins_at_the_bow_of_the_ship() {
+    let middle = |length: f64| {
+        let short = Conditions {
+            ship_length: Some(length),
+            ..known(9.0, 0.0, [0.0, 0.0])
+        };
+        let frame = Frame::of(&short).unwrap();
+        let edge = |across: f64, astern: f64| frame.places([-astern, across])[WEDGE];
+        // On the edge of the wedge |η| = tan(ψ)(L/2 − ξ), a little inside and outside.
+        let at = |astern: f64| (astern + 0.5 * length) / 8f64.sqrt();
+        (edge(0.99 * at(300.0), 300.0), edge(1.01 * at(300.0), 300.0))
+    };
+    for length in [60.0, 195.0, 300.0] {
+        assert_eq!(middle(length), (1.0, 0.0), "{length} m");
     }
 }

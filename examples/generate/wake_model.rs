@@ -31,7 +31,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let (count, seed) = (arguments.count, arguments.seed);
     // All images as one batch.
     let images = match &scene {
-        Some(scene) => sampler.sample_scenes(&vec![scene.clone(); count], seed)?,
+        Some(scene) => sampler.sample_scenes(&seeded(scene, seed, count))?,
         None => sampler.sample_many(&vec![prompt.as_str(); count], seed)?,
     };
     let total = begin.elapsed().as_secs_f64();
@@ -41,14 +41,27 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     output::write_json(&arguments.out.join("labels.json"), &labels)?;
     let seconds = images[0].seconds;
     let report = json!({
-        "prompt": prompt, "seed": seed, "steps": sampler.steps(), "count": count, "device": arguments.device,
+        "prompt": prompt, "scene": images[0].scene, "seed": seed, "steps": sampler.steps(), "count": count, "device": arguments.device,
         "weights": arguments.weights, "files": files,
         "seconds": {
             "load": load, "text": seconds.text, "expect": seconds.expect, "denoise": seconds.denoise,
             "decode": seconds.decode, "total": total,
         },
     });
+    if !arguments.json {
+        println!("drawn: {}", wake_text::prompt(&images[0].scene)?);
+    }
     Ok(finish(arguments, &report)?)
+}
+
+/// A scene with seeds that count up.
+fn seeded(scene: &Scene, seed: u64, count: usize) -> Vec<Scene> {
+    let seeds = (0..count as u64).map(|k| seed.wrapping_add(k));
+    let scenes = seeds.map(|seed| Scene {
+        seed,
+        ..scene.clone()
+    });
+    scenes.collect()
 }
 
 /// The small model has one sampler and no guidance, and draws all images at once.
