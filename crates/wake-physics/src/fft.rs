@@ -14,6 +14,7 @@
 //! (0, 1, …, then negative). The field comes out as `[rows, columns]`, row 0 at the largest y. Pixel `[0, 0]`
 //! is the phase reference: multiply the spectrum by `exp(i(kx·x₀ + ky·y₀))` to place it.
 
+use crate::workspace::{Shelf, Workspace};
 use num_complex::Complex;
 use rayon::prelude::*;
 use rustfft::{Fft, FftNum, FftPlanner};
@@ -23,11 +24,13 @@ use std::sync::Arc;
 const BLOCK: usize = 16;
 
 /// The two precisions a transform can run in; fields are `f32` either way.
-pub trait Real: FftNum {
+pub(crate) trait Real: FftNum {
     /// Rounds to `f32`.
     fn to_f32(self) -> f32;
     /// Rounds from `f64`.
     fn from_f64(value: f64) -> Self;
+    /// Blocks for spectra, and the FFTs planned so far, in this precision.
+    fn of(workspace: &mut Workspace) -> (&mut Shelf<Complex<Self>>, &mut FftPlanner<Self>);
 }
 
 impl Real for f32 {
@@ -36,6 +39,9 @@ impl Real for f32 {
     }
     fn from_f64(value: f64) -> Self {
         value as Self
+    }
+    fn of(workspace: &mut Workspace) -> (&mut Shelf<Complex<Self>>, &mut FftPlanner<Self>) {
+        (&mut workspace.spectra.0, &mut workspace.planners.0)
     }
 }
 
@@ -46,10 +52,13 @@ impl Real for f64 {
     fn from_f64(value: f64) -> Self {
         value
     }
+    fn of(workspace: &mut Workspace) -> (&mut Shelf<Complex<Self>>, &mut FftPlanner<Self>) {
+        (&mut workspace.spectra.1, &mut workspace.planners.1)
+    }
 }
 
 /// Sums plane waves of a lattice of wavenumbers on a raster, by two passes of one-dimensional FFTs.
-pub struct Synthesis<T> {
+pub(crate) struct Synthesis<T> {
     rows: usize,
     columns: usize,
     along_y: Arc<dyn Fft<T>>,
@@ -68,8 +77,12 @@ impl<T> std::fmt::Debug for Synthesis<T> {
 impl<T: Real> Synthesis<T> {
     /// Plans the sum for a lattice of `rows` × `columns` points, both at least 1.
     #[must_use]
-    pub fn new(rows: usize, columns: usize) -> Self {
-        let mut planner = FftPlanner::new();
+    pub(crate) fn new(rows: usize, columns: usize) -> Self {
+        Self::planned(&mut FftPlanner::new(), rows, columns)
+    }
+
+    /// [`Self::new`] by a planner that keeps what it planned.
+    pub(crate) fn planned(planner: &mut FftPlanner<T>, rows: usize, columns: usize) -> Self {
         Self {
             rows,
             columns,
@@ -91,7 +104,7 @@ impl<T: Real> Synthesis<T> {
     /// # Panics
     ///
     /// If a length is another, or more is kept than there is.
-    pub fn run<F>(
+    pub(crate) fn run<F>(
         &self,
         spectrum: &mut [Complex<T>],
         keep: [usize; 2],
@@ -108,7 +121,7 @@ impl<T: Real> Synthesis<T> {
     /// # Panics
     ///
     /// If a length is another, or more is kept than there is.
-    pub fn run_window<F>(
+    pub(crate) fn run_window<F>(
         &self,
         spectrum: &mut [Complex<T>],
         start: [usize; 2],
@@ -167,7 +180,7 @@ impl<T: Real> Synthesis<T> {
 
     /// Length of the workspace that [`Self::run_real`] needs.
     #[must_use]
-    pub fn half_len(&self) -> usize {
+    pub(crate) fn half_len(&self) -> usize {
         2 * self.rows * self.columns.div_ceil(2)
     }
 
@@ -185,7 +198,7 @@ impl<T: Real> Synthesis<T> {
     /// # Panics
     ///
     /// If a length is another, or more is kept than there is.
-    pub fn run_real<F>(
+    pub(crate) fn run_real<F>(
         &self,
         half: &mut [Complex<T>],
         keep: [usize; 2],
@@ -295,7 +308,7 @@ fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
 
 /// The smallest length of at least `n` whose only prime factors are 2, 3 and 5: the FFT is fast there.
 #[must_use]
-pub fn fast_length(n: usize) -> usize {
+pub(crate) fn fast_length(n: usize) -> usize {
     let mut m = n.max(1);
     loop {
         let mut rest = m;
@@ -313,7 +326,7 @@ pub fn fast_length(n: usize) -> usize {
 
 /// Signed index of entry `index` of an FFT of length `n`: 0, 1, …, −2, −1; the middle of an even n is −n/2.
 #[must_use]
-pub fn signed_index(index: usize, n: usize) -> i64 {
+pub(crate) fn signed_index(index: usize, n: usize) -> i64 {
     if index < n.div_ceil(2) {
         index as i64
     } else {

@@ -1,7 +1,7 @@
 //! Physics-based simulation of ship wakes in synthetic aperture radar (SAR) images.
 //!
 //! A [`Scene`] (ship, sea, radar, grid) becomes a SAR image with every intermediate field, labels, and a plan that
-//! says what was computed and bounds what was not:
+//! says what was computed and estimates what was not:
 //!
 //! ```
 //! use wake_physics::{Scene, simulate};
@@ -38,10 +38,11 @@ mod error;
 pub mod constants;
 mod vectorize;
 mod raster;
-pub mod quadrature;
+mod quadrature;
 mod memory;
+mod workspace;
 pub mod output;
-pub mod fft;
+mod fft;
 mod random;
 pub mod dispersion;
 pub mod scene;
@@ -60,7 +61,9 @@ pub mod scattering;
 pub mod sar;
 pub mod labels;
 pub mod grey;
-mod setup;
+mod modulation;
+mod models;
+mod survey;
 mod plan;
 mod simulate;
 pub mod measure;
@@ -70,6 +73,7 @@ pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
 pub use simulate::{
-    LinearSea, Method, Seconds, Simulation, expected_intensity, labels_of, simulate, simulate_with,
+    Accuracy, LinearSea, Method, Reached, SarImage, Seconds, Simulation, Simulator,
+    expected_intensity, labels_of, simulate, simulate_with,
 };
 pub use track::Track;

@@ -1,7 +1,6 @@
 //! Will the fields fit? Asked before anything is computed.
 
 use crate::error::{Error, Result};
-use std::sync::Once;
 
 /// Checks that `needed` bytes for a grid are free.
 ///
@@ -21,17 +20,6 @@ pub(crate) fn check([rows, columns]: [usize; 2], margin: [usize; 2], needed: u64
         }),
         _ => Ok(()),
     }
-}
-
-/// Makes the C library keep large blocks that are freed, for the next simulation.
-///
-/// By default glibc gives blocks above 128 KiB back to the system, and every page of the next field is a page fault:
-/// a quarter of the time of a simulation. It raises that bound, to 32 MiB at most, when a larger block is freed; this
-/// frees one, of which no page was ever touched. Other allocators are not affected.
-pub(crate) fn keep_large_blocks() {
-    static ONCE: Once = Once::new();
-    const LARGEST: usize = (32 << 20) - (64 << 10);
-    ONCE.call_once(|| drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST))));
 }
 
 const GIB: f64 = (1u64 << 30) as f64;

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 /// ∫₋₁¹ f(t) dt ≈ Σᵢ wᵢ f(tᵢ),   exact for polynomials up to degree 2n − 1
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct GaussLegendre {
+pub(crate) struct GaussLegendre {
     /// Nodes tᵢ, falling.
     pub nodes: Vec<f64>,
     /// Weights wᵢ, above 0.
@@ -18,7 +18,7 @@ pub struct GaussLegendre {
 impl GaussLegendre {
     /// Finds the `count` ≥ 1 nodes by Newton's method on the Legendre polynomial.
     #[must_use]
-    pub fn new(count: usize) -> Self {
+    pub(crate) fn new(count: usize) -> Self {
         let n = count.max(1);
         let (mut nodes, mut weights) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for i in 0..n {
@@ -36,7 +36,7 @@ impl GaussLegendre {
     }
 
     /// Nodes and weights moved to [from, to].
-    pub fn on(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
+    pub(crate) fn on(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
         self.nodes
             .iter()
@@ -45,7 +45,7 @@ impl GaussLegendre {
     }
 
     /// ∫ f over [from, to].
-    pub fn integrate(&self, [from, to]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
+    pub(crate) fn integrate(&self, [from, to]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
         self.on(from, to).map(|(t, w)| w * f(t)).sum()
     }
 }
@@ -76,7 +76,7 @@ fn legendre(n: usize, t: f64) -> (f64, f64) {
 ///
 /// Davis and Rabinowitz (1984), *Methods of Numerical Integration*, §2.7.
 #[must_use]
-pub fn largest_phase(count: usize, error: f64) -> f64 {
+pub(crate) fn largest_phase(count: usize, error: f64) -> f64 {
     let n = count as f64;
     let ln_factorial = |m: usize| (2..=m).map(|i| (i as f64).ln()).sum::<f64>();
     let ln_bound = (2.0 * n + 1.0) * 2f64.ln() + 4.0 * ln_factorial(count)

@@ -96,8 +96,8 @@ impl Raster {
     }
 }
 
-/// One value a pixel, row after row.
-#[derive(Debug, Clone, PartialEq)]
+/// One value a pixel, row after row; by default there is no pixel.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Field {
     /// Number of rows.
     pub rows: usize,
@@ -122,16 +122,20 @@ impl Field {
     #[must_use]
     pub fn from_fn(raster: &Raster, value: impl Fn(usize, usize) -> f32 + Sync) -> Self {
         let mut field = Self::constant(raster, 0.0);
+        field.fill_from_fn(value);
         field
-            .values
-            .par_chunks_mut(raster.columns.max(1))
+    }
+
+    /// Overwrites the values by a function of (row, column), row by row in parallel.
+    pub(crate) fn fill_from_fn(&mut self, value: impl Fn(usize, usize) -> f32 + Sync) {
+        self.values
+            .par_chunks_mut(self.columns.max(1))
             .enumerate()
             .for_each(|(i, row)| {
                 for (j, v) in row.iter_mut().enumerate() {
                     *v = value(i, j);
                 }
             });
-        field
     }
 
     /// The value at `[row, column]`.

@@ -85,6 +85,13 @@ impl TurbulentWake {
     /// [`Self::damping`] at every pixel; the Bragg spectrum is multiplied by 1 − it.
     #[must_use]
     pub fn damping_field(&self, raster: &Raster) -> Field {
+        let mut field = Field::constant(raster, 0.0);
+        self.fill_damping(&mut field, raster);
+        field
+    }
+
+    /// [`Self::damping_field`] over a field of the raster's size.
+    pub(crate) fn fill_damping(&self, field: &mut Field, raster: &Raster) {
         let corners = self.track.corners(raster);
         let farthest = corners.iter().map(|c| -c[0]).fold(0.0, f64::max);
         // Six standard deviations: exp(−18) ≈ 1.5e-8 lies below the rounding of 1 − damping in f32.
@@ -92,7 +99,7 @@ impl TurbulentWake {
         let corner = self.track.seen_from_ship([raster.x(0), raster.y(0)]);
         // Places seen from the ship change by the same step from pixel to pixel of a row.
         let step = self.track.seen_from_ship([raster.x(1), raster.y(0)]);
-        let mut field = Field::constant(raster, 0.0);
+        field.values.fill(0.0);
         field
             .values
             .par_chunks_mut(raster.columns.max(1))
@@ -104,7 +111,6 @@ impl TurbulentWake {
                     *value = self.damping(seen(j)) as f32;
                 }
             });
-        field
     }
 }
 

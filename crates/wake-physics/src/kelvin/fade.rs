@@ -24,12 +24,17 @@ pub fn fade(forward: f64, length: f64) -> f64 {
 /// [`fade`] at every pixel of a raster.
 #[must_use]
 pub fn fade_field(track: &Track, length: f64, raster: &Raster) -> Field {
+    let mut field = Field::constant(raster, 0.0);
+    fill_fade(&mut field, track, length, raster);
+    field
+}
+
+/// [`fade_field`] over a field of the raster's size.
+pub(crate) fn fill_fade(field: &mut Field, track: &Track, length: f64, raster: &Raster) {
     let [fx, fy] = track.forward;
     let corner = track.seen_from_ship([raster.x(0), raster.y(0)])[0];
     let (down, right) = (-fy * raster.spacing, fx * raster.spacing);
-    Field::from_fn(raster, |i, j| {
-        fade(corner + i as f64 * down + j as f64 * right, length) as f32
-    })
+    field.fill_from_fn(|i, j| fade(corner + i as f64 * down + j as f64 * right, length) as f32);
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ mod steady;
 mod zones;
 
 pub use direct::direct_quadrature;
+pub(crate) use fade::fill_fade;
 pub use fade::{fade, fade_field};
 pub use panels::{WakePlan, Zone};
 

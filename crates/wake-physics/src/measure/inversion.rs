@@ -5,10 +5,10 @@
 //! *this* wind at *this* incidence makes the sea.
 
 use super::{Measured, OpenSea};
+use crate::models::Models;
 use crate::raster::Raster;
 use crate::scattering::SlopeCovariance;
 use crate::scene::Scene;
-use crate::setup::Setup;
 
 /// Winds tried [m/s]: first, step, number.
 const WINDS: Lattice = Lattice(2.0, 0.5, 21);
@@ -50,7 +50,7 @@ pub fn mean_sigma0(scene: &Scene) -> crate::Result<f64> {
 }
 
 fn brightness(scene: &Scene) -> f64 {
-    let setup = Setup::new(scene);
+    let setup = Models::new(scene);
     let band = Raster::nyquist_wavenumber(&setup.image);
     let moments = setup.sea.moments(0.0, band, setup.incidence);
     let resolved = SlopeCovariance {

@@ -25,6 +25,7 @@ pub use kernel::Kernel;
 use crate::fft::{Real, Synthesis};
 use crate::raster::{Field, Raster};
 use crate::waves::{PlaneWaves, Quantity, Transfer, strengths};
+use crate::workspace::Workspace;
 use gridding::Demand;
 use num_complex::{Complex, Complex64};
 use spread::Footprints;
@@ -60,32 +61,31 @@ pub fn synthesize(
     tolerance: f64,
 ) -> Vec<Field> {
     let mut fields = vec![Field::constant(raster, 0.0); quantities.len()];
-    synthesize_each(
-        waves,
-        transfer,
-        quantities,
-        raster,
-        tolerance,
-        |q, field| {
-            std::mem::swap(&mut fields[q], field);
-        },
-    );
+    let mut workspace = Workspace::default();
+    let take = |q: usize, field: &mut Field| std::mem::swap(&mut fields[q], field);
+    let sum = (waves, transfer, quantities, raster);
+    synthesize_each(&mut workspace, sum, tolerance, take);
     fields
 }
 
+/// What a sum of waves takes: the waves, their transfer, the quantities, the raster.
+pub(crate) type Summands<'a> = (&'a PlaneWaves, &'a Transfer, &'a [Quantity], &'a Raster);
+
 /// [`synthesize`], one field at a time: `take` gets the number of a quantity and its field, once each and in any
 /// order; what it leaves of the field is overwritten. Fields that are 0 everywhere are not computed.
-pub fn synthesize_each(
-    waves: &PlaneWaves,
-    transfer: &Transfer,
-    quantities: &[Quantity],
-    raster: &Raster,
+///
+/// Returns the largest bound on the error of a field, relative to its root mean square: above `tolerance` where no
+/// kernel is that exact; 0 where nothing is computed.
+pub(crate) fn synthesize_each(
+    workspace: &mut Workspace,
+    (waves, transfer, quantities, raster): Summands<'_>,
     tolerance: f64,
     mut take: impl FnMut(usize, &mut Field),
-) {
+) -> f64 {
     let sums = CentredSums::new(waves, transfer, quantities, raster);
     let mut rms: Vec<f64> = sums.sizes.iter().map(|s| s.expected_rms()).collect();
     let mut todo: Vec<usize> = (0..quantities.len()).filter(|&q| rms[q] > 0.0).collect();
+    let mut reached = 0.0f64;
     for attempt in 1..=ATTEMPTS {
         if todo.is_empty() || raster.is_empty() {
             break;
@@ -96,19 +96,22 @@ pub fn synthesize_each(
         let check = |q: usize, field: &mut Field| {
             // A field below its own error says nothing yet; the estimate falls, but never to nothing.
             rms[q] = field.rms().max(1e-6 * rms[q]);
-            if attempt < ATTEMPTS && gridding.error_bound(&sums.sizes[q]) > tolerance * rms[q] {
+            let error = gridding.error_bound(&sums.sizes[q]) / rms[q];
+            if attempt < ATTEMPTS && error > tolerance {
                 again.push(q);
             } else {
+                reached = reached.max(error);
                 take(q, field);
             }
         };
         if gridding.double_precision {
-            sums.run::<f64>(&gridding, &todo, check);
+            sums.run::<f64>(workspace, &gridding, &todo, check);
         } else {
-            sums.run::<f32>(&gridding, &todo, check);
+            sums.run::<f32>(workspace, &gridding, &todo, check);
         }
         todo = again;
     }
+    reached
 }
 
 /// The first choice of kernel and lattice that [`synthesize`] makes.
@@ -183,6 +186,7 @@ impl<'a> CentredSums<'a> {
     /// Computes the fields numbered `todo`, two at a time, and hands each to `done`.
     fn run<T: Real>(
         &self,
+        workspace: &mut Workspace,
         gridding: &Gridding,
         todo: &[usize],
         mut done: impl FnMut(usize, &mut Field),
@@ -194,7 +198,10 @@ impl<'a> CentredSums<'a> {
             .map(|c| [c[0] * rows as f64, c[1] * columns as f64])
             .collect();
         let footprints = Footprints::<T>::new(&scaled, &gridding.kernel, gridding.lattice);
-        let synthesis = Synthesis::<T>::new(rows, columns);
+        let mut fields = [(); 2].map(|()| workspace.field(self.raster));
+        let (blocks, planner) = T::of(workspace);
+        let synthesis = Synthesis::<T>::planned(planner, rows, columns);
+        let mut lattice = blocks.take(rows * columns, Complex::new(T::zero(), T::zero()));
         let correct = |pixels, lattice| -> Vec<T> {
             let factors = gridding.kernel.correction(pixels, lattice);
             factors.into_iter().map(<T as Real>::from_f64).collect()
@@ -206,8 +213,6 @@ impl<'a> CentredSums<'a> {
             columns / 2 - self.raster.columns / 2,
         ];
         let keep = [self.raster.rows, self.raster.columns];
-        let mut lattice = vec![Complex::new(T::zero(), T::zero()); rows * columns];
-        let mut fields = [(); 2].map(|()| Field::constant(self.raster, 0.0));
         for pair in todo.chunks(2) {
             let [re, im] = fields.each_mut().map(|field| &mut field.values[..]);
             footprints.spread(&self.paired::<T>(pair), &mut lattice);
@@ -220,6 +225,8 @@ impl<'a> CentredSums<'a> {
                 done(q, field);
             }
         }
+        blocks.give(lattice);
+        fields.into_iter().for_each(|field| workspace.give(field));
     }
 
     /// What k and −k carry for a pair of quantities: (c + id)/2 and (c̄ + id̄)/2.

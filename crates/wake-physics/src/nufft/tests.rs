@@ -149,10 +149,10 @@ fn rounding_is_bounded() {
                 let todo: Vec<usize> = (0..ALL.len()).collect();
                 let mut fields = [(); 2].map(|()| vec![Field::constant(&raster, 0.0); ALL.len()]);
                 let [by_single, by_double] = &mut fields;
-                sums.run::<f32>(&single, &todo, |q, field| {
+                sums.run::<f32>(&mut Workspace::default(), &single, &todo, |q, field| {
                     std::mem::swap(&mut by_single[q], field);
                 });
-                sums.run::<f64>(&double, &todo, |q, field| {
+                sums.run::<f64>(&mut Workspace::default(), &double, &todo, |q, field| {
                     std::mem::swap(&mut by_double[q], field);
                 });
                 for &q in &todo {

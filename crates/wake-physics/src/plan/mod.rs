@@ -1,23 +1,23 @@
 //! What a scene needs, decided before anything is computed: which terms, how wide a margin, how many nodes.
+//!
+//! A plan is complete when it is returned and never changed. What the methods then reach is
+//! [`Accuracy`](crate::Accuracy).
 
-mod bounds;
-mod choose;
-mod linear;
-mod margin;
-mod sample;
-mod situation;
+mod budget;
+mod estimates;
+mod terms;
 
-pub use choose::PlannedTerm;
+pub(crate) use budget::SHARES;
+pub use terms::PlannedTerm;
 
 use crate::error::Result;
 use crate::kelvin::WakePlan;
 use crate::memory;
-use crate::raster::Raster;
+use crate::models::Models;
 use crate::scene::{Scene, Term};
-use crate::setup::Setup;
-pub(crate) use linear::smear;
+use crate::surface::lattice_size;
+use crate::survey::Survey;
 use serde::Serialize;
-pub(crate) use situation::Situation;
 
 /// Fields of four bytes a pixel that are alive at once, at most; the target of the design.
 const FIELDS_IN_MEMORY: u64 = 40;
@@ -25,7 +25,7 @@ const FIELDS_IN_MEMORY: u64 = 40;
 /// The plan of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Every term: used or not, what leaving it out would change at most, and why.
+    /// Every term: used or not, an estimate of what leaving it out changes, and why.
     pub terms: Vec<PlannedTerm>,
     /// How much is computed.
     pub sizes: Sizes,
@@ -51,8 +51,6 @@ pub struct Sizes {
     pub wake_nodes: [usize; 2],
     /// Ranges of the direction of wake waves to the track \[deg\].
     pub wake_directions: Vec<[f64; 2]>,
-    /// Nodes of the backscatter table along the two slopes; 0 where σ⁰ is evaluated exactly.
-    pub table: [usize; 2],
 }
 
 impl Plan {
@@ -62,18 +60,11 @@ impl Plan {
         self.terms.iter().any(|t| t.term == term && t.used)
     }
 
-    /// Computes these terms, and not those.
-    pub(crate) fn change(&mut self, with: &[Term], without: &[Term]) {
-        for t in &mut self.terms {
-            t.used = (t.used || with.contains(&t.term)) && !without.contains(&t.term);
-        }
-    }
-
-    /// Sum of the bounds of the terms left out of the image before speckle.
+    /// Sum of the estimates of the terms left out of the image before speckle.
     #[must_use]
-    pub fn bound(&self) -> f64 {
+    pub fn left_out(&self) -> f64 {
         let out = |t: &&PlannedTerm| !t.used && t.term != Term::Speckle;
-        self.terms.iter().filter(out).map(|t| t.bound).sum()
+        self.terms.iter().filter(out).map(|t| t.estimate).sum()
     }
 
     /// Plans a valid scene.
@@ -83,70 +74,73 @@ impl Plan {
     /// [`Error::TooLarge`](crate::Error::TooLarge) if the fields do not fit in memory.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        Self::of(scene, &Setup::new(scene))
+        let models = Models::new(scene);
+        Self::of(scene, &models, &Survey::new(scene, &models))
     }
 
-    pub(crate) fn of(scene: &Scene, setup: &Setup) -> Result<Self> {
-        Self::of_situation(scene, setup, &Situation::new(scene, setup))
-    }
-
-    pub(crate) fn of_situation(
-        scene: &Scene,
-        setup: &Setup,
-        situation: &Situation,
-    ) -> Result<Self> {
-        let effects = situation.effects();
-        let terms = choose::choose(&effects, &scene.model.terms, scene.model.tolerance);
-        let margin = situation.margin(setup);
-        let raster = setup.image.with_margin(margin[0], margin[1]);
+    pub(crate) fn of(scene: &Scene, models: &Models, survey: &Survey) -> Result<Self> {
+        let tolerance = scene.model.tolerance;
+        let effects = estimates::effects(survey);
+        let terms = terms::choose(&effects, &scene.model.terms, tolerance);
+        let uses = |term| terms.iter().any(|t| t.term == term && t.used);
+        let margin = survey.margin(models);
+        let raster = models.image.with_margin(margin[0], margin[1]);
         let needed = FIELDS_IN_MEMORY * 4 * raster.len() as u64;
         memory::check([scene.grid.rows, scene.grid.columns], margin, needed)?;
-        let mut plan = Self {
-            terms,
+        let wake = match &models.wake {
+            Some(wake) if uses(Term::Kelvin) => wake.plan(&raster, SHARES.wake_nodes * tolerance),
+            _ => WakePlan::default(),
+        };
+        let directions = wake.zones.iter().map(|z| z.directions.map(f64::to_degrees));
+        Ok(Self {
             sizes: Sizes {
                 margin,
                 computed: [raster.rows, raster.columns],
                 band: raster.nyquist_wavenumber(),
-                sea_lattice: [0, 0],
-                wake_nodes: [0, 0],
-                wake_directions: Vec::new(),
-                table: [0, 0],
+                sea_lattice: if uses(Term::Sea) {
+                    lattice_size(&models.sea, &raster)
+                } else {
+                    [0, 0]
+                },
+                wake_nodes: [wake.transverse_nodes, wake.divergent_nodes],
+                wake_directions: directions.collect(),
             },
-            notes: situation.notes(scene, setup),
-            wake: WakePlan::default(),
-            mean_sigma0: situation.mean[0] + situation.mean[1],
-        };
-        if plan.uses(Term::Kelvin) {
-            plan.plan_wake(setup, &raster, scene.model.tolerance);
-        }
-        Ok(plan)
+            terms,
+            notes: survey.notes(scene, models),
+            wake,
+            mean_sigma0: survey.mean[0] + survey.mean[1],
+        })
     }
 
-    fn plan_wake(&mut self, setup: &Setup, raster: &Raster, tolerance: f64) {
-        let Some(wake) = &setup.wake else { return };
-        self.wake = wake.plan(raster, tolerance);
-        self.sizes.wake_nodes = [self.wake.transverse_nodes, self.wake.divergent_nodes];
-        let zones = &self.wake.zones;
-        self.sizes.wake_directions = zones
-            .iter()
-            .map(|z| z.directions.map(f64::to_degrees))
-            .collect();
+    /// The same for the mean over all seas: no sea is drawn, and what its waves do is averaged over.
+    pub(crate) fn over_all_seas(mut self) -> Self {
+        let bunching = self.uses(Term::Bunching);
+        for t in &mut self.terms {
+            t.used = match t.term {
+                Term::Sea => false,
+                Term::TiltAverage | Term::Specular => true,
+                Term::Coherence => t.used || bunching,
+                _ => t.used,
+            };
+        }
+        self.sizes.sea_lattice = [0, 0];
+        self
     }
 }
 
 /// A table of the terms, then the sizes.
 impl std::fmt::Display for Plan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        writeln!(f, "{:<16} {:<5} {:>10}  why", "term", "used", "bound")?;
+        writeln!(f, "{:<16} {:<5} {:>10}  why", "term", "used", "estimate")?;
         for t in &self.terms {
             let used = if t.used { "yes" } else { "no" };
             let name = t.term.name();
-            writeln!(f, "{name:<16} {used:<5} {:>10.2e}  {}", t.bound, t.why)?;
+            writeln!(f, "{name:<16} {used:<5} {:>10.2e}  {}", t.estimate, t.why)?;
         }
         let s = &self.sizes;
         write!(
             f,
-            "computed {} x {} pixels (margin {} x {}), sea lattice {} x {}, wake nodes {} + {}, table {} x {}",
+            "computed {} x {} pixels (margin {} x {}), sea lattice {} x {}, wake nodes {} + {}",
             s.computed[0],
             s.computed[1],
             s.margin[0],
@@ -154,9 +148,7 @@ impl std::fmt::Display for Plan {
             s.sea_lattice[0],
             s.sea_lattice[1],
             s.wake_nodes[0],
-            s.wake_nodes[1],
-            s.table[0],
-            s.table[1]
+            s.wake_nodes[1]
         )
     }
 }

@@ -23,6 +23,7 @@ use crate::sar::places::{Places, split};
 use crate::sar::response::{Response, largest, reach};
 use crate::sar::spread::{LANES, Steps, gaussian};
 use crate::vectorize::vectorized;
+use crate::workspace::Workspace;
 use rayon::prelude::*;
 use std::f64::consts::{LOG2_E, PI, SQRT_2};
 use std::ops::Range;
@@ -94,20 +95,36 @@ impl Imaging {
     /// If a field is not of the size of its raster or the rasters' spacings differ.
     #[must_use]
     pub fn image(&self, sources: &Sources<'_>, image: &Raster, tolerance: f64) -> Field {
+        self.image_in(&mut Workspace::default(), sources, image, tolerance)
+    }
+
+    /// [`Self::image`] in blocks of a workspace.
+    pub(crate) fn image_in(
+        &self,
+        workspace: &mut Workspace,
+        sources: &Sources<'_>,
+        image: &Raster,
+        tolerance: f64,
+    ) -> Field {
         sources.check();
         let sum = Sum::new(self, sources, image, tolerance);
         let width = sum.block_width();
-        let blocks: Vec<Vec<f32>> = (0..image.columns.div_ceil(width))
-            .into_par_iter()
-            .map(|b| {
+        // Each block of columns, `[steps, columns]`, in one piece.
+        let mut steps = workspace.floats.take(sum.count * image.columns, 0.0);
+        steps
+            .par_chunks_mut((sum.count * width).max(1))
+            .enumerate()
+            .for_each_init(Vec::new, |lines, (b, block)| {
                 let columns = b * width..((b + 1) * width).min(image.columns);
                 vectorized(
                     #[inline(always)]
-                    || sum.block(columns),
-                )
-            })
-            .collect();
-        sum.filled(&blocks, width)
+                    || sum.block(columns, lines, block),
+                );
+            });
+        let mut field = workspace.field(image);
+        sum.fill(&mut field, &steps, width);
+        workspace.floats.give(steps);
+        field
     }
 }
 
@@ -166,12 +183,14 @@ impl<'a> Sum<'a> {
         to_source(columns.start, -lean)..to_source(columns.end, lean)
     }
 
-    /// The steps of these columns, `[steps, columns]`.
+    /// Writes the steps of these columns, `[steps, columns]`; `values` is a workspace.
     #[inline(always)]
-    fn block(&self, columns: Range<usize>) -> Vec<f32> {
+    fn block(&self, columns: Range<usize>, values: &mut Vec<f32>, block: &mut [f32]) {
         let reaching = self.reaching(&columns);
+        values.clear();
+        values.resize(self.count * columns.len(), 0.0);
         let mut lines = Lines {
-            values: vec![0.0; self.count * columns.len()],
+            values,
             count: self.count,
             columns: columns.len() as i32,
         };
@@ -182,7 +201,7 @@ impl<'a> Sum<'a> {
             self.place_row(i, &row, &mut places);
             self.add_row(&row, &places, first as i32, &mut taps, &mut lines);
         }
-        lines.transposed()
+        lines.transpose(block);
     }
 
     /// Where the sources of row `i` are imaged.
@@ -213,7 +232,7 @@ impl<'a> Sum<'a> {
         places: &Places,
         first: i32,
         taps: &mut Taps,
-        lines: &mut Lines,
+        lines: &mut Lines<'_>,
     ) {
         for (j, &sigma0) in row.sigma0.iter().enumerate() {
             taps.set(self, places.fractions[j], value(row.acceleration, j));
@@ -233,8 +252,7 @@ impl<'a> Sum<'a> {
     }
 
     /// Fills the rows between the steps, row by row.
-    fn filled(&self, blocks: &[Vec<f32>], width: usize) -> Field {
-        let mut image = Field::constant(self.image, 0.0);
+    fn fill(&self, image: &mut Field, steps: &[f32], width: usize) {
         let columns = self.image.columns.max(1);
         image
             .values
@@ -243,14 +261,15 @@ impl<'a> Sum<'a> {
             .for_each(|(m, row)| {
                 vectorized(
                     #[inline(always)]
-                    || self.fill_row(m, row, blocks, width),
+                    || self.fill_row(m, row, steps, width),
                 );
             });
-        image
     }
 
     #[inline(always)]
-    fn fill_row(&self, m: usize, row: &mut [f32], blocks: &[Vec<f32>], width: usize) {
+    fn fill_row(&self, m: usize, row: &mut [f32], steps: &[f32], width: usize) {
+        row.fill(0.0);
+        let blocks = steps.chunks((self.count * width).max(1));
         let weights = &self.filling[m % self.steps.step];
         let first = (m / self.steps.step + self.pad) as i64 + self.filling_first;
         for (out, block) in row.chunks_mut(width).zip(blocks) {
@@ -329,14 +348,14 @@ impl Taps {
 }
 
 /// The columns of a block, each contiguous.
-struct Lines {
+struct Lines<'a> {
     /// `[columns, count]`.
-    values: Vec<f32>,
+    values: &'a mut [f32],
     count: usize,
     columns: i32,
 }
 
-impl Lines {
+impl Lines<'_> {
     /// Adds `power × taps` from step `from` of a column on; what lies outside is lost.
     #[inline(always)]
     fn add(&mut self, column: i32, from: usize, taps: &[f32], power: f32) {
@@ -356,17 +375,15 @@ impl Lines {
         }
     }
 
-    /// `[count, columns]`.
+    /// Writes `[count, columns]`.
     #[inline(always)]
-    fn transposed(&self) -> Vec<f32> {
+    fn transpose(&self, values: &mut [f32]) {
         let columns = self.columns as usize;
-        let mut values = vec![0.0; self.values.len()];
         for (j, line) in self.values.chunks_exact(self.count).enumerate() {
             for (n, &v) in line.iter().enumerate() {
                 values[n * columns + j] = v;
             }
         }
-        values
     }
 }
 

@@ -42,6 +42,8 @@ pub struct BackscatterTable {
     axes: PrincipalAxes,
     interpolation: Bicubic,
     error: f64,
+    /// What it was made for: ranges of slope along the axes, and the error asked for.
+    made_for: ([[f64; 2]; 2], f64),
 }
 
 impl BackscatterTable {
@@ -55,9 +57,20 @@ impl BackscatterTable {
         slope_y: &Field,
         error: f64,
     ) -> Self {
+        Self::covering_or(None, backscatter, [slope_x, slope_y], error)
+    }
+
+    /// [`Self::covering`], which is `last` if that was made for the same.
+    pub(crate) fn covering_or(
+        last: Option<Self>,
+        backscatter: Backscatter,
+        [slope_x, slope_y]: [&Field; 2],
+        error: f64,
+    ) -> Self {
         let axes = backscatter.tilt.principal_axes();
         let range = extent(&axes, &slope_x.values, &slope_y.values);
-        Self::over(backscatter, range, error)
+        last.filter(|last| last.made_for == (range, error) && last.backscatter == backscatter)
+            .unwrap_or_else(|| Self::over(backscatter, range, error))
     }
 
     /// A table for ranges of slope [first, last] along the two principal axes of the unresolved slopes.
@@ -72,6 +85,7 @@ impl BackscatterTable {
                     backscatter,
                     axes,
                     error: average.error,
+                    made_for: (range, error),
                     interpolation: Bicubic::through(average.lattice),
                 };
             }
@@ -107,19 +121,26 @@ impl BackscatterTable {
     #[must_use]
     pub fn sigma0_field(&self, fields: &FacetFields<'_>) -> Field {
         let (rows, columns) = (fields.slope_x.rows, fields.slope_x.columns);
-        let mut values = vec![0.0; rows * columns];
-        values
+        let mut field = Field {
+            rows,
+            columns,
+            values: vec![0.0; rows * columns],
+        };
+        self.fill_sigma0(&mut field, fields);
+        field
+    }
+
+    /// [`Self::sigma0_field`] over a field of the same size.
+    pub(crate) fn fill_sigma0(&self, field: &mut Field, fields: &FacetFields<'_>) {
+        let columns = field.columns;
+        field
+            .values
             .par_chunks_mut(columns.max(1))
             .enumerate()
             .for_each_init(
                 || vec![0.0; columns],
                 |bragg, (row, out)| self.sigma0_row(fields, row * columns, bragg, out),
             );
-        Field {
-            rows,
-            columns,
-            values,
-        }
     }
 
     /// σ⁰ of the pixels from `first` on: a loop that looks up, then one that the compiler can vectorise.

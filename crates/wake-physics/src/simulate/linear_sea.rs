@@ -4,11 +4,12 @@ use crate::dispersion::angular_frequency;
 use crate::error::Result;
 use crate::fft::{Synthesis, fast_length, signed_index};
 use crate::memory;
-use crate::plan::{Situation, smear};
+use crate::models::Models;
+use crate::modulation::smear;
 use crate::raster::Field;
 use crate::scene::Scene;
-use crate::setup::Setup;
 use crate::surface::wave_variances;
+use crate::survey::Survey;
 use num_complex::Complex32;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -57,15 +58,15 @@ impl LinearSea {
         let period = fast_length(rows.max(columns) + GUARD);
         // White numbers, waves, two fields.
         memory::check([rows, columns], [0, 0], 24 * (period * period) as u64)?;
-        let mut setup = Setup::new(&scene);
-        let situation = Situation::new(&scene, &setup);
-        let (slopes, velocity) = situation.resolved_sea();
-        setup.average_over(&slopes, velocity);
-        let image = situation.linear_image(&setup);
+        let mut models = Models::new(&scene);
+        let survey = Survey::new(&scene, &models);
+        let (slopes, velocity) = survey.resolved_sea();
+        models.average_over(&slopes, velocity);
+        let transfer = survey.modulation_of(&models);
         let spacing = scene.grid.spacing;
         let step = TAU / (period as f64 * spacing);
-        let resolution = setup.resolution().at(0.0);
-        let mut amplitudes = wave_variances(&setup.sea, period, spacing);
+        let resolution = models.resolution().at(0.0);
+        let mut amplitudes = wave_variances(&models.sea, period, spacing);
         let line = |(column, line): (usize, &mut [f32])| {
             let kx = signed_index(column, period) as f64 * step;
             for (row, amplitude) in line.iter_mut().enumerate().filter(|(_, v)| **v > 0.0) {
@@ -75,8 +76,8 @@ impl LinearSea {
                     *amplitude = 0.0;
                     continue;
                 }
-                let omega = angular_frequency(kx.hypot(ky), setup.sea.depth());
-                let modulation = image.modulation([kx, ky], omega).total();
+                let omega = angular_frequency(kx.hypot(ky), models.sea.depth());
+                let modulation = transfer.at([kx, ky], omega).total();
                 let variance = f64::from(*amplitude) * share * modulation.norm_sqr();
                 *amplitude = variance.sqrt() as f32;
             }

@@ -1,28 +1,37 @@
 //! From a scene to a SAR image: `stages` alone knows the order of the stages.
 //!
-//! It calls the method of each stage, `label` says what is where, `clock` times, `report` writes what came out.
+//! ```text
+//! Scene ─► Models ─► Survey ─► Plan ─► Stages ─► Simulation
+//! ```
+//!
+//! `Models` are the formulas with the scene's numbers, `Survey` is what linear theory tells of them, `Plan` what is to be
+//! computed, `Stages` computes it.
 
-use crate::error::Result;
-use crate::labels::Labels;
-use crate::memory;
-use crate::plan::Plan;
-use crate::raster::{Field, Raster};
-use crate::scene::Scene;
-use crate::setup::Setup;
-use clock::Clock;
-pub use clock::Seconds;
-pub use expected::expected_intensity;
-pub use label::labels_of;
-pub use linear_sea::LinearSea;
-use serde::Serialize;
-use stages::Run;
-
+mod accuracy;
 mod clock;
-mod expected;
 mod label;
 mod linear_sea;
-mod report;
+mod simulation;
 mod stages;
+
+pub use accuracy::{Accuracy, Reached};
+pub use clock::Seconds;
+pub use label::labels_of;
+pub use linear_sea::LinearSea;
+pub use simulation::{SarImage, Simulation};
+
+use crate::error::Result;
+use crate::models::Models;
+use crate::plan::Plan;
+use crate::raster::Field;
+use crate::sar::speckle::speckle;
+use crate::scattering::BackscatterTable;
+use crate::scene::{Scene, Term};
+use crate::survey::Survey;
+use crate::workspace::Workspace;
+use clock::Clock;
+use serde::Serialize;
+use stages::Stages;
 
 /// How fields are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -35,96 +44,204 @@ pub enum Method {
     Direct,
 }
 
-/// Everything a simulation makes. Fields are `[rows, columns]` of the image.
-#[derive(Debug, Clone)]
-pub struct Simulation {
-    /// Places of the pixels.
-    pub raster: Raster,
-    /// Elevation ζ \[m\].
-    pub elevation: Field,
-    /// Slope ∂ζ/∂x \[1\].
-    pub slope_x: Field,
-    /// Slope ∂ζ/∂y \[1\].
-    pub slope_y: Field,
-    /// Velocity of the water along x [m/s].
-    pub velocity_x: Field,
-    /// Velocity of the water along y [m/s].
-    pub velocity_y: Field,
-    /// Velocity of the water upward [m/s].
-    pub velocity_z: Field,
-    /// Velocity toward the radar [m/s].
-    pub radial_velocity: Field,
-    /// Cross-section σ⁰ per unit area, linear.
-    pub sigma0: Field,
-    /// Image intensity before speckle, linear, in the unit of σ⁰.
-    pub intensity: Field,
-    /// Image intensity with speckle.
-    pub speckled: Field,
-    /// Where ship and wake are.
-    pub labels: Labels,
-    /// What was computed, and bounds on what was not.
-    pub plan: Plan,
-    /// Seconds by stage.
-    pub seconds: Seconds,
-    /// How fields were computed.
-    pub method: Method,
-    /// The scene.
-    pub scene: Scene,
+/// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
+///
+/// The first scene costs what [`simulate`] costs; later ones of its size fault no new pages, and those of the same radar
+/// and wind make no new table. No result depends on what was simulated before. A simulator keeps as many blocks as its
+/// largest scene needs at once, some 30 fields of the image; it is freed with it. One simulator serves one thread, and
+/// uses all threads of the pool itself.
+///
+/// ```
+/// use wake_physics::{Scene, Simulator};
+///
+/// let mut scene = Scene::default();
+/// (scene.grid.rows, scene.grid.columns) = (64, 64);
+/// let mut simulator = Simulator::default();
+/// for seed in 0..3 {
+///     scene.seed = seed;
+///     let image = simulator.image(&scene)?; // no field but the image
+///     assert_eq!(image.intensity.values.len(), 64 * 64);
+/// }
+/// # Ok::<(), wake_physics::Error>(())
+/// ```
+#[derive(Debug, Default)]
+pub struct Simulator {
+    workspace: Workspace,
+    /// The last table of σ⁰.
+    table: Option<BackscatterTable>,
 }
 
-/// Simulates a scene with the fast methods.
+impl Simulator {
+    /// Simulates a scene: all fields, the image, labels.
+    ///
+    /// # Errors
+    ///
+    /// A value of the scene out of its range, or a grid that does not fit in memory.
+    pub fn simulate(&mut self, scene: &Scene) -> Result<Simulation> {
+        self.simulate_with(scene, Method::Fast)
+    }
+
+    /// [`Self::simulate`] by a method.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::simulate`].
+    pub fn simulate_with(&mut self, scene: &Scene, method: Method) -> Result<Simulation> {
+        scene.validate()?;
+        let mut clock = Clock::start();
+        let mut seconds = Seconds::default();
+        let models = Models::new(scene);
+        let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
+        let stages = Stages::new(scene, &models, &plan, method);
+        seconds.plan = clock.lap();
+        let mut drawn = stages.draw(self, &mut clock, &mut seconds);
+        let mut speckled = self.workspace.field(&models.image);
+        speckled.values.copy_from_slice(&drawn.intensity.values);
+        if plan.uses(Term::Speckle) {
+            speckle(&mut speckled, scene.radar.looks, scene.seed);
+        }
+        seconds.speckle = clock.lap();
+        let labels = labels_of(scene);
+        let crop = |field: &mut Field| {
+            let [rows, columns] = plan.sizes.margin;
+            std::mem::take(field).crop(rows, columns)
+        };
+        let fields = &mut drawn.fields;
+        let mut simulation = Simulation {
+            raster: models.image,
+            elevation: crop(&mut fields.elevation),
+            slope_x: crop(&mut fields.slope_x),
+            slope_y: crop(&mut fields.slope_y),
+            velocity_x: crop(&mut fields.velocity_x),
+            velocity_y: crop(&mut fields.velocity_y),
+            velocity_z: crop(&mut fields.velocity_z),
+            radial_velocity: crop(&mut drawn.radial_velocity),
+            sigma0: crop(&mut drawn.sigma0),
+            intensity: Field::default(),
+            speckled,
+            labels,
+            accuracy: drawn.accuracy,
+            plan,
+            seconds,
+            method,
+            scene: scene.clone(),
+        };
+        simulation.intensity = drawn.give_back(&mut self.workspace);
+        simulation.seconds.labels = clock.lap();
+        simulation.seconds.total = clock.total();
+        Ok(simulation)
+    }
+
+    /// The image of a scene and its labels: fields that the image does not need are not computed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::simulate`].
+    pub fn image(&mut self, scene: &Scene) -> Result<SarImage> {
+        scene.validate()?;
+        let models = Models::new(scene);
+        let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
+        let (intensity, accuracy) = self.intensity(scene, &models, &plan);
+        let speckle = plan.uses(Term::Speckle);
+        Ok(SarImage {
+            intensity,
+            labels: labels_of(scene),
+            plan,
+            accuracy,
+            speckle: speckle.then_some((scene.radar.looks, scene.seed)),
+        })
+    }
+
+    /// As [`expected_intensity`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::simulate`].
+    pub fn expected_intensity(&mut self, scene: &Scene) -> Result<Field> {
+        scene.validate()?;
+        let mut models = Models::new(scene);
+        let survey = Survey::new(scene, &models);
+        let mut plan = Plan::of(scene, &models, &survey)?;
+        if plan.uses(Term::Sea) {
+            let (slopes, velocity) = survey.resolved_sea();
+            models.average_over(&slopes, velocity);
+            plan = plan.over_all_seas();
+        }
+        Ok(self.intensity(scene, &models, &plan).0)
+    }
+
+    /// The intensity before speckle, and no other field.
+    fn intensity(&mut self, scene: &Scene, models: &Models, plan: &Plan) -> (Field, Accuracy) {
+        let stages = Stages::new(scene, models, plan, Method::Fast);
+        let drawn = stages.draw(self, &mut Clock::start(), &mut Seconds::default());
+        let accuracy = drawn.accuracy;
+        (drawn.give_back(&mut self.workspace), accuracy)
+    }
+
+    /// Takes the blocks of a simulation back that is no longer needed: the next one of this size asks the system for
+    /// none.
+    pub fn reclaim(&mut self, simulation: Simulation) {
+        let s = simulation;
+        let surface = [
+            s.elevation,
+            s.slope_x,
+            s.slope_y,
+            s.velocity_x,
+            s.velocity_y,
+        ];
+        let more = [
+            s.velocity_z,
+            s.radial_velocity,
+            s.sigma0,
+            s.intensity,
+            s.speckled,
+        ];
+        let fields = surface.into_iter().chain(more);
+        fields.for_each(|field| self.workspace.give(field));
+    }
+}
+
+/// Simulates a scene with the fast methods; for many scenes see [`Simulator`].
 ///
 /// # Errors
 ///
-/// A value of the scene out of its range, or a grid that does not fit in memory.
+/// As [`Simulator::simulate`].
 pub fn simulate(scene: &Scene) -> Result<Simulation> {
-    simulate_with(scene, Method::Fast)
+    Simulator::default().simulate(scene)
 }
 
-/// Simulates a scene.
+/// [`simulate`] by a method.
+///
+/// # Errors
+///
+/// As [`Simulator::simulate`].
+pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
+    Simulator::default().simulate_with(scene, method)
+}
+
+/// Mean over all seas of the intensity before speckle, in the unit of σ⁰, `[rows, columns]` of the image.
+///
+/// The wake is imaged as in [`simulate`], but every wave of the sea counts as one that a pixel does not
+/// resolve: its slopes are averaged over in σ⁰, and its velocity widens the response in azimuth,
+///
+/// ```text
+/// E I = Σ E σ⁰ P(y − y' − (R/V) u; ρ'),     ρ'² = ρ² + 2π² (R/V)² var u_sea
+/// ```
+///
+/// with u of the wake alone. This is the mean where the sea's velocity is Gaussian and independent of the σ⁰ of the
+/// same place, which a tilt and a velocity of different phase are to first order. Neglected: the sea's displacement in
+/// range, its defocus, and how it and the wake modulate each other.
+///
+/// It needs no random numbers: the scene's seed does not matter.
 ///
 /// # Errors
 ///
 /// As [`simulate`].
-pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
-    scene.validate()?;
-    memory::keep_large_blocks();
-    let mut clock = Clock::start();
-    let mut seconds = Seconds::default();
-    let setup = Setup::new(scene);
-    let mut plan = Plan::of(scene, &setup)?;
-    let run = Run::new(scene, &setup, &plan, method);
-    seconds.plan = clock.lap();
-    let drawn = run.draw(&plan, &mut clock, &mut seconds);
-    [plan.sizes.sea_lattice, plan.sizes.table] = drawn.sizes;
-    let speckled = run.speckle(&plan, &drawn.intensity);
-    seconds.speckle = clock.lap();
-    let labels = labels_of(scene);
-    let crop = |field| run.crop(field);
-    let (radial_velocity, sigma0) = (crop(drawn.radial_velocity), crop(drawn.sigma0));
-    let fields = drawn.fields;
-    let [elevation, slope_x, slope_y] =
-        [fields.elevation, fields.slope_x, fields.slope_y].map(crop);
-    let [velocity_x, velocity_y, velocity_z] =
-        [fields.velocity_x, fields.velocity_y, fields.velocity_z].map(crop);
-    seconds.labels = clock.lap();
-    seconds.total = clock.total();
-    Ok(Simulation {
-        raster: setup.image,
-        elevation,
-        slope_x,
-        slope_y,
-        velocity_x,
-        velocity_y,
-        velocity_z,
-        radial_velocity,
-        sigma0,
-        intensity: drawn.intensity,
-        speckled,
-        labels,
-        plan,
-        seconds,
-        method,
-        scene: scene.clone(),
-    })
+///
+/// # References
+///
+/// Hasselmann & Hasselmann (1991), J. Geophys. Res. 96(C6), 10713 (the factor of the
+/// sea's displacement in the quasi-linear transform).
+pub fn expected_intensity(scene: &Scene) -> Result<Field> {
+    Simulator::default().expected_intensity(scene)
 }

@@ -1,35 +1,26 @@
-//! One function a stage: what it takes from the plan, and which method it calls.
+//! The order of the stages, and one function a stage: what it takes from the plan, and which method it calls.
 
-use super::Method;
+use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
 use super::label::echo_displacement;
+use super::{Method, Simulator};
 use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
+use crate::models::{Models, turbulent_wake};
 use crate::nufft;
-use crate::plan::Plan;
+use crate::plan::{Plan, SHARES};
 use crate::raster::{Field, Raster};
 use crate::sar::direct::DirectImage;
 use crate::sar::echo::ship_cross_section;
-use crate::sar::speckle::speckle;
 use crate::sar::{AzimuthResolution, Echo, Imaging, Sources};
 use crate::scattering::{BackscatterTable, FacetFields};
 use crate::scene::{Scene, Term};
-use crate::setup::{Setup, turbulent_wake};
 use crate::surface::Surface;
 use crate::waves::{Quantity, harmonic_fields};
+use crate::workspace::Workspace;
 use rayon::prelude::*;
 
-/// Share of the tolerance for the fields: their largest error is some five times its root mean square, and
-/// bunching turns an error of the velocity into a larger one of the image.
-const SHARE_OF_FIELDS: f64 = 0.3;
-
-/// Share of the tolerance for the table of σ⁰, whose error is bounded pixel by pixel.
-const SHARE_OF_TABLE: f64 = 0.5;
-
-/// Share of the tolerance for the kernels of the imaging.
-const SHARE_OF_KERNELS: f64 = 0.4;
-
-/// The fields that are always made, for they are results.
+/// The fields that are results.
 const OUTPUTS: [Quantity; 6] = [
     Quantity::Elevation,
     Quantity::SlopeX,
@@ -39,17 +30,19 @@ const OUTPUTS: [Quantity; 6] = [
     Quantity::VelocityZ,
 ];
 
-/// A scene being simulated.
-pub(super) struct Run<'a> {
+/// A scene being drawn: what its stages have in common.
+pub(super) struct Stages<'a> {
     scene: &'a Scene,
-    setup: &'a Setup,
+    models: &'a Models,
+    plan: &'a Plan,
     method: Method,
     /// The image and its margin.
     raster: Raster,
     quantities: Vec<Quantity>,
 }
 
-/// Linear fields of the surface on the raster with its margin.
+/// Linear fields of the surface on the raster with its margin; those that nobody asks for have no pixel.
+#[derive(Debug, Default)]
 pub(super) struct SurfaceFields {
     /// ζ \[m\].
     pub(super) elevation: Field,
@@ -63,13 +56,28 @@ pub(super) struct SurfaceFields {
     pub(super) velocity_y: Field,
     /// Of the water upward [m/s].
     pub(super) velocity_z: Field,
-    /// Acceleration toward the radar [m/s²], where coherence counts.
-    acceleration: Option<Field>,
-    /// Hydrodynamic modulation \[1\], where it counts.
-    modulation: Option<Field>,
+    /// Acceleration toward the radar [m/s²].
+    pub(super) radial_acceleration: Field,
+    /// Hydrodynamic modulation of the Bragg waves \[1\].
+    pub(super) modulation: Field,
 }
 
-/// What a scene looks like before speckle, on the raster with its margin but for the image.
+impl SurfaceFields {
+    fn of(&mut self, quantity: Quantity) -> &mut Field {
+        match quantity {
+            Quantity::Elevation => &mut self.elevation,
+            Quantity::SlopeX => &mut self.slope_x,
+            Quantity::SlopeY => &mut self.slope_y,
+            Quantity::VelocityX => &mut self.velocity_x,
+            Quantity::VelocityY => &mut self.velocity_y,
+            Quantity::VelocityZ => &mut self.velocity_z,
+            Quantity::RadialAcceleration => &mut self.radial_acceleration,
+            Quantity::Hydrodynamic => &mut self.modulation,
+        }
+    }
+}
+
+/// What a scene looks like before speckle; all but the image on the raster with its margin.
 pub(super) struct Drawn {
     pub(super) fields: SurfaceFields,
     /// Velocity toward the radar [m/s].
@@ -77,12 +85,35 @@ pub(super) struct Drawn {
     pub(super) sigma0: Field,
     /// Intensity of the image.
     pub(super) intensity: Field,
-    /// Sizes of the lattice of the sea, and of the table of σ⁰.
-    pub(super) sizes: [[usize; 2]; 2],
+    pub(super) accuracy: Accuracy,
 }
 
-impl<'a> Run<'a> {
-    pub(super) fn new(scene: &'a Scene, setup: &'a Setup, plan: &Plan, method: Method) -> Self {
+impl Drawn {
+    /// Puts the blocks of all fields but the image's back.
+    pub(super) fn give_back(self, workspace: &mut Workspace) -> Field {
+        let f = self.fields;
+        let surface = [
+            f.elevation,
+            f.slope_x,
+            f.slope_y,
+            f.velocity_x,
+            f.velocity_y,
+        ];
+        let more = [f.velocity_z, f.radial_acceleration, f.modulation];
+        let rest = [self.radial_velocity, self.sigma0];
+        let fields = surface.into_iter().chain(more).chain(rest);
+        fields.for_each(|field| workspace.give(field));
+        self.intensity
+    }
+}
+
+impl<'a> Stages<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        models: &'a Models,
+        plan: &'a Plan,
+        method: Method,
+    ) -> Self {
         let mut quantities = OUTPUTS.to_vec();
         if plan.uses(Term::Coherence) {
             quantities.push(Quantity::RadialAcceleration);
@@ -90,113 +121,114 @@ impl<'a> Run<'a> {
         if plan.uses(Term::Hydrodynamic) {
             quantities.push(Quantity::Hydrodynamic);
         }
+        let [rows, columns] = plan.sizes.margin;
         Self {
             scene,
-            setup,
+            models,
+            plan,
             method,
-            raster: setup
-                .image
-                .with_margin(plan.sizes.margin[0], plan.sizes.margin[1]),
+            raster: models.image.with_margin(rows, columns),
             quantities,
         }
     }
 
-    /// All stages up to the intensity before speckle, in their order; `clock` runs since the plan was made.
-    pub(super) fn draw(&self, plan: &Plan, clock: &mut Clock, seconds: &mut Seconds) -> Drawn {
-        let (mut fields, lattice) = self.sea(plan);
+    /// All stages up to the intensity before speckle, in their order; the clock runs since the plan was made.
+    pub(super) fn draw(
+        &self,
+        simulator: &mut Simulator,
+        clock: &mut Clock,
+        seconds: &mut Seconds,
+    ) -> Drawn {
+        let workspace = &mut simulator.workspace;
+        let mut accuracy = Accuracy::default();
+        let mut fields = self.sea(workspace);
         seconds.sea = clock.lap();
-        self.add_wake(plan, &mut fields);
+        accuracy.wake = self.add_wake(workspace, &mut fields);
         seconds.kelvin = clock.lap();
-        let damping = self.damping(plan);
+        let damping = self.damping(workspace);
         seconds.turbulent = clock.lap();
-        let (sigma0, table) = self.sigma0(plan, &fields, damping.as_ref());
+        let sigma0 = self.sigma0(simulator, &fields, damping.as_ref(), &mut accuracy);
+        let workspace = &mut simulator.workspace;
+        damping.into_iter().for_each(|field| workspace.give(field));
         seconds.backscatter = clock.lap();
-        let radial_velocity = fields.radial_velocity(self.setup.incidence);
-        let intensity = self.image(plan, &sigma0, &radial_velocity, &fields);
+        let radial_velocity = self.radial_velocity(workspace, &fields);
+        let intensity = self.image(workspace, &sigma0, &radial_velocity, &fields);
         seconds.imaging = clock.lap();
         Drawn {
             fields,
             radial_velocity,
             sigma0,
             intensity,
-            sizes: [lattice, table],
+            accuracy,
         }
     }
 
+    /// Tolerance of sums of waves; single precision is not more exact.
     fn field_tolerance(&self) -> f64 {
-        (SHARE_OF_FIELDS * self.scene.model.tolerance).max(1e-6)
+        (SHARES.fields * self.scene.model.tolerance).max(1e-6)
     }
 
-    /// The sea, and the size of its lattice.
-    fn sea(&self, plan: &Plan) -> (SurfaceFields, [usize; 2]) {
-        let flat = || vec![Field::constant(&self.raster, 0.0); self.quantities.len()];
-        if !plan.uses(Term::Sea) {
-            return (self.collect(flat(), plan), [0, 0]);
-        }
-        let (seed, time) = (self.scene.seed, self.scene.sea.time);
-        let surface = Surface::new(&self.setup.sea, seed, time, &self.raster);
-        let transfer = &self.setup.transfer;
-        let fields = match self.method {
-            Method::Fast => surface.fields(transfer, &self.quantities, self.field_tolerance()),
-            Method::Direct => {
-                harmonic_fields(&surface.modes(), transfer, &self.quantities, &self.raster)
+    fn sea(&self, workspace: &mut Workspace) -> SurfaceFields {
+        let mut fields = SurfaceFields::default();
+        if !self.plan.uses(Term::Sea) {
+            for &quantity in &self.quantities {
+                *fields.of(quantity) = workspace.flat_field(&self.raster);
             }
-        };
-        (self.collect(fields, plan), surface.lattice_size())
-    }
-
-    fn collect(&self, fields: Vec<Field>, plan: &Plan) -> SurfaceFields {
-        let mut fields = fields.into_iter();
-        let mut next = || {
-            fields
-                .next()
-                .unwrap_or_else(|| Field::constant(&self.raster, 0.0))
-        };
-        SurfaceFields {
-            elevation: next(),
-            slope_x: next(),
-            slope_y: next(),
-            velocity_x: next(),
-            velocity_y: next(),
-            velocity_z: next(),
-            acceleration: plan.uses(Term::Coherence).then(&mut next),
-            modulation: plan.uses(Term::Hydrodynamic).then(&mut next),
+            return fields;
         }
+        let seed_and_time = (self.scene.seed, self.scene.sea.time);
+        let spectrum = &self.models.sea;
+        let surface = Surface::new_in(workspace, spectrum, seed_and_time, &self.raster);
+        let (transfer, quantities) = (&self.models.transfer, &self.quantities);
+        let made = match self.method {
+            Method::Fast => {
+                surface.fields_in(workspace, transfer, quantities, self.field_tolerance())
+            }
+            Method::Direct => harmonic_fields(&surface.modes(), transfer, quantities, &self.raster),
+        };
+        for (&quantity, field) in quantities.iter().zip(made) {
+            *fields.of(quantity) = field;
+        }
+        surface.give_back(workspace);
+        fields
     }
 
     /// Adds the Kelvin wake, faded over the hull.
-    fn add_wake(&self, plan: &Plan, fields: &mut SurfaceFields) {
-        let Some(wake) = self.setup.wake.as_ref().filter(|_| plan.uses(Term::Kelvin)) else {
-            return;
-        };
-        let waves = wake.waves(&plan.wake);
-        let transfer = &self.setup.transfer;
+    fn add_wake(&self, workspace: &mut Workspace, fields: &mut SurfaceFields) -> Option<Reached> {
+        let wake = self.models.wake.as_ref();
+        let wake = wake.filter(|_| self.plan.uses(Term::Kelvin))?;
+        let waves = wake.waves(&self.plan.wake);
+        let transfer = &self.models.transfer;
         let (quantities, raster) = (&self.quantities, &self.raster);
-        let fade = kelvin::fade_field(&wake.track, wake.hull.length(), raster);
-        let mut fields: Vec<&mut Field> = fields.all().collect();
-        let mut add = |q: usize, wake: &mut Field| fields[q].add_product(wake, &fade);
-        match self.method {
+        let mut fade = workspace.field(raster);
+        kelvin::fill_fade(&mut fade, &wake.track, wake.hull.length(), raster);
+        let mut add =
+            |q: usize, wake: &mut Field| fields.of(quantities[q]).add_product(wake, &fade);
+        let reached = match self.method {
             Method::Fast => {
-                let tolerance = self.field_tolerance();
-                nufft::synthesize_each(&waves, transfer, quantities, raster, tolerance, add);
+                let asked = self.field_tolerance();
+                let sum = (&waves, transfer, &quantities[..], raster);
+                let reached = nufft::synthesize_each(workspace, sum, asked, add);
+                Some(Reached { asked, reached })
             }
             Method::Direct => {
                 let wake_fields = harmonic_fields(&waves, transfer, quantities, raster);
                 for (q, mut field) in wake_fields.into_iter().enumerate() {
                     add(q, &mut field);
                 }
+                None
             }
-        }
+        };
+        workspace.give(fade);
+        reached
     }
 
     /// What the turbulent wake leaves of the short waves.
-    fn damping(&self, plan: &Plan) -> Option<Field> {
-        let wake = self
-            .setup
-            .wake
-            .as_ref()
-            .filter(|_| plan.uses(Term::Turbulent))?;
-        let mut field = turbulent_wake(wake).damping_field(&self.raster);
+    fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
+        let wake = self.models.wake.as_ref();
+        let wake = wake.filter(|_| self.plan.uses(Term::Turbulent))?;
+        let mut field = workspace.field(&self.raster);
+        turbulent_wake(wake).fill_damping(&mut field, &self.raster);
         field
             .values
             .par_iter_mut()
@@ -205,59 +237,92 @@ impl<'a> Run<'a> {
         Some(field)
     }
 
-    /// σ⁰, and the size of its table.
     fn sigma0(
         &self,
-        plan: &Plan,
+        simulator: &mut Simulator,
         fields: &SurfaceFields,
         damping: Option<&Field>,
-    ) -> (Field, [usize; 2]) {
+        accuracy: &mut Accuracy,
+    ) -> Field {
+        let uses = |term| self.plan.uses(term);
         let backscatter = self
-            .setup
-            .backscatter(plan.uses(Term::TiltAverage), plan.uses(Term::Specular));
+            .models
+            .backscatter(uses(Term::TiltAverage), uses(Term::Specular));
         let facets = FacetFields {
             slope_x: &fields.slope_x,
             slope_y: &fields.slope_y,
-            modulation: fields.modulation.as_ref(),
+            modulation: uses(Term::Hydrodynamic).then_some(&fields.modulation),
             damping,
         };
         if self.method == Method::Direct {
-            return (backscatter.sigma0_field(&facets), [0, 0]);
+            return backscatter.sigma0_field(&facets);
         }
-        let error = SHARE_OF_TABLE * self.scene.model.tolerance * plan.mean_sigma0;
-        let table = BackscatterTable::covering(backscatter, facets.slope_x, facets.slope_y, error);
-        (table.sigma0_field(&facets), table.size())
+        let asked = SHARES.table * self.scene.model.tolerance;
+        let slopes = [facets.slope_x, facets.slope_y];
+        let (last, mean) = (simulator.table.take(), self.plan.mean_sigma0);
+        let table = BackscatterTable::covering_or(last, backscatter, slopes, asked * mean);
+        accuracy.table = Some(Reached {
+            asked,
+            reached: if mean > 0.0 {
+                table.error() / mean
+            } else {
+                0.0
+            },
+        });
+        accuracy.table_nodes = table.size();
+        let mut sigma0 = simulator.workspace.field(&self.raster);
+        table.fill_sigma0(&mut sigma0, &facets);
+        simulator.table = Some(table);
+        sigma0
+    }
+
+    /// Velocity toward the radar; without pixels where the velocities are not known.
+    fn radial_velocity(&self, workspace: &mut Workspace, fields: &SurfaceFields) -> Field {
+        let [vx, vz] = [&fields.velocity_x, &fields.velocity_z];
+        if vx.values.is_empty() {
+            return Field::default();
+        }
+        let incidence = self.models.incidence;
+        let (sin, cos) = (incidence.sin() as f32, incidence.cos() as f32);
+        let mut field = workspace.field(&self.raster);
+        let velocities = vx.values.par_iter().zip(&vz.values);
+        let pixels = field.values.par_iter_mut().zip(velocities);
+        pixels
+            .with_min_len(1 << 14)
+            .for_each(|(radial, (x, z))| *radial = z * cos - x * sin);
+        field
     }
 
     /// Intensity of the image before speckle.
     fn image(
         &self,
-        plan: &Plan,
+        workspace: &mut Workspace,
         sigma0: &Field,
         radial_velocity: &Field,
         fields: &SurfaceFields,
     ) -> Field {
+        let uses = |term| self.plan.uses(term);
         let sources = Sources {
             raster: self.raster,
             sigma0,
-            radial_velocity: plan.uses(Term::Bunching).then_some(radial_velocity),
-            radial_acceleration: fields.acceleration.as_ref(),
-            elevation: plan.uses(Term::RangeBunching).then_some(&fields.elevation),
+            radial_velocity: uses(Term::Bunching).then_some(radial_velocity),
+            radial_acceleration: uses(Term::Coherence).then_some(&fields.radial_acceleration),
+            elevation: uses(Term::RangeBunching).then_some(&fields.elevation),
         };
-        let at_rest = AzimuthResolution::at_rest(self.setup.azimuth_resolution, 1);
+        let at_rest = AzimuthResolution::at_rest(self.models.azimuth_resolution, 1);
         let imaging = Imaging {
-            range_to_velocity: self.setup.range_to_velocity,
-            incidence: self.setup.incidence,
-            resolution: if plan.uses(Term::Coherence) {
-                self.setup.resolution()
+            range_to_velocity: self.models.range_to_velocity,
+            incidence: self.models.incidence,
+            resolution: if uses(Term::Coherence) {
+                self.models.resolution()
             } else {
                 at_rest
             },
         };
-        let image = &self.setup.image;
-        let tolerance = SHARE_OF_KERNELS * self.scene.model.tolerance;
+        let image = &self.models.image;
+        let tolerance = SHARES.kernels * self.scene.model.tolerance;
         let mut intensity = match self.method {
-            Method::Fast => imaging.image(&sources, image, tolerance),
+            Method::Fast => imaging.image_in(workspace, &sources, image, tolerance),
             Method::Direct => DirectImage::new(&imaging, &sources, image).image(),
         };
         if let Some(echo) = self.echo() {
@@ -269,7 +334,7 @@ impl<'a> Run<'a> {
     /// The ship's own echo, if it is asked for.
     fn echo(&self) -> Option<Echo> {
         let ship = self.scene.ship.as_ref().filter(|ship| ship.echo)?;
-        let wake = self.setup.wake.as_ref()?;
+        let wake = self.models.wake.as_ref()?;
         let displacement = SEA_WATER_DENSITY * wake.hull.volume();
         Some(Echo {
             position: wake.track.position,
@@ -279,48 +344,5 @@ impl<'a> Run<'a> {
             cross_section: ship_cross_section(self.scene.radar.frequency, displacement),
             displacement: echo_displacement(self.scene),
         })
-    }
-
-    pub(super) fn speckle(&self, plan: &Plan, intensity: &Field) -> Field {
-        let mut speckled = intensity.clone();
-        if plan.uses(Term::Speckle) {
-            speckle(&mut speckled, self.scene.radar.looks, self.scene.seed);
-        }
-        speckled
-    }
-
-    /// Cuts the image from the middle.
-    pub(super) fn crop(&self, field: Field) -> Field {
-        let rows = (self.raster.rows - self.setup.image.rows) / 2;
-        let columns = (self.raster.columns - self.setup.image.columns) / 2;
-        field.crop(rows, columns)
-    }
-}
-
-impl SurfaceFields {
-    /// In the order of a run's quantities.
-    fn all(&mut self) -> impl Iterator<Item = &mut Field> {
-        let outputs = [
-            &mut self.elevation,
-            &mut self.slope_x,
-            &mut self.slope_y,
-            &mut self.velocity_x,
-            &mut self.velocity_y,
-            &mut self.velocity_z,
-        ];
-        let more = self.acceleration.iter_mut().chain(&mut self.modulation);
-        outputs.into_iter().chain(more)
-    }
-
-    /// Velocity toward the radar.
-    fn radial_velocity(&self, incidence: f64) -> Field {
-        let [vx, vz] = [&self.velocity_x, &self.velocity_z];
-        let (sin, cos) = (incidence.sin() as f32, incidence.cos() as f32);
-        let values = vx.values.par_iter().zip(&vz.values).with_min_len(1 << 14);
-        Field {
-            rows: vx.rows,
-            columns: vx.columns,
-            values: values.map(|(x, z)| z * cos - x * sin).collect(),
-        }
     }
 }

@@ -74,11 +74,12 @@ impl<'a> Draw<'a> {
     }
 
     /// Even and odd parts ½(c(k) ± c*(−k)) of the amplitudes of all lines, phases at pixel `[0, 0]`, and their
-    /// mean variance \[m²\].
-    pub(super) fn run(&self) -> ([Vec<Complex32>; 2], f64) {
+    /// mean variance \[m²\]; written into two blocks of any content.
+    pub(super) fn run(
+        &self,
+        [mut even, mut odd]: [Vec<Complex32>; 2],
+    ) -> ([Vec<Complex32>; 2], f64) {
         let rows = self.lattice.rows;
-        let mut even = vec![Complex32::ZERO; self.lattice.lines() * rows];
-        let mut odd = vec![Complex32::ZERO; self.lattice.lines() * rows];
         let variances: Vec<f64> = even
             .par_chunks_mut(rows)
             .zip(odd.par_chunks_mut(rows))
@@ -104,6 +105,9 @@ impl<'a> Draw<'a> {
         even: &mut [Complex32],
         odd: &mut [Complex32],
     ) -> f64 {
+        let [up, down] = self.lattice.disk(line);
+        even[up.end..down.start].fill(Complex32::ZERO);
+        odd[up.end..down.start].fill(Complex32::ZERO);
         let mut generator = line_generator(self.seed, line as u64);
         let mut variance = 0.0;
         for range in self.lattice.disk(line) {

@@ -12,6 +12,7 @@ use crate::raster::{Field, Raster};
 use crate::vectorize::vectorized;
 use crate::waves::{PlaneWaves, Quantity, Transfer};
 use crate::wind_sea::DirectionalSpectrum;
+use crate::workspace::Workspace;
 use amplitude::Amplitudes;
 use draw::{Draw, Scatter};
 use factor::Factors;
@@ -63,6 +64,12 @@ pub(crate) fn wave_variances(
     variances
 }
 
+/// Rows and columns of the lattice that a sea on a raster is drawn on.
+pub(crate) fn lattice_size(spectrum: &DirectionalSpectrum, raster: &Raster) -> [usize; 2] {
+    let lattice = Lattice::new(raster, TAU / spectrum.peak_wavenumber());
+    [lattice.rows, lattice.columns]
+}
+
 /// One realisation of a wind sea at one instant, around one raster.
 ///
 /// ```text
@@ -97,7 +104,30 @@ impl Surface {
     /// - `raster` where the sea will be seen, margins included
     #[must_use]
     pub fn new(spectrum: &DirectionalSpectrum, seed: u64, time: f64, raster: &Raster) -> Self {
-        Self::draw(spectrum, (seed, time), raster, Scatter::Gaussian)
+        let mut workspace = Workspace::default();
+        Self::draw(
+            spectrum,
+            (seed, time),
+            raster,
+            Scatter::Gaussian,
+            &mut workspace,
+        )
+    }
+
+    /// [`Self::new`] in blocks of a workspace; [`Self::give_back`] returns them.
+    pub(crate) fn new_in(
+        workspace: &mut Workspace,
+        spectrum: &DirectionalSpectrum,
+        seed_and_time: (u64, f64),
+        raster: &Raster,
+    ) -> Self {
+        Self::draw(
+            spectrum,
+            seed_and_time,
+            raster,
+            Scatter::Gaussian,
+            workspace,
+        )
     }
 
     fn draw(
@@ -105,11 +135,14 @@ impl Surface {
         seed_and_time: (u64, f64),
         raster: &Raster,
         scatter: Scatter,
+        workspace: &mut Workspace,
     ) -> Self {
         let lattice = Lattice::new(raster, TAU / spectrum.peak_wavenumber());
         let band = spectrum.moments(0.0, lattice.cutoff(), 0.0).elevation;
         let ([even, odd], carried) = if band > 0.0 {
-            Draw::new(spectrum, lattice, raster, seed_and_time, scatter).run()
+            let len = lattice.lines() * lattice.rows;
+            let parts = [(); 2].map(|()| workspace.spectra.0.take(len, Complex32::ZERO));
+            Draw::new(spectrum, lattice, raster, seed_and_time, scatter).run(parts)
         } else {
             ([Vec::new(), Vec::new()], 0.0)
         };
@@ -126,6 +159,12 @@ impl Surface {
                 0.0
             },
         }
+    }
+
+    /// Puts the blocks of the amplitudes back.
+    pub(crate) fn give_back(self, workspace: &mut Workspace) {
+        workspace.spectra.0.give(self.even);
+        workspace.spectra.0.give(self.odd);
     }
 
     /// Whether there is no resolved wave.
@@ -244,29 +283,52 @@ impl Surface {
         quantities: &[Quantity],
         tolerance: f64,
     ) -> Vec<Field> {
-        if tolerance >= SINGLE_PRECISION_TOLERANCE {
-            self.fields_in::<f32>(transfer, quantities)
-        } else {
-            self.fields_in::<f64>(transfer, quantities)
-        }
+        self.fields_in(&mut Workspace::default(), transfer, quantities, tolerance)
     }
 
-    fn fields_in<T: Lane>(&self, transfer: &Transfer, quantities: &[Quantity]) -> Vec<Field> {
-        let mut fields = vec![Field::constant(&self.raster, 0.0); quantities.len()];
+    /// [`Self::fields`] in blocks of a workspace.
+    pub(crate) fn fields_in(
+        &self,
+        workspace: &mut Workspace,
+        transfer: &Transfer,
+        quantities: &[Quantity],
+        tolerance: f64,
+    ) -> Vec<Field> {
+        let mut fields: Vec<Field> = quantities
+            .iter()
+            .map(|_| workspace.field(&self.raster))
+            .collect();
         if self.is_flat() || self.raster.is_empty() {
-            return fields;
+            fields.iter_mut().for_each(|field| field.values.fill(0.0));
+        } else if tolerance >= SINGLE_PRECISION_TOLERANCE {
+            self.synthesize::<f32>(workspace, transfer, quantities, &mut fields);
+        } else {
+            self.synthesize::<f64>(workspace, transfer, quantities, &mut fields);
         }
-        let plan = Synthesis::<T>::new(self.lattice.rows, self.lattice.columns);
+        fields
+    }
+
+    /// Overwrites all of the fields.
+    fn synthesize<T: Lane>(
+        &self,
+        workspace: &mut Workspace,
+        transfer: &Transfer,
+        quantities: &[Quantity],
+        fields: &mut [Field],
+    ) {
+        let mut unused = if quantities.len() % 2 == 1 {
+            workspace.floats.take(self.raster.len(), 0.0)
+        } else {
+            Vec::new()
+        };
+        let (blocks, planner) = T::of(workspace);
+        let plan = Synthesis::<T>::planned(planner, self.lattice.rows, self.lattice.columns);
         let factors = Factors::new(&self.lattice, transfer);
-        let mut half = vec![Complex::new(T::zero(), T::zero()); plan.half_len()];
+        let mut half = blocks.take(plan.half_len(), Complex::new(T::zero(), T::zero()));
         for (pair, quantities) in fields.chunks_mut(2).zip(quantities.chunks(2)) {
-            let mut unused = Vec::new();
             let out = match pair {
                 [first, second] => (&mut first.values[..], &mut second.values[..]),
-                [first] => {
-                    unused.resize(first.values.len(), 0.0);
-                    (&mut first.values[..], &mut unused[..])
-                }
+                [first] => (&mut first.values[..], &mut unused[..]),
                 _ => continue,
             };
             plan.run_real(
@@ -281,7 +343,8 @@ impl Surface {
                 },
             );
         }
-        fields
+        T::of(workspace).0.give(half);
+        workspace.floats.give(unused);
     }
 
     /// Writes line `line` of the half spectra of one or two quantities.

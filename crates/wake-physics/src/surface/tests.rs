@@ -43,6 +43,7 @@ fn steady(sea: &WindSea, raster: &Raster) -> Surface {
         (7, 0.0),
         raster,
         Scatter::Phase,
+        &mut Workspace::default(),
     )
 }
 

@@ -269,7 +269,7 @@ proptest! {
         assert_sound(&a, "random scene");
         let b = run(&scene);
         prop_assert_eq!(&a.speckled, &b.speckled);
-        prop_assert!(a.plan.bound() <= 0.5 * scene.model.tolerance);
+        prop_assert!(a.plan.left_out() <= 0.5 * scene.model.tolerance);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Whole scenes: hard cases, fast against direct, the plan's bounds, and trends that radar images show.
+//! Whole scenes: hard cases, fast against direct, the plan's estimates, and trends that radar images show.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 #![allow(clippy::float_cmp, reason = "values that must be the same bits")]
@@ -10,7 +10,8 @@
 mod expected;
 mod hard_cases;
 mod methods;
-mod plan_bounds;
+mod plan;
+mod simulator;
 mod trends;
 
 use wake_physics::{Scene, Simulation, simulate};
@@ -59,7 +60,7 @@ fn assert_sound(simulation: &Simulation, what: &str) {
     assert!(
         plan.terms
             .iter()
-            .all(|t| t.bound.is_finite() && t.bound >= 0.0),
+            .all(|t| t.estimate.is_finite() && t.estimate >= 0.0),
         "{what}: {plan}"
     );
 }

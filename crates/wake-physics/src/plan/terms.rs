@@ -1,5 +1,6 @@
 //! Which terms are computed: the choice, given what each would change.
 
+use super::SHARES;
 use crate::scene::{Term, TermRule, Terms};
 use serde::Serialize;
 
@@ -10,9 +11,10 @@ pub struct PlannedTerm {
     pub term: Term,
     /// Whether it is computed.
     pub used: bool,
-    /// What leaving it out changes at most: root mean square of the change of the intensity before speckle,
-    /// relative to its mean; for speckle itself, of the speckled image. 0 where the scene has nothing of it.
-    pub bound: f64,
+    /// What leaving it out changes, by estimate: three times the root mean square that linear theory gives of the
+    /// change of the intensity before speckle, relative to its mean; for speckle itself, of the speckled image.
+    /// 0 where the scene has nothing of it. No estimate: the image is not linear.
+    pub estimate: f64,
     /// Why, in words.
     pub why: String,
 }
@@ -21,31 +23,28 @@ pub struct PlannedTerm {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Effect {
     pub(crate) term: Term,
-    pub(crate) bound: f64,
-    /// `Some` where the scene does not have the term at all: the bound is 0 exactly.
+    pub(crate) estimate: f64,
+    /// `Some` where the scene does not have the term at all: the estimate is 0 exactly.
     pub(crate) absent: Option<&'static str>,
 }
 
-/// Share of the tolerance that terms left out may use; the rest is for the numerical methods.
-const SHARE_OF_TERMS: f64 = 0.5;
-
-/// Chooses terms. By rule "needed" terms are left out from the smallest bound up, as long as the sum of the bounds
-/// left out stays within their share of the tolerance; speckle, which is no part of the image before speckle, has
+/// Chooses terms. By rule "needed" terms are left out from the smallest estimate up, as long as the sum of the
+/// estimates left out stays within their share of the tolerance; speckle, which is no part of the image before speckle, has
 /// the tolerance for itself.
 pub(crate) fn choose(effects: &[Effect], terms: &Terms, tolerance: f64) -> Vec<PlannedTerm> {
     let mut order: Vec<&Effect> = effects.iter().filter(|e| e.term != Term::Speckle).collect();
-    order.sort_by(|a, b| a.bound.total_cmp(&b.bound));
+    order.sort_by(|a, b| a.estimate.total_cmp(&b.estimate));
     let mut left_out = Vec::new();
     let mut sum = 0.0;
     for effect in order {
-        sum += effect.bound;
-        if sum <= SHARE_OF_TERMS * tolerance {
+        sum += effect.estimate;
+        if sum <= SHARES.terms * tolerance {
             left_out.push(effect.term);
         }
     }
     if effects
         .iter()
-        .any(|e| e.term == Term::Speckle && e.bound <= tolerance)
+        .any(|e| e.term == Term::Speckle && e.estimate <= tolerance)
     {
         left_out.push(Term::Speckle);
     }
@@ -72,10 +71,10 @@ fn planned(effect: &Effect, terms: &Terms, below_budget: bool) -> PlannedTerm {
     PlannedTerm {
         term: effect.term,
         used,
-        bound: if effect.absent.is_some() {
+        estimate: if effect.absent.is_some() {
             0.0
         } else {
-            effect.bound
+            effect.estimate
         },
         why,
     }
@@ -85,10 +84,10 @@ fn planned(effect: &Effect, terms: &Terms, below_budget: bool) -> PlannedTerm {
 mod tests {
     use super::*;
 
-    fn effect(term: Term, bound: f64) -> Effect {
+    fn effect(term: Term, estimate: f64) -> Effect {
         Effect {
             term,
-            bound,
+            estimate,
             absent: None,
         }
     }
@@ -126,12 +125,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_is_never_used_and_bounds_nothing() {
+    fn what_is_not_there_is_never_used_and_counts_nothing() {
         let mut absent = effect(Term::Kelvin, f64::NAN);
         absent.absent = Some("there is no ship");
         for terms in [Terms::Rule(TermRule::All), Terms::List(vec![Term::Kelvin])] {
             let plan = choose(&[absent.clone()], &terms, 1e-3);
-            assert!(!plan[0].used && plan[0].bound == 0.0);
+            assert!(!plan[0].used && plan[0].estimate == 0.0);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A scene as the numbers that formulas take: angles in radians, wavenumbers, the objects of each stage.
+//! The models of a scene: sea, wake, backscatter and radar, with the scene's numbers in the units of formulas.
 
 use crate::constants::SPEED_OF_LIGHT;
 use crate::hull::Hull;
@@ -20,9 +20,9 @@ use std::f64::consts::TAU;
 /// Block coefficient of the full hull where the scene names none: a laden tanker.
 const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
 
-/// The numbers of a valid scene.
+/// The models of a valid scene.
 #[derive(Debug, Clone)]
-pub(crate) struct Setup {
+pub(crate) struct Models {
     /// Pixels of the image.
     pub(crate) image: Raster,
     /// Incidence angle \[rad\].
@@ -49,7 +49,7 @@ pub(crate) struct Setup {
     averaged_slopes: SlopeCovariance,
 }
 
-impl Setup {
+impl Models {
     pub(crate) fn new(scene: &Scene) -> Self {
         let sea = wind_sea(scene);
         let image = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);

@@ -1,13 +1,16 @@
-//! What is known of a scene before it is computed: its waves, its backscatter, its motion.
+//! What is known of a scene before it is computed: a few thousand of its waves, its backscatter, its motion.
 
-use super::linear::{LinearImage, WaveSample, rms};
-use super::sample;
+mod waves;
+
 use crate::kelvin::KelvinWake;
+use crate::models::{Models, turbulent_wake};
+use crate::modulation::{ModulationTransfer, WaveSample, rms};
 use crate::raster::Raster;
 use crate::sar::AzimuthResolution;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::{Scene, Term};
-use crate::setup::{Setup, turbulent_wake};
+use crate::waves::Quantity;
+use std::f64::consts::{PI, SQRT_2};
 
 /// Step of the differences that give the slope of ln σ⁰ \[1\].
 const SLOPE_STEP: f64 = 0.05;
@@ -18,15 +21,21 @@ const COARSE: f64 = 0.1;
 /// Points along each side of the image where the turbulent wake is looked at.
 const DAMPING_POINTS: usize = 48;
 
+/// Standard deviations that the margin holds; beyond lie 7 in a million.
+const DEVIATIONS: f64 = 4.5;
+
+/// Mean square of the wake where it is over that in the whole image: the wedge covers about a quarter of it.
+const WEDGE: f64 = 4.0;
+
 /// What is known of a scene before it is computed.
 #[derive(Debug)]
-pub(crate) struct Situation {
+pub(crate) struct Survey {
     /// Resolved waves of the sea.
     pub(crate) sea: Vec<WaveSample>,
     /// Resolved waves of the wake.
     pub(crate) wake: Vec<WaveSample>,
     /// How waves modulate the image.
-    pub(crate) image: LinearImage,
+    pub(crate) modulation: ModulationTransfer,
     /// ½ ∂²ln σ⁰/∂slope² along x and y, absolute.
     pub(crate) curvature: [f64; 2],
     /// Azimuth resolution of the sea in motion.
@@ -45,52 +54,52 @@ pub(crate) struct Situation {
     pub(crate) absent: Vec<(Term, &'static str)>,
 }
 
-impl Situation {
-    pub(crate) fn new(scene: &Scene, setup: &Setup) -> Self {
+impl Survey {
+    pub(crate) fn new(scene: &Scene, models: &Models) -> Self {
         // Half a cell of the sea's lattice more than the band: cells at its edge hold waves from beyond.
-        let half_cell = 1.0 / setup.image.rows.min(setup.image.columns) as f64;
-        let band = setup.image.nyquist_wavenumber() * (1.0 + half_cell);
-        let sea = sample::sea(&setup.sea, band);
-        let (wake, crowding) = match &setup.wake {
-            Some(wake) => sampled_wake(wake, &setup.image),
+        let half_cell = 1.0 / models.image.rows.min(models.image.columns) as f64;
+        let band = models.image.nyquist_wavenumber() * (1.0 + half_cell);
+        let sea = waves::sea(&models.sea, band);
+        let (wake, crowding) = match &models.wake {
+            Some(wake) => sampled_wake(wake, &models.image),
             None => (Vec::new(), 1.0),
         };
-        let backscatter = setup.backscatter(true, true);
+        let backscatter = models.backscatter(true, true);
         let resolved = slopes(&sea).plus(&slopes(&wake).times(crowding));
         let sensitivity = backscatter.sensitivity(&resolved);
         let (tilt, curvature) = slope_of_ln_sigma(&backscatter);
         let total = sensitivity.mean[0] + sensitivity.mean[1];
-        let mut situation = Self {
+        let mut survey = Self {
             sea,
             wake,
-            image: LinearImage {
-                transfer: setup.transfer,
+            modulation: ModulationTransfer {
+                transfer: models.transfer,
                 tilt,
                 bragg_share: if total > 0.0 {
                     sensitivity.mean[0] / total
                 } else {
                     0.0
                 },
-                range_to_velocity: setup.range_to_velocity,
+                range_to_velocity: models.range_to_velocity,
             },
             curvature,
-            resolution: setup.resolution(),
-            damping: damping(setup),
+            resolution: models.resolution(),
+            damping: damping(models),
             mean: sensitivity.mean,
             backscatter: [sensitivity.tilt_average, sensitivity.specular],
             spacing: scene.grid.spacing,
             looks: f64::from(scene.radar.looks),
             absent: Vec::new(),
         };
-        situation.absent = situation.absent_terms(setup);
-        situation
+        survey.absent = survey.absent_terms(models);
+        survey
     }
 
     /// Terms that the scene has nothing of.
-    fn absent_terms(&self, setup: &Setup) -> Vec<(Term, &'static str)> {
+    fn absent_terms(&self, models: &Models) -> Vec<(Term, &'static str)> {
         let no_waves = self.sea.is_empty() && self.wake.is_empty();
-        let no_bragg = setup.short_waves_vanish();
-        let ship = setup.wake.as_ref();
+        let no_bragg = models.short_waves_vanish();
+        let ship = models.wake.as_ref();
         let kelvin = match ship {
             None => Some("there is no ship"),
             Some(w) if w.speed == 0.0 => Some("the ship is at rest"),
@@ -111,9 +120,9 @@ impl Situation {
             .is_empty()
             .then_some("no wind wave that a pixel carries");
         let flat = no_waves.then_some("there are no resolved waves");
-        let still = (setup.range_to_velocity == 0.0).then_some("R/V is 0");
+        let still = (models.range_to_velocity == 0.0).then_some("R/V is 0");
         let bragg = no_bragg.then_some("there are no short waves to scatter");
-        let tilt = (setup.unresolved_slopes() == SlopeCovariance::NONE)
+        let tilt = (models.unresolved_slopes() == SlopeCovariance::NONE)
             .then_some("no wave between pixel and Bragg waves");
         [
             (Term::Sea, sea),
@@ -132,34 +141,53 @@ impl Situation {
 
     /// Slopes of the resolved waves of the sea, and the standard deviation of their line-of-sight velocity [m/s].
     pub(crate) fn resolved_sea(&self) -> (SlopeCovariance, f64) {
-        let radial = |w: &WaveSample| self.image.transfer.radial(w.k, w.omega);
+        let radial = |w: &WaveSample| self.modulation.transfer.radial(w.k, w.omega);
         (slopes(&self.sea), rms(&self.sea, radial))
     }
 
-    /// The linear image of a setup that may average over more than the one this was made of.
-    pub(crate) fn linear_image(&self, setup: &Setup) -> LinearImage {
-        LinearImage {
-            tilt: slope_of_ln_sigma(&setup.backscatter(true, true)).0,
-            ..self.image
+    /// The modulation where models may average over more waves than those this was made of.
+    pub(crate) fn modulation_of(&self, models: &Models) -> ModulationTransfer {
+        ModulationTransfer {
+            tilt: slope_of_ln_sigma(&models.backscatter(true, true)).0,
+            ..self.modulation
         }
     }
 
+    /// Margin in rows and columns. It depends on the scene alone, not on the terms that are used: the same seed
+    /// draws the same sea whatever is left out.
+    pub(crate) fn margin(&self, models: &Models) -> [usize; 2] {
+        if self.sea.is_empty() && self.wake.is_empty() {
+            return [0, 0];
+        }
+        let deviation = |quantity| {
+            let factor = |w: &WaveSample| self.modulation.transfer.factor(quantity, w.k, w.omega);
+            rms(&self.sea, factor).hypot(WEDGE.sqrt() * rms(&self.wake, factor))
+        };
+        let radial = |w: &WaveSample| self.modulation.transfer.radial(w.k, w.omega);
+        let velocity = rms(&self.sea, radial).hypot(WEDGE.sqrt() * rms(&self.wake, radial));
+        let acceleration = deviation(Quantity::RadialAcceleration);
+        let width = self.resolution.at(acceleration) / (SQRT_2 * PI);
+        let azimuth = (models.range_to_velocity * velocity).hypot(width);
+        let range = deviation(Quantity::Elevation) / models.incidence.tan();
+        [azimuth, range].map(|d| (DEVIATIONS * d / models.image.spacing).ceil() as usize + 1)
+    }
+
     /// What a user should know.
-    pub(crate) fn notes(&self, scene: &Scene, setup: &Setup) -> Vec<String> {
+    pub(crate) fn notes(&self, scene: &Scene, models: &Models) -> Vec<String> {
         let mut notes = Vec::new();
-        if setup.short_waves_vanish() {
+        if models.short_waves_vanish() {
             notes.push(format!(
                 "a wind of {} m/s raises no short waves at this incidence: the image is specular only, or dark",
                 scene.sea.wind_speed
             ));
         }
-        if let Some(wake) = &setup.wake {
+        if let Some(wake) = &models.wake {
             let froude = wake.hull.froude_number(wake.speed);
-            if froude > 0.0 && 2.0 * setup.image.spacing > wake.transverse_wavelength() {
+            if froude > 0.0 && 2.0 * models.image.spacing > wake.transverse_wavelength() {
                 notes.push(format!(
                     "the transverse waves are {:.2} m long: a pixel of {} m carries none of them",
                     wake.transverse_wavelength(),
-                    setup.image.spacing
+                    models.image.spacing
                 ));
             }
         }
@@ -191,7 +219,7 @@ fn sampled_wake(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
     // track stands on this width, also where the image is narrower.
     let wedge = track_length * 0.71 * (0.5 * length).max(nearest);
     let area = (height * across).max(wedge);
-    let waves = sample::wake(&nodes, wake.track.forward, track_length, area);
+    let waves = waves::wake(&nodes, wake.track.forward, track_length, area);
     (waves, area / wedge)
 }
 
@@ -227,12 +255,12 @@ fn slope_of_ln_sigma(backscatter: &Backscatter) -> ([f64; 2], [f64; 2]) {
 }
 
 /// Root of the mean square of the turbulent wake's damping over the image, looked at on a coarse raster.
-fn damping(setup: &Setup) -> f64 {
-    let Some(wake) = setup.wake.as_ref().filter(|w| w.speed > 0.0) else {
+fn damping(models: &Models) -> f64 {
+    let Some(wake) = models.wake.as_ref().filter(|w| w.speed > 0.0) else {
         return 0.0;
     };
     let turbulent = turbulent_wake(wake);
-    let image = &setup.image;
+    let image = &models.image;
     let (rows, columns) = (
         image.rows.min(DAMPING_POINTS),
         image.columns.min(DAMPING_POINTS),

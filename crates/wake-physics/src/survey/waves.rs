@@ -1,7 +1,7 @@
-//! A few thousand waves that stand for the resolved sea and wake when terms are weighed.
+//! A few thousand waves that stand for the resolved sea and wake.
 
-use super::linear::WaveSample;
 use crate::dispersion::angular_frequency;
+use crate::modulation::WaveSample;
 use crate::waves::PlaneWaves;
 use crate::wind_sea::DirectionalSpectrum;
 use std::f64::consts::{PI, TAU};

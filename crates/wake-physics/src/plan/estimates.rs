@@ -1,15 +1,15 @@
-//! What leaving each term out would change: bounds from the linear image.
+//! What leaving each term out would change: estimates by the modulation transfer functions.
 
-use super::choose::Effect;
-use super::linear::{Modulation, WaveSample, rms, smear};
-use super::situation::Situation;
+use super::terms::Effect;
+use crate::modulation::{Modulation, WaveSample, rms, smear};
 use crate::scene::Term;
+use crate::survey::Survey;
 use crate::waves::Quantity;
 use num_complex::Complex64;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Safety factor on root mean squares: one draw of a random sea may be rougher than its mean, bunching gathers
-/// what changes, and waves of finite height are not quite linear.
+/// An estimate is this many times the linear root mean square: one draw of a random sea may be rougher than its mean,
+/// bunching gathers what changes, and waves of finite height are not quite linear. No proof makes it a bound.
 const SAFETY: f64 = 3.0;
 
 /// What the rounding of `f32` fields may change, whatever is left out: a few times 6e-8 of each of several fields.
@@ -29,54 +29,44 @@ impl AsRef<WaveSample> for Weighed<'_> {
     }
 }
 
-/// The waves of a situation, weighed once for all terms.
-struct Bounds<'a> {
-    situation: &'a Situation,
+/// The waves of a survey, weighed once for all terms.
+struct Estimates<'a> {
+    survey: &'a Survey,
     sea: Vec<Weighed<'a>>,
     wake: Vec<Weighed<'a>>,
     /// Standard deviation over mean of the image.
     contrast: f64,
 }
 
-impl Situation {
-    /// One effect a term, in the order of the data flow.
-    pub(crate) fn effects(&self) -> Vec<Effect> {
-        let bounds = Bounds::new(self);
-        let effect = |&term: &Term| Effect {
-            term,
-            bound: bounds.of(term),
-            absent: self
-                .absent
-                .iter()
-                .find(|(absent, _)| *absent == term)
-                .map(|(_, why)| *why),
-        };
-        Term::ALL.iter().map(effect).collect()
-    }
-
-    /// Width of a point of azimuth resolution ρ on the pixels \[m\].
-    fn width(&self, resolution: f64) -> f64 {
-        self.spacing.hypot(resolution / (SQRT_2 * PI))
-    }
+/// One effect a term, in the order of the data flow.
+pub(super) fn effects(survey: &Survey) -> Vec<Effect> {
+    let estimates = Estimates::new(survey);
+    let absent = |term| survey.absent.iter().find(|(absent, _)| *absent == term);
+    let effect = |&term: &Term| Effect {
+        term,
+        estimate: estimates.of(term),
+        absent: absent(term).map(|(_, why)| *why),
+    };
+    Term::ALL.iter().map(effect).collect()
 }
 
-impl<'a> Bounds<'a> {
-    fn new(situation: &'a Situation) -> Self {
-        let at_rest = situation.resolution.at(0.0);
+impl<'a> Estimates<'a> {
+    fn new(survey: &'a Survey) -> Self {
+        let at_rest = survey.resolution.at(0.0);
         let weighed = |waves: &'a [WaveSample]| -> Vec<Weighed<'a>> {
             let one = |wave: &'a WaveSample| Weighed {
                 wave,
-                modulation: situation.image.modulation(wave.k, wave.omega),
+                modulation: survey.modulation.at(wave.k, wave.omega),
                 sharpest: smear(wave.k[1], at_rest),
             };
             waves.iter().map(one).collect()
         };
-        let (sea, wake) = (weighed(&situation.sea), weighed(&situation.wake));
+        let (sea, wake) = (weighed(&survey.sea), weighed(&survey.wake));
         let contrast = linear(&sea)
             .hypot(linear(&wake))
-            .hypot(situation.backscatter[1]);
+            .hypot(survey.backscatter[1]);
         Self {
-            situation,
+            survey,
             sea,
             wake,
             contrast,
@@ -87,9 +77,9 @@ impl<'a> Bounds<'a> {
         let effect = match term {
             Term::Sea => self.waves(&self.sea),
             Term::Kelvin => self.waves(&self.wake),
-            Term::Turbulent => self.situation.damping * self.situation.image.bragg_share,
-            Term::TiltAverage => self.situation.backscatter[0],
-            Term::Specular => self.situation.backscatter[1],
+            Term::Turbulent => self.survey.damping * self.survey.modulation.bragg_share,
+            Term::TiltAverage => self.survey.backscatter[0],
+            Term::Specular => self.survey.backscatter[1],
             Term::RangeBunching => {
                 self.part(|m| m.range_bunching) + self.both(|w| self.range_shift(w)) * self.contrast
             }
@@ -99,9 +89,14 @@ impl<'a> Bounds<'a> {
             }
             Term::Coherence => self.coherence(),
             // Speckle multiplies: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
-            Term::Speckle => return 2.0 / self.situation.looks.sqrt(),
+            Term::Speckle => return 2.0 / self.survey.looks.sqrt(),
         };
         SAFETY * effect + ROUNDING
+    }
+
+    /// Width of a point of azimuth resolution ρ on the pixels \[m\].
+    fn width(&self, resolution: f64) -> f64 {
+        self.survey.spacing.hypot(resolution / (SQRT_2 * PI))
     }
 
     fn both(&self, of: impl Fn(&[Weighed<'_>]) -> f64) -> f64 {
@@ -114,7 +109,7 @@ impl<'a> Bounds<'a> {
             let square = |w: &Weighed<'_>| w.wave.variance * w.wave.k[axis].powi(2);
             waves.iter().map(square).sum()
         };
-        let curvature = self.situation.curvature;
+        let curvature = self.survey.curvature;
         let tilt = curvature[0] * variance(0) + curvature[1] * variance(1);
         let shift = self.azimuth_shift(waves).hypot(self.range_shift(waves));
         (linear(waves) + tilt) * self.contrast.hypot(1.0) + shift * self.contrast
@@ -132,15 +127,15 @@ impl<'a> Bounds<'a> {
 
     /// The change of the smear of everything that is imaged.
     fn coherence(&self) -> f64 {
-        let situation = self.situation;
-        let transfer = &situation.image.transfer;
+        let survey = self.survey;
+        let transfer = &survey.modulation.transfer;
         let accelerations = |waves: &[Weighed<'_>]| {
             rms(waves, |w| {
                 transfer.factor(Quantity::RadialAcceleration, w.wave.k, w.wave.omega)
             })
         };
-        let nominal = situation.resolution.nominal;
-        let moving = situation.resolution.at(self.both(accelerations));
+        let nominal = survey.resolution.nominal;
+        let moving = survey.resolution.at(self.both(accelerations));
         let change = |waves: &[Weighed<'_>]| {
             rms(waves, |w| {
                 let lost = smear(w.wave.k[1], nominal) - smear(w.wave.k[1], moving);
@@ -148,23 +143,25 @@ impl<'a> Bounds<'a> {
             })
         };
         // A spot of width w spread to w' loses about (1 − w²/w'²)/2 of its height.
-        let widths = [nominal, moving].map(|rho| situation.width(rho));
+        let widths = [nominal, moving].map(|rho| self.width(rho));
         let spots = 0.5 * (1.0 - (widths[0] / widths[1]).powi(2));
-        self.both(change) * self.contrast.hypot(1.0) + spots * situation.backscatter[1]
+        self.both(change) * self.contrast.hypot(1.0) + spots * survey.backscatter[1]
     }
 
     /// Displacements in azimuth over the width of what is displaced.
     fn azimuth_shift(&self, waves: &[Weighed<'_>]) -> f64 {
-        let image = &self.situation.image;
-        let velocity = rms(waves, |w| image.transfer.radial(w.wave.k, w.wave.omega));
-        let width = self.situation.width(self.situation.resolution.at(0.0));
-        image.range_to_velocity * velocity / width
+        let modulation = &self.survey.modulation;
+        let velocity = rms(waves, |w| {
+            modulation.transfer.radial(w.wave.k, w.wave.omega)
+        });
+        let width = self.width(self.survey.resolution.at(0.0));
+        modulation.range_to_velocity * velocity / width
     }
 
     /// Displacements in range over the width of what is displaced.
     fn range_shift(&self, waves: &[Weighed<'_>]) -> f64 {
-        let incidence = self.situation.image.transfer.incidence;
-        rms(waves, |_| Complex64::ONE) / (incidence.tan() * self.situation.spacing)
+        let incidence = self.survey.modulation.transfer.incidence;
+        rms(waves, |_| Complex64::ONE) / (incidence.tan() * self.survey.spacing)
     }
 }
 

@@ -1,6 +1,6 @@
-//! The linear image: how strongly each wave modulates the intensity, to first order in its height.
+//! Modulation transfer functions: how strongly each wave modulates the image, to first order in its height.
 //!
-//! It decides what matters, and has the spectrum of open sea; it never makes an image of a scene.
+//! By them the plan weighs terms, and the open sea has its spectrum; they never make the image of a scene.
 
 use crate::waves::{Quantity, Transfer};
 use num_complex::Complex64;
@@ -25,7 +25,7 @@ impl AsRef<Self> for WaveSample {
 
 /// What the intensity of one pixel depends on, linearised about the calm surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LinearImage {
+pub(crate) struct ModulationTransfer {
     /// Orbital motion and modulation of a wave.
     pub(crate) transfer: Transfer,
     /// ∂ln σ⁰/∂slope along x and y.
@@ -56,7 +56,7 @@ impl Modulation {
     }
 }
 
-impl LinearImage {
+impl ModulationTransfer {
     /// Linear modulation transfer functions of the four effects.
     ///
     /// ```text
@@ -66,7 +66,7 @@ impl LinearImage {
     /// # References
     ///
     /// Alpers, Ross and Rufenach (1981), J. Geophys. Res. 86(C7), 6481.
-    pub(crate) fn modulation(&self, k: [f64; 2], omega: f64) -> Modulation {
+    pub(crate) fn at(&self, k: [f64; 2], omega: f64) -> Modulation {
         let i = Complex64::i();
         let hydrodynamic = self.transfer.factor(Quantity::Hydrodynamic, k, omega);
         let radial = self.transfer.radial(k, omega);
@@ -97,8 +97,8 @@ pub(crate) fn rms<W: AsRef<WaveSample>>(waves: &[W], factor: impl Fn(&W) -> Comp
 mod tests {
     use super::*;
 
-    fn image() -> LinearImage {
-        LinearImage {
+    fn transfer() -> ModulationTransfer {
+        ModulationTransfer {
             transfer: Transfer {
                 depth: f64::INFINITY,
                 incidence: 0.6,
@@ -127,9 +127,9 @@ mod tests {
     /// Waves along range are not bunched; waves along azimuth are neither tilted (for an even σ⁰) nor laid over.
     #[test]
     fn each_effect_has_its_direction() {
-        let m = image().modulation([0.2, 0.0], 1.4);
+        let m = transfer().at([0.2, 0.0], 1.4);
         assert_eq!(m.bunching, Complex64::ZERO);
-        let m = image().modulation([0.0, 0.2], 1.4);
+        let m = transfer().at([0.0, 0.2], 1.4);
         assert_eq!(m.tilt + m.range_bunching + m.hydrodynamic, Complex64::ZERO);
         // |T_v| = ω cos θ for a wave along azimuth: modulation (R/V) k ω cos θ.
         assert!((m.bunching.norm() - 50.0 * 0.2 * 1.4 * 0.6f64.cos()).abs() < 1e-12);
@@ -142,7 +142,7 @@ mod tests {
         let shifted = |x: f64| x - a * (k * x).sin() * cot;
         let x = 3.0;
         let density = 2e-3 / (shifted(x + 1e-3) - shifted(x - 1e-3));
-        let m = image().modulation([k, 0.0], 1.4).range_bunching;
+        let m = transfer().at([k, 0.0], 1.4).range_bunching;
         // ζ = a sin kx = Re(−i a e^{ikx})
         let linear = 1.0 + (m * Complex64::new(0.0, -a) * Complex64::cis(k * x)).re;
         assert!((density - linear).abs() < 1e-8);

@@ -1,0 +1,141 @@
+//! What comes out of a simulation, and how it is written.
+
+use super::Method;
+use super::accuracy::Accuracy;
+use super::clock::Seconds;
+use crate::error::Result;
+use crate::grey::GreyScale;
+use crate::labels::Labels;
+use crate::output;
+use crate::plan::Plan;
+use crate::raster::{Field, Raster};
+use crate::sar::speckle::speckle;
+use crate::scene::Scene;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Everything a simulation makes. Fields are `[rows, columns]` of the image.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    /// Places of the pixels.
+    pub raster: Raster,
+    /// Elevation ζ \[m\].
+    pub elevation: Field,
+    /// Slope ∂ζ/∂x \[1\].
+    pub slope_x: Field,
+    /// Slope ∂ζ/∂y \[1\].
+    pub slope_y: Field,
+    /// Velocity of the water along x [m/s].
+    pub velocity_x: Field,
+    /// Velocity of the water along y [m/s].
+    pub velocity_y: Field,
+    /// Velocity of the water upward [m/s].
+    pub velocity_z: Field,
+    /// Velocity toward the radar [m/s].
+    pub radial_velocity: Field,
+    /// Cross-section σ⁰ per unit area, linear.
+    pub sigma0: Field,
+    /// Image intensity before speckle, linear, in the unit of σ⁰.
+    pub intensity: Field,
+    /// Image intensity with speckle.
+    pub speckled: Field,
+    /// Where ship and wake are.
+    pub labels: Labels,
+    /// What was computed, and estimates of what was not.
+    pub plan: Plan,
+    /// What the numerical methods reached.
+    pub accuracy: Accuracy,
+    /// Seconds by stage.
+    pub seconds: Seconds,
+    /// How fields were computed.
+    pub method: Method,
+    /// The scene.
+    pub scene: Scene,
+}
+
+/// The image of a scene, without the fields it was made from.
+#[derive(Debug, Clone)]
+pub struct SarImage {
+    /// Intensity before speckle, linear, in the unit of σ⁰, `[rows, columns]`: the same bits as
+    /// [`Simulation::intensity`].
+    pub intensity: Field,
+    /// Where ship and wake are.
+    pub labels: Labels,
+    /// What was computed, and estimates of what was not.
+    pub plan: Plan,
+    /// What the numerical methods reached.
+    pub accuracy: Accuracy,
+    /// Looks and seed of the speckle, if the plan has it.
+    pub(super) speckle: Option<(u32, u64)>,
+}
+
+impl SarImage {
+    /// Intensity with speckle, if the plan has it: the same bits as [`Simulation::speckled`].
+    #[must_use]
+    pub fn speckled(mut self) -> Field {
+        if let Some((looks, seed)) = self.speckle {
+            speckle(&mut self.intensity, looks, seed);
+        }
+        self.intensity
+    }
+}
+
+impl Simulation {
+    /// The fields by their names in `fields.safetensors`.
+    #[must_use]
+    pub fn named_fields(&self) -> [(&'static str, &Field); 10] {
+        [
+            ("elevation", &self.elevation),
+            ("slope_x", &self.slope_x),
+            ("slope_y", &self.slope_y),
+            ("velocity_x", &self.velocity_x),
+            ("velocity_y", &self.velocity_y),
+            ("velocity_z", &self.velocity_z),
+            ("sigma0", &self.sigma0),
+            ("radial_velocity", &self.radial_velocity),
+            ("intensity", &self.intensity),
+            ("speckled", &self.speckled),
+        ]
+    }
+
+    /// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json` into a folder, each whole or
+    /// not at all, and returns the report.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::File`](crate::Error::File) if the folder cannot be made or a file not be written.
+    pub fn write(&self, folder: &Path) -> Result<Value> {
+        output::make_folder(folder)?;
+        let path = |name: &str| folder.join(name);
+        let grey = GreyScale::default();
+        let level = |&power: &f32| grey.level(f64::from(power));
+        let pixels: Vec<u8> = self.speckled.values.iter().map(level).collect();
+        output::write_png(
+            &path("image.png"),
+            &pixels,
+            self.raster.rows,
+            self.raster.columns,
+        )?;
+        output::write_fields(&path("fields.safetensors"), &self.named_fields())?;
+        output::write_json(&path("labels.json"), &self.labels)?;
+        let names = [
+            "image.png",
+            "fields.safetensors",
+            "labels.json",
+            "report.json",
+        ];
+        let report = json!({
+            "method": self.method,
+            "seconds": self.seconds,
+            "plan": self.plan.terms,
+            "sizes": self.plan.sizes,
+            "notes": self.plan.notes,
+            "accuracy": self.accuracy,
+            "grey": grey,
+            "files": names.map(|name| path(name).display().to_string()),
+            "scene": self.scene,
+        });
+        output::write_json(&path("report.json"), &report)?;
+        Ok(report)
+    }
+}

@@ -1,0 +1,124 @@
+//! Blocks of memory and plans of FFTs that one simulation leaves to the next.
+//!
+//! A block that is freed goes back to the system, and every page of the next one is a page fault: a quarter of the time
+//! of a simulation. Nothing here changes a result: what is taken has any content, and its user overwrites it.
+
+use crate::raster::{Field, Raster};
+use num_complex::{Complex32, Complex64};
+use rustfft::FftPlanner;
+
+/// Blocks of values, kept to be taken again.
+#[derive(Debug)]
+pub(crate) struct Shelf<T>(Vec<Vec<T>>);
+
+impl<T> Default for Shelf<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: Copy> Shelf<T> {
+    /// `len` values of any content; where new ones are needed they are `fill`.
+    pub(crate) fn take(&mut self, len: usize, fill: T) -> Vec<T> {
+        let fits = |block: &Vec<T>| block.capacity() >= len;
+        // The smallest that fits; where none does, the largest makes room for a new one.
+        let order = |&n: &usize| (!fits(&self.0[n]), self.0[n].capacity().abs_diff(len));
+        let block = (0..self.0.len()).min_by_key(order);
+        let mut block = match block.map(|n| self.0.swap_remove(n)) {
+            Some(block) if block.capacity() >= len => block,
+            _ => return vec![fill; len],
+        };
+        block.resize(len, fill);
+        block
+    }
+
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Puts a block back.
+    pub(crate) fn give(&mut self, block: Vec<T>) {
+        if block.capacity() > 0 {
+            self.0.push(block);
+        }
+    }
+}
+
+/// What stages take their blocks and the plans of their FFTs from.
+pub(crate) struct Workspace {
+    /// Values of fields.
+    pub(crate) floats: Shelf<f32>,
+    /// Spectra, in single and in double precision.
+    pub(crate) spectra: (Shelf<Complex32>, Shelf<Complex64>),
+    /// FFTs planned so far.
+    pub(crate) planners: (FftPlanner<f32>, FftPlanner<f64>),
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self {
+            floats: Shelf::default(),
+            spectra: (Shelf::default(), Shelf::default()),
+            planners: (FftPlanner::new(), FftPlanner::new()),
+        }
+    }
+}
+
+impl std::fmt::Debug for Workspace {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let spectra = [self.spectra.0.len(), self.spectra.1.len()];
+        f.debug_struct("Workspace")
+            .field("floats", &self.floats.len())
+            .field("spectra", &spectra)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Workspace {
+    /// A field of any content.
+    pub(crate) fn field(&mut self, raster: &Raster) -> Field {
+        Field {
+            rows: raster.rows,
+            columns: raster.columns,
+            values: self.floats.take(raster.len(), 0.0),
+        }
+    }
+
+    /// A field that is 0 everywhere.
+    pub(crate) fn flat_field(&mut self, raster: &Raster) -> Field {
+        let mut field = self.field(raster);
+        field.values.fill(0.0);
+        field
+    }
+
+    /// Takes the block of a field back.
+    pub(crate) fn give(&mut self, field: Field) {
+        self.floats.give(field.values);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The block that fits best is taken, and there are never more than were out at once.
+    #[test]
+    fn blocks_are_used_again() {
+        let mut shelf = Shelf::default();
+        let (small, large) = (vec![1u8; 10], vec![2u8; 100]);
+        let places = [small.as_ptr(), large.as_ptr()];
+        shelf.give(large);
+        shelf.give(small);
+        let nine = shelf.take(9, 0);
+        assert_eq!((nine.as_ptr(), nine.len()), (places[0], 9));
+        shelf.give(nine);
+        let eleven = shelf.take(11, 0);
+        assert_eq!((eleven.as_ptr(), eleven.len()), (places[1], 11));
+        shelf.give(eleven);
+        // None fits: the large one is dropped for a larger one.
+        let block = shelf.take(1000, 7);
+        assert_eq!(block, vec![7; 1000]);
+        shelf.give(block);
+        assert_eq!(shelf.len(), 2);
+    }
+}
