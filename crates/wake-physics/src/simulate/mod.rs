@@ -31,7 +31,7 @@ use crate::survey::Survey;
 use crate::workspace::Workspace;
 use clock::Clock;
 use serde::Serialize;
-use stages::Stages;
+use stages::{Stages, Wanted};
 
 /// How fields are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -92,7 +92,7 @@ impl Simulator {
         let mut seconds = Seconds::default();
         let models = Models::new(scene);
         let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
-        let stages = Stages::new(scene, &models, &plan, method);
+        let stages = Stages::new(scene, &models, &plan, method, Wanted::Fields);
         seconds.plan = clock.lap();
         let mut drawn = stages.draw(self, &mut clock, &mut seconds);
         let mut speckled = self.workspace.field(&models.image);
@@ -172,7 +172,7 @@ impl Simulator {
 
     /// The intensity before speckle, and no other field.
     fn intensity(&mut self, scene: &Scene, models: &Models, plan: &Plan) -> (Field, Accuracy) {
-        let stages = Stages::new(scene, models, plan, Method::Fast);
+        let stages = Stages::new(scene, models, plan, Method::Fast, Wanted::Image);
         let drawn = stages.draw(self, &mut Clock::start(), &mut Seconds::default());
         let accuracy = drawn.accuracy;
         (drawn.give_back(&mut self.workspace), accuracy)

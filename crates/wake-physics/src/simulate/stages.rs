@@ -38,7 +38,47 @@ pub(super) struct Stages<'a> {
     method: Method,
     /// The image and its margin.
     raster: Raster,
-    quantities: Vec<Quantity>,
+    /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
+    /// same bits with and without the second.
+    quantities: [Vec<Quantity>; 2],
+}
+
+/// Which fields a caller asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// The image, and what it is made of.
+    Image,
+    /// All results.
+    Fields,
+}
+
+/// The linear fields to be computed: those that the image needs, and those that are wanted besides.
+fn quantities(plan: &Plan, wanted: Wanted) -> [Vec<Quantity>; 2] {
+    let mut image = vec![Quantity::SlopeX, Quantity::SlopeY];
+    if plan.uses(Term::Bunching) {
+        image.extend([Quantity::VelocityX, Quantity::VelocityZ]);
+    }
+    let single = [
+        (Term::RangeBunching, Quantity::Elevation),
+        (Term::Coherence, Quantity::RadialAcceleration),
+        (Term::Hydrodynamic, Quantity::Hydrodynamic),
+    ];
+    image.extend(
+        single
+            .iter()
+            .filter(|(term, _)| plan.uses(*term))
+            .map(|(_, q)| *q),
+    );
+    let mut rest = OUTPUTS.to_vec();
+    rest.retain(|quantity| !image.contains(quantity));
+    // Two fields share a transform: where one would stand alone, one more costs nothing.
+    if image.len() % 2 == 1 && !rest.is_empty() {
+        image.push(rest.remove(0));
+    }
+    if wanted == Wanted::Image {
+        rest.clear();
+    }
+    [image, rest]
 }
 
 /// Linear fields of the surface on the raster with its margin; those that nobody asks for have no pixel.
@@ -113,14 +153,8 @@ impl<'a> Stages<'a> {
         models: &'a Models,
         plan: &'a Plan,
         method: Method,
+        wanted: Wanted,
     ) -> Self {
-        let mut quantities = OUTPUTS.to_vec();
-        if plan.uses(Term::Coherence) {
-            quantities.push(Quantity::RadialAcceleration);
-        }
-        if plan.uses(Term::Hydrodynamic) {
-            quantities.push(Quantity::Hydrodynamic);
-        }
         let [rows, columns] = plan.sizes.margin;
         Self {
             scene,
@@ -128,7 +162,7 @@ impl<'a> Stages<'a> {
             plan,
             method,
             raster: models.image.with_margin(rows, columns),
-            quantities,
+            quantities: quantities(plan, wanted),
         }
     }
 
@@ -171,7 +205,7 @@ impl<'a> Stages<'a> {
     fn sea(&self, workspace: &mut Workspace) -> SurfaceFields {
         let mut fields = SurfaceFields::default();
         if !self.plan.uses(Term::Sea) {
-            for &quantity in &self.quantities {
+            for &quantity in self.quantities.iter().flatten() {
                 *fields.of(quantity) = workspace.flat_field(&self.raster);
             }
             return fields;
@@ -179,15 +213,29 @@ impl<'a> Stages<'a> {
         let seed_and_time = (self.scene.seed, self.scene.sea.time);
         let spectrum = &self.models.sea;
         let surface = Surface::new_in(workspace, spectrum, seed_and_time, &self.raster);
-        let (transfer, quantities) = (&self.models.transfer, &self.quantities);
-        let made = match self.method {
-            Method::Fast => {
-                surface.fields_in(workspace, transfer, quantities, self.field_tolerance())
+        let transfer = &self.models.transfer;
+        let mut put = |quantities: &[Quantity], made: Vec<Field>| {
+            for (&quantity, field) in quantities.iter().zip(made) {
+                *fields.of(quantity) = field;
             }
-            Method::Direct => harmonic_fields(&surface.modes(), transfer, quantities, &self.raster),
         };
-        for (&quantity, field) in quantities.iter().zip(made) {
-            *fields.of(quantity) = field;
+        match self.method {
+            Method::Fast => {
+                for group in &self.quantities {
+                    let tolerance = self.field_tolerance();
+                    put(
+                        group,
+                        surface.fields_in(workspace, transfer, group, tolerance),
+                    );
+                }
+            }
+            Method::Direct => {
+                let all = self.quantities.concat();
+                put(
+                    &all,
+                    harmonic_fields(&surface.modes(), transfer, &all, &self.raster),
+                );
+            }
         }
         surface.give_back(workspace);
         fields
@@ -199,22 +247,26 @@ impl<'a> Stages<'a> {
         let wake = wake.filter(|_| self.plan.uses(Term::Kelvin))?;
         let waves = wake.waves(&self.plan.wake);
         let transfer = &self.models.transfer;
-        let (quantities, raster) = (&self.quantities, &self.raster);
+        let raster = &self.raster;
         let mut fade = workspace.field(raster);
         kelvin::fill_fade(&mut fade, &wake.track, wake.hull.length(), raster);
-        let mut add =
-            |q: usize, wake: &mut Field| fields.of(quantities[q]).add_product(wake, &fade);
+        let mut add = |quantity, wake: &mut Field| fields.of(quantity).add_product(wake, &fade);
         let reached = match self.method {
             Method::Fast => {
                 let asked = self.field_tolerance();
-                let sum = (&waves, transfer, &quantities[..], raster);
-                let reached = nufft::synthesize_each(workspace, sum, asked, add);
+                let mut reached = 0.0f64;
+                for group in &self.quantities {
+                    let sum = (&waves, transfer, &group[..], raster);
+                    let take = |q: usize, wake: &mut Field| add(group[q], wake);
+                    reached = reached.max(nufft::synthesize_each(workspace, sum, asked, take));
+                }
                 Some(Reached { asked, reached })
             }
             Method::Direct => {
-                let wake_fields = harmonic_fields(&waves, transfer, quantities, raster);
-                for (q, mut field) in wake_fields.into_iter().enumerate() {
-                    add(q, &mut field);
+                let all = self.quantities.concat();
+                let made = harmonic_fields(&waves, transfer, &all, raster);
+                for (quantity, mut field) in all.into_iter().zip(made) {
+                    add(quantity, &mut field);
                 }
                 None
             }
@@ -276,7 +328,7 @@ impl<'a> Stages<'a> {
         sigma0
     }
 
-    /// Velocity toward the radar; without pixels where the velocities are not known.
+    /// Velocity toward the radar; without pixels where nobody asked for the velocities.
     fn radial_velocity(&self, workspace: &mut Workspace, fields: &SurfaceFields) -> Field {
         let [vx, vz] = [&fields.velocity_x, &fields.velocity_z];
         if vx.values.is_empty() {
