@@ -62,7 +62,7 @@ impl KelvinWake {
     /// that reach it. The number of nodes grows with the pixels on a side of the raster, never with the
     /// distance of the ship.
     ///
-    /// - `tolerance`: largest error relative to a field's rms, 1e-6 to 0.1
+    /// - `tolerance`: largest error relative to a field's rms, 1e-7 to 0.1
     ///
     /// # Validity
     ///
