@@ -1,8 +1,7 @@
 //! The oracle of velocity bunching: every pixel from all sources, exactly, in double precision; O(N³).
 
 use crate::raster::{Field, Raster};
-use crate::sar::bunching::{Imaging, Sources};
-use crate::sar::response::Response;
+use crate::sar::imaging::{Imaging, Response, Sources};
 use std::f64::consts::PI;
 
 /// The bunching integral as a sum over all sources, ready to be evaluated at any pixel.

@@ -67,7 +67,7 @@ impl Echo {
         let area = raster.spacing * raster.spacing;
         let power = self.cross_section / (area * points.len() as f64);
         let variance = (resolution / raster.spacing).powi(2) / (2.0 * PI * PI);
-        let variance = variance.max(super::response::SMALLEST_VARIANCE);
+        let variance = variance.max(super::imaging::SMALLEST_VARIANCE);
         for [x, y] in points {
             let [column, row] = raster.pixel(x, y + self.displacement);
             add_point(intensity, [row, column], power, variance);

@@ -14,10 +14,9 @@ pub mod echo;
 pub mod geometry;
 pub mod speckle;
 
-mod places;
-mod response;
+mod imaging;
 mod spread;
 
-pub use bunching::{Imaging, Sources};
 pub use coherence::AzimuthResolution;
 pub use echo::Echo;
+pub use imaging::{Imaging, Sources};

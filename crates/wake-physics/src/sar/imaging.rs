@@ -1,8 +1,36 @@
-//! Where the power of one source pixel goes, in pixels of the image: shared by the fast sum and its oracle.
+//! What the radar does to its sources: where the power of a source pixel goes, and how wide.
 
 use crate::raster::{Field, Raster};
-use crate::sar::bunching::{Imaging, Sources};
+use crate::sar::AzimuthResolution;
 use std::f64::consts::PI;
+
+/// The radar's part of velocity bunching.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Imaging {
+    /// Range over platform speed R/V \[s\], at least 0.
+    pub range_to_velocity: f64,
+    /// Incidence angle θ \[rad\], between 0 and π/2.
+    pub incidence: f64,
+    /// Azimuth resolution ρ' and how it depends on acceleration.
+    pub resolution: AzimuthResolution,
+}
+
+/// What the radar looks at: fields on a raster that has a margin around the image, all finite.
+///
+/// An absent field is an absent effect, and costs nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Sources<'a> {
+    /// The pixels of the fields.
+    pub raster: Raster,
+    /// Backscatter σ⁰ \[1\].
+    pub sigma0: &'a Field,
+    /// Velocity toward the radar `u_r` [m/s]: displaces in azimuth.
+    pub radial_velocity: Option<&'a Field>,
+    /// Acceleration toward the radar `a_r` [m/s²]: defocuses.
+    pub radial_acceleration: Option<&'a Field>,
+    /// Elevation ζ \[m\]: displaces in range.
+    pub elevation: Option<&'a Field>,
+}
 
 /// Smallest variance of the azimuth response [pixel²]: half a pixel of standard deviation, a width at half
 /// power of 1.2 pixels. A narrower response would fall between the pixels.
@@ -80,28 +108,4 @@ impl Sources<'_> {
 pub(super) fn largest(field: Option<&Field>) -> f64 {
     let of = |f: &Field| f.values.iter().fold(0f32, |m, v| m.max(v.abs()));
     f64::from(field.map_or(0.0, of))
-}
-
-/// Standard deviations z beyond which a Gaussian's two tails, cut off and given back to the rest, change it by
-/// at most `error`: 2·2Q(z) ≤ error, with the bound Q(z) ≤ exp(−z²/2)/(z√(2π)).
-pub(super) fn reach(error: f64) -> f64 {
-    (0..8).fold(3.0, |z: f64, _| {
-        let ratio = 4.0 / (error * z * (2.0 * PI).sqrt());
-        (2.0 * ratio.ln()).max(1.0).sqrt()
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn reach_is_that_of_the_normal_tail() {
-        // Two-sided tails 2Q(z) of the normal distribution: 0.0027 at 3, 5.733e-7 at 5 (tables). The bound used
-        // is larger than Q by at most 1/z² of it.
-        for (z, tails) in [(3.0, 2.6998e-3), (5.0, 5.733e-7)] {
-            let found = reach(2.0 * tails);
-            assert!(found >= z && found < z + 0.04, "{found}");
-        }
-    }
 }

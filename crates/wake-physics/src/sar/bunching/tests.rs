@@ -1,9 +1,11 @@
 use super::*;
+use crate::sar::AzimuthResolution;
 use crate::sar::coherence::cutoff_transfer;
 use crate::sar::direct::DirectImage;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
+use std::f64::consts::{PI, SQRT_2};
 
 const DEFAULT: Imaging = Imaging {
     range_to_velocity: 78.0,
@@ -229,40 +231,18 @@ fn without_a_synthetic_aperture_nothing_moves() {
     assert!(image.values.iter().all(|v| (v / 0.04 - 1.0).abs() < 2e-5));
 }
 
-/// A margin of the stated size is as good as a larger one, and what the margin holds arrives.
+/// What is imaged out of sight leaves the image empty; nothing comes back around.
 #[test]
-fn the_margin_is_enough_and_nothing_wraps() {
+fn nothing_wraps() {
     let image = Raster::image(50, 40, 2.5);
     let wide = image.with_margin(150, 40);
     let scene = Scene::random(wide, [0.25, 0.5, 0.6]);
-    let extremes = Extremes {
-        radial_velocity: largest(Some(&scene.velocity)),
-        radial_acceleration: largest(Some(&scene.acceleration)),
-        elevation: largest(Some(&scene.elevation)),
-    };
-    let tolerance = 1e-4;
-    let [rows, columns] = DEFAULT.margin(2.5, &extremes, tolerance);
-    assert!(rows < 150 && columns < 40);
-    let cut = |f: &Field| f.clone().crop(150 - rows, 40 - columns);
-    let small = Scene {
-        raster: image.with_margin(rows, columns),
-        sigma0: cut(&scene.sigma0),
-        velocity: cut(&scene.velocity),
-        acceleration: cut(&scene.acceleration),
-        elevation: cut(&scene.elevation),
-    };
-    let (a, b) = (
-        DirectImage::new(&DEFAULT, &scene.sources(), &image).image(),
-        DirectImage::new(&DEFAULT, &small.sources(), &image).image(),
-    );
-    assert!(a.difference(&b).1 < tolerance * a.mean());
-    // A bright margin whose sources move out of sight leaves the image empty; nothing comes back around.
     let away = Field::from_fn(&wide, |i, _| if wide.y(i) > 0.0 { 1e3 } else { -1e3 });
     let sources = Sources {
         radial_velocity: Some(&away),
         ..still(wide, &scene.sigma0)
     };
-    let empty = DEFAULT.image(&sources, &image, tolerance);
+    let empty = DEFAULT.image(&sources, &image, 1e-4);
     assert!(empty.values.iter().all(|v| v.abs() < f32::MIN_POSITIVE));
 }
 
@@ -378,4 +358,15 @@ fn coherence_is_bunching_by_unresolved_waves() {
         (bunched / smeared - 1.0).abs() < 0.09,
         "{bunched} {smeared}"
     );
+}
+
+#[test]
+fn positions_are_a_floor_and_a_rest() {
+    let values = [0.0, 0.25, -0.25, 3.0, -3.0, -2.75];
+    let (mut whole, mut rest) = ([0; 6], [0.0; 6]);
+    split(&mut whole, &mut rest, 0.5, (1.0, Some(&values)));
+    assert_eq!(whole, [0, 0, 0, 3, -3, -3]);
+    assert_eq!(rest, [0.5, 0.75, 0.25, 0.5, 0.5, 0.75]);
+    split(&mut whole, &mut rest, -0.25, (1.0, None));
+    assert_eq!((whole, rest), ([-1; 6], [0.75; 6]));
 }

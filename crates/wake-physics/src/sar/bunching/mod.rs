@@ -18,71 +18,15 @@
 //! Alpers and Rufenach (1979), IEEE Trans. Antennas Propag. 27; Hasselmann et al. (1985), J. Geophys. Res. 90.
 
 use crate::raster::{Field, Raster};
-use crate::sar::AzimuthResolution;
-use crate::sar::places::{Places, split};
-use crate::sar::response::{Response, largest, reach};
+use crate::sar::imaging::{Imaging, Response, SMALLEST_VARIANCE, Sources, largest};
 use crate::sar::spread::{LANES, Steps, gaussian};
 use crate::vectorize::vectorized;
 use crate::workspace::Workspace;
 use rayon::prelude::*;
-use std::f64::consts::{LOG2_E, PI, SQRT_2};
+use std::f64::consts::LOG2_E;
 use std::ops::Range;
 
-/// The radar's part of velocity bunching.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Imaging {
-    /// Range over platform speed R/V \[s\], at least 0.
-    pub range_to_velocity: f64,
-    /// Incidence angle θ \[rad\], between 0 and π/2.
-    pub incidence: f64,
-    /// Azimuth resolution ρ' and how it depends on acceleration.
-    pub resolution: AzimuthResolution,
-}
-
-/// What the radar looks at: fields on a raster that has a margin around the image, all finite.
-///
-/// An absent field is an absent effect, and costs nothing.
-#[derive(Debug, Clone, Copy)]
-pub struct Sources<'a> {
-    /// The pixels of the fields.
-    pub raster: Raster,
-    /// Backscatter σ⁰ \[1\].
-    pub sigma0: &'a Field,
-    /// Velocity toward the radar `u_r` [m/s]: displaces in azimuth.
-    pub radial_velocity: Option<&'a Field>,
-    /// Acceleration toward the radar `a_r` [m/s²]: defocuses.
-    pub radial_acceleration: Option<&'a Field>,
-    /// Elevation ζ \[m\]: displaces in range.
-    pub elevation: Option<&'a Field>,
-}
-
-/// Largest absolute values of what displaces and defocuses.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Extremes {
-    /// Of the velocity toward the radar `u_r` [m/s].
-    pub radial_velocity: f64,
-    /// Of the acceleration toward the radar `a_r` [m/s²].
-    pub radial_acceleration: f64,
-    /// Of the elevation ζ \[m\].
-    pub elevation: f64,
-}
-
 impl Imaging {
-    /// Rows and columns around the image from which power can reach it.
-    ///
-    /// ```text
-    /// rows = ((R/V) max|u_r| + z ρ'/(√2 π))/spacing,     columns = max|ζ| cot θ/spacing
-    /// ```
-    ///
-    /// rounded up, with one pixel more; z is the number of standard deviations that `tolerance` asks for.
-    #[must_use]
-    pub fn margin(&self, spacing: f64, extremes: &Extremes, tolerance: f64) -> [usize; 2] {
-        let width = self.resolution.at(extremes.radial_acceleration) / (SQRT_2 * PI);
-        let azimuth = self.range_to_velocity * extremes.radial_velocity + reach(tolerance) * width;
-        let range = extremes.elevation / self.incidence.tan();
-        [azimuth, range].map(|d| (d / spacing).ceil() as usize + 1)
-    }
-
     /// The image before speckle, in the unit of σ⁰, on the raster `image`.
     ///
     /// - `tolerance`: largest sum of |error| in the response of any one source, relative to its power; so the mean
@@ -284,6 +228,50 @@ impl<'a> Sum<'a> {
     }
 }
 
+/// Where the sources of a row are imaged.
+#[derive(Default)]
+struct Places {
+    /// Step at or before each source, and how far beyond it the source is, 0 to 1.
+    steps: Vec<i32>,
+    fractions: Vec<f32>,
+    /// Columns that each source leans by, rounded down, and the share of the next column.
+    columns: Vec<i32>,
+    shares: Vec<f32>,
+}
+
+impl Places {
+    fn resize(&mut self, sources: usize) {
+        self.steps.resize(sources, 0);
+        self.fractions.resize(sources, 0.0);
+        self.columns.resize(sources, 0);
+        self.shares.resize(sources, 0.0);
+    }
+}
+
+/// Takes positions `start + factor·value` apart: largest integers not above them, and the rest.
+#[inline(always)]
+fn split(whole: &mut [i32], rest: &mut [f32], start: f32, (factor, values): (f32, Option<&[f32]>)) {
+    let apart = |at: f32| (floor(at), at - floor(at) as f32);
+    match values {
+        None => {
+            whole.fill(apart(start).0);
+            rest.fill(apart(start).1);
+        }
+        Some(values) => {
+            for ((whole, rest), &value) in whole.iter_mut().zip(rest).zip(values) {
+                (*whole, *rest) = apart(start + factor * value);
+            }
+        }
+    }
+}
+
+/// Largest integer not above x: [`f32::floor`] is a call without SSE 4.1.
+#[inline(always)]
+fn floor(x: f32) -> i32 {
+    let cut = x as i32;
+    cut - i32::from(x < cut as f32)
+}
+
 /// One row of the sources, cut to the columns that matter.
 struct SourceRow<'a> {
     sigma0: &'a [f32],
@@ -329,7 +317,7 @@ impl Taps {
         if self.key == Some((fraction, acceleration)) {
             return;
         }
-        let smallest = crate::sar::response::SMALLEST_VARIANCE as f32;
+        let smallest = SMALLEST_VARIANCE as f32;
         let response = &sum.response;
         let variance = (response.variance as f32
             + response.variance_per_square as f32 * acceleration * acceleration)
@@ -388,5 +376,4 @@ impl Lines<'_> {
 }
 
 #[cfg(test)]
-#[path = "bunching_tests.rs"]
 mod tests;
