@@ -25,10 +25,10 @@ impl Track {
     /// - `distance` U t run since time 0 \[m\]
     #[must_use]
     pub fn new(start: [f64; 2], heading: f64, distance: f64) -> Self {
-        let (sin, cos) = heading.rem_euclid(360.0).to_radians().sin_cos();
+        let forward = direction(heading);
         Self {
-            position: [start[0] + distance * sin, start[1] + distance * cos],
-            forward: [sin, cos],
+            position: [0, 1].map(|axis| start[axis] + distance * forward[axis]),
+            forward,
         }
     }
 
@@ -66,6 +66,22 @@ impl Track {
         let (bottom, right) = (raster.rows.max(1) - 1, raster.columns.max(1) - 1);
         [(0, 0), (0, right), (bottom, right), (bottom, 0)]
             .map(|(i, j)| self.seen_from_ship([raster.x(j), raster.y(i)]))
+    }
+}
+
+/// Unit vector (x, y) of a direction [deg clockwise from +y].
+///
+/// Multiples of 90° are exact.
+#[must_use]
+pub fn direction(degrees: f64) -> [f64; 2] {
+    let turn = degrees.rem_euclid(360.0);
+    let quarter = (turn / 90.0).round();
+    let (sin, cos) = (turn - 90.0 * quarter).to_radians().sin_cos();
+    match quarter as u8 % 4 {
+        0 => [sin, cos],
+        1 => [cos, -sin],
+        2 => [-sin, -cos],
+        _ => [-cos, sin],
     }
 }
 

@@ -1,5 +1,7 @@
 //! Where the radar sees a point: line of sight, azimuth displacement, layover.
 
+pub use crate::track::direction;
+
 /// Velocity toward the radar, positive when the point approaches.
 ///
 /// ```text
@@ -56,22 +58,6 @@ pub fn azimuth_displacement(range_to_velocity: f64, radial_velocity: f64) -> f64
 #[must_use]
 pub fn layover(elevation: f64, incidence: f64) -> f64 {
     -elevation / incidence.tan()
-}
-
-/// Unit vector (x, y) of a direction [deg clockwise from +y].
-///
-/// Multiples of 90° are exact.
-#[must_use]
-pub fn direction(degrees: f64) -> [f64; 2] {
-    let turn = degrees.rem_euclid(360.0);
-    let quarter = (turn / 90.0).round();
-    let (sin, cos) = (turn - 90.0 * quarter).to_radians().sin_cos();
-    match quarter as u8 % 4 {
-        0 => [sin, cos],
-        1 => [cos, -sin],
-        2 => [-sin, -cos],
-        _ => [-cos, sin],
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Bicubic interpolation on a lattice.
 
-use crate::scattering::lattice::Lattice;
+use crate::scattering::slope_lattice::SlopeLattice;
 
 /// Lagrange interpolation through four by four nodes: exact for cubics, of fourth order in the step.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +16,7 @@ impl Bicubic {
         self.nodes
     }
 
-    pub(crate) fn through(lattice: Lattice) -> Self {
+    pub(crate) fn through(lattice: SlopeLattice) -> Self {
         Self {
             start: lattice.start,
             inverse_step: 1.0 / lattice.step,
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn cubics_are_exact_and_edges_are_out() {
         let cubic = |[u, v]: [f64; 2]| (u.powi(3) - 2.0 * u) * (1.0 - v * v + 0.5 * v.powi(3));
-        let table = Bicubic::through(Lattice::sample([-1.0, -0.5], 0.25, [9, 6], cubic));
+        let table = Bicubic::through(SlopeLattice::sample([-1.0, -0.5], 0.25, [9, 6], cubic));
         for point in [[-0.75, -0.25], [0.0, 0.1], [0.75, 0.5], [0.3, 0.33]] {
             let value = table.at(point).unwrap();
             assert!((value - cubic(point)).abs() < 1e-14, "{point:?} {value}");
@@ -100,7 +100,7 @@ mod tests {
         let wave = |[u, v]: [f64; 2]| (3.0 * u + 2.0 * v).sin();
         let error = |step: f64| {
             let nodes = (2.0 / step) as usize + 1;
-            let table = Bicubic::through(Lattice::sample([-1.0; 2], step, [nodes; 2], wave));
+            let table = Bicubic::through(SlopeLattice::sample([-1.0; 2], step, [nodes; 2], wave));
             (0..400)
                 .map(|n| {
                     [

@@ -14,7 +14,7 @@
 pub mod bragg;
 mod facet_fields;
 pub mod hydrodynamic;
-mod lattice;
+mod slope_lattice;
 mod slopes;
 mod specular;
 mod table;

@@ -2,7 +2,7 @@
 
 use crate::raster::Field;
 use crate::scattering::bicubic::Bicubic;
-use crate::scattering::lattice::{Lattice, radius};
+use crate::scattering::slope_lattice::{SlopeLattice, radius};
 use crate::scattering::slopes::PrincipalAxes;
 use crate::scattering::{Backscatter, FacetFields};
 use crate::vectorize::vectorized;
@@ -168,7 +168,7 @@ impl BackscatterTable {
 
 /// Bragg return of plane facets on a lattice of slopes, with what is needed to average it.
 struct Facets {
-    lattice: Lattice,
+    lattice: SlopeLattice,
     std: [f64; 2],
     radius: [usize; 2],
 }
@@ -187,7 +187,7 @@ impl Facets {
         let cells = range.map(|[first, last]| ((last - first) / (2.0 * spacing)).ceil() as usize);
         let nodes = [0, 1].map(|a| 2 * cells[a] + 7 + 2 * radius[a]);
         let start = [0, 1].map(|a| range[a][0] - spacing * (3 + radius[a]) as f64);
-        let lattice = Lattice::sample(start, spacing, nodes, |point| {
+        let lattice = SlopeLattice::sample(start, spacing, nodes, |point| {
             backscatter.two_scale.facet(axes.slope(point))
         });
         Self {
@@ -219,7 +219,7 @@ impl Facets {
     }
 
     /// The error of the averages, from the largest difference that leaving out every other facet makes.
-    fn averaging_error(&self, average: &Lattice, largest: f64) -> f64 {
+    fn averaging_error(&self, average: &SlopeLattice, largest: f64) -> f64 {
         let half = self.radius.map(|r| r / 2);
         let coarse = self.lattice.every_other().smoothed(self.std, half, 1);
         let fine = average.every_other();
@@ -235,7 +235,7 @@ impl Facets {
 
 /// Bragg return averaged over tilt.
 struct Average {
-    lattice: Lattice,
+    lattice: SlopeLattice,
     /// Largest value.
     largest: f64,
     /// Stated error of the averages and of their interpolation.
@@ -257,7 +257,7 @@ impl Average {
 
 /// An eighth of the largest difference between a lattice and the interpolation of every other node of it, at
 /// the middles of its cells.
-fn interpolation_error(lattice: &Lattice) -> f64 {
+fn interpolation_error(lattice: &SlopeLattice) -> f64 {
     let coarse = Bicubic::through(lattice.every_other());
     let mut difference = 0.0f64;
     for j in (1..lattice.nodes[1]).step_by(2) {

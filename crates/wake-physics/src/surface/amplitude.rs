@@ -1,7 +1,7 @@
 //! Mean amplitude of every wave of a lattice, by a table over |k| and an elementary function of the direction.
 
-use super::lattice::Lattice;
 use super::vector::{exp, ln};
+use super::wave_lattice::WaveLattice;
 use crate::spectrum::deep_equivalent;
 use crate::spreading::{Cos2s, Spreading};
 use crate::wind_sea::{DirectionalSpectrum, GAUSS_8};
@@ -31,7 +31,7 @@ pub(super) struct Amplitudes<'a> {
 }
 
 impl<'a> Amplitudes<'a> {
-    pub(super) fn new(spectrum: &'a DirectionalSpectrum, lattice: &Lattice) -> Self {
+    pub(super) fn new(spectrum: &'a DirectionalSpectrum, lattice: &WaveLattice) -> Self {
         let cell = lattice.steps();
         let key = |squared: f64| (squared as f32).to_bits() >> SHIFT;
         let first = key(0.9 * cell[0].min(cell[1]).powi(2));
@@ -154,7 +154,7 @@ mod tests {
     /// The table and the fast functions against Ψ itself, wave by wave.
     #[test]
     fn amplitudes_are_those_of_the_density() {
-        let lattice = Lattice {
+        let lattice = WaveLattice {
             rows: 180,
             columns: 160,
             spacing: 2.0,

@@ -1,8 +1,8 @@
 //! Draws the random amplitudes of a sea, line by line.
 
 use super::amplitude::Amplitudes;
-use super::lattice::Lattice;
 use super::vector::{cos_sin, ln};
+use super::wave_lattice::WaveLattice;
 use crate::dispersion::angular_frequency;
 use crate::random::line_generator;
 use crate::raster::Raster;
@@ -26,7 +26,7 @@ pub(super) enum Scatter {
 
 /// What the amplitudes of one sea depend on.
 pub(super) struct Draw<'a> {
-    lattice: Lattice,
+    lattice: WaveLattice,
     amplitudes: Amplitudes<'a>,
     depth: f64,
     seed: u64,
@@ -53,7 +53,7 @@ struct Workspace {
 impl<'a> Draw<'a> {
     pub(super) fn new(
         spectrum: &'a DirectionalSpectrum,
-        lattice: Lattice,
+        lattice: WaveLattice,
         raster: &Raster,
         (seed, time): (u64, f64),
         scatter: Scatter,
@@ -221,7 +221,7 @@ impl Workspace {
     }
 
     /// On line 0 the wave −k is another wave of the line.
-    fn mirror(&mut self, lattice: &Lattice) {
+    fn mirror(&mut self, lattice: &WaveLattice) {
         let [waves, mirrored] = &mut self.waves;
         for n in lattice.disk(0).into_iter().flatten() {
             mirrored[n] = waves[(lattice.rows - n) % lattice.rows];

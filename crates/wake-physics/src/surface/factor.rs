@@ -3,8 +3,8 @@
 //! A real field has the half spectrum H(k) = ½(T(k) c(k) + T*(−k) c*(−k)). With E and O = ½(c(k) ± c*(−k))
 //! and the factors T of [`Transfer::factor`], each quantity needs one or both of E and O.
 
-use super::lattice::Lattice;
 use super::vector::Lane;
+use super::wave_lattice::WaveLattice;
 use crate::constants::{GRAVITY, KINEMATIC_SURFACE_TENSION};
 use crate::waves::{BRAGG_SPECTRUM_STEEPNESS, Quantity, Transfer};
 use num_complex::{Complex, Complex32};
@@ -21,7 +21,7 @@ pub(super) struct LineWaves<T> {
 
 /// Factors that are the same for every wave.
 pub(super) struct Factors<'a, T> {
-    lattice: &'a Lattice,
+    lattice: &'a WaveLattice,
     ky: Vec<T>,
     depth: Option<T>,
     sin: T,
@@ -30,7 +30,7 @@ pub(super) struct Factors<'a, T> {
 }
 
 impl<'a, T: Lane> Factors<'a, T> {
-    pub(super) fn new(lattice: &'a Lattice, transfer: &Transfer) -> Self {
+    pub(super) fn new(lattice: &'a WaveLattice, transfer: &Transfer) -> Self {
         Self {
             lattice,
             ky: (0..lattice.rows)

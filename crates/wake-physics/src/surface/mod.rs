@@ -3,7 +3,7 @@
 mod amplitude;
 mod draw;
 mod factor;
-mod lattice;
+mod wave_lattice;
 mod vector;
 
 use crate::dispersion::angular_frequency;
@@ -16,10 +16,10 @@ use crate::workspace::Workspace;
 use amplitude::Amplitudes;
 use draw::{Draw, Scatter};
 use factor::Factors;
-use lattice::Lattice;
 use num_complex::{Complex, Complex32, Complex64};
 use std::f64::consts::TAU;
 use vector::Lane;
+use wave_lattice::WaveLattice;
 
 /// From this tolerance on single precision is enough: its error stays below a quarter of it.
 const SINGLE_PRECISION_TOLERANCE: f64 = 2e-5;
@@ -34,7 +34,7 @@ pub(crate) fn wave_variances(
     period: usize,
     spacing: f64,
 ) -> Vec<f32> {
-    let lattice = Lattice {
+    let lattice = WaveLattice {
         rows: period,
         columns: period,
         spacing,
@@ -66,7 +66,7 @@ pub(crate) fn wave_variances(
 
 /// Rows and columns of the lattice that a sea on a raster is drawn on.
 pub(crate) fn lattice_size(spectrum: &DirectionalSpectrum, raster: &Raster) -> [usize; 2] {
-    let lattice = Lattice::new(raster, TAU / spectrum.peak_wavenumber());
+    let lattice = WaveLattice::new(raster, TAU / spectrum.peak_wavenumber());
     [lattice.rows, lattice.columns]
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn lattice_size(spectrum: &DirectionalSpectrum, raster: &Raster) -> [
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
     raster: Raster,
-    lattice: Lattice,
+    lattice: WaveLattice,
     depth: f64,
     /// ½(c(k) + c*(−k)) of the lines b ≥ 0, phases at pixel `[0, 0]`.
     even: Vec<Complex32>,
@@ -137,7 +137,7 @@ impl Surface {
         scatter: Scatter,
         workspace: &mut Workspace,
     ) -> Self {
-        let lattice = Lattice::new(raster, TAU / spectrum.peak_wavenumber());
+        let lattice = WaveLattice::new(raster, TAU / spectrum.peak_wavenumber());
         let band = spectrum.moments(0.0, lattice.cutoff(), 0.0).elevation;
         let ([even, odd], carried) = if band > 0.0 {
             let len = lattice.lines() * lattice.rows;

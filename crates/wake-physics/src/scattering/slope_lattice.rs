@@ -5,14 +5,14 @@ use std::f64::consts::PI;
 
 /// Values at the nodes `start + step·(i, j)`, the first coordinate running fastest.
 #[derive(Debug, Clone)]
-pub(crate) struct Lattice {
+pub(crate) struct SlopeLattice {
     pub start: [f64; 2],
     pub step: f64,
     pub nodes: [usize; 2],
     pub values: Vec<f64>,
 }
 
-impl Lattice {
+impl SlopeLattice {
     /// Samples `function`, row by row in parallel.
     pub(crate) fn sample(
         start: [f64; 2],
@@ -177,7 +177,8 @@ mod tests {
             let step = 0.03;
             let radius = std.map(|s| radius(s, step));
             let nodes = radius.map(|r| 2 * r + 7);
-            let lattice = Lattice::sample([-0.2, 0.1], step, nodes, |[u, v]| (a * u + b * v).exp());
+            let lattice =
+                SlopeLattice::sample([-0.2, 0.1], step, nodes, |[u, v]| (a * u + b * v).exp());
             let mean = lattice.smoothed(std, radius, refinement);
             assert_eq!(mean.nodes, [6 * refinement + 1; 2]);
             let gain = (0.5 * ((a * std[0]).powi(2) + (b * std[1]).powi(2))).exp();
@@ -195,7 +196,7 @@ mod tests {
 
     #[test]
     fn every_other_node_keeps_places() {
-        let lattice = Lattice::sample([1.0, 2.0], 0.5, [5, 3], |[u, v]| 10.0 * u + v);
+        let lattice = SlopeLattice::sample([1.0, 2.0], 0.5, [5, 3], |[u, v]| 10.0 * u + v);
         let coarse = lattice.every_other();
         assert_eq!(coarse.nodes, [3, 2]);
         for j in 0..2 {

@@ -28,13 +28,13 @@ const LEAST_GUARD: usize = 8;
 ///
 /// Stored are the lines b ≥ 0, each with the indices a in FFT order; −k stands beside k.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Lattice {
+pub(super) struct WaveLattice {
     pub(super) rows: usize,
     pub(super) columns: usize,
     pub(super) spacing: f64,
 }
 
-impl Lattice {
+impl WaveLattice {
     /// The lattice for a raster and a peak wavelength \[m\].
     ///
     /// Each period holds the raster and a guard of 4 peak wavelengths (at most a quarter of the raster), so that
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn disk_holds_the_resolved_waves() {
         for (rows, columns) in [(32, 32), (45, 36), (40, 75)] {
-            let lattice = Lattice {
+            let lattice = WaveLattice {
                 rows,
                 columns,
                 spacing: 2.0,
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn period_holds_raster_guard_and_long_waves() {
         let size = |rows, columns, spacing, peak| {
-            let lattice = Lattice::new(&Raster::image(rows, columns, spacing), peak);
+            let lattice = WaveLattice::new(&Raster::image(rows, columns, spacing), peak);
             [lattice.rows, lattice.columns]
         };
         assert_eq!(size(616, 520, 2.5, 13.4), [640, 576]);
