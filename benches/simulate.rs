@@ -1,10 +1,11 @@
-//! A whole scene by size, from numbers to speckle and labels, and the peak memory of a process that simulates it:
+//! A whole scene by size, from numbers to speckle and labels: the second and later scenes of a simulator, all fields and
+//! the image alone, and one call on fresh memory; and the peak memory of a process that simulates it:
 //! `cargo bench --no-default-features --bench simulate`.
 
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use std::env;
 use std::process::Command;
-use wake_physics::{Scene, simulate};
+use wake_physics::{Scene, Simulator, simulate};
 
 /// Pixels along a side.
 const SIZES: [usize; 6] = [128, 256, 512, 1024, 2048, 4096];
@@ -22,13 +23,20 @@ fn seconds(c: &mut Criterion) {
     group.sample_size(10).sampling_mode(SamplingMode::Flat);
     for size in SIZES {
         group.throughput(Throughput::Elements((size * size) as u64));
-        group.bench_with_input(
-            BenchmarkId::from_parameter(size),
-            &scene(size),
-            |b, scene| {
-                b.iter(|| simulate(scene).expect("a valid scene"));
-            },
-        );
+        let scene = scene(size);
+        let mut simulator = Simulator::default();
+        group.bench_with_input(BenchmarkId::new("fields", size), &scene, |b, scene| {
+            b.iter(|| {
+                let simulation = simulator.simulate(scene).expect("a valid scene");
+                simulator.reclaim(simulation);
+            });
+        });
+        group.bench_with_input(BenchmarkId::new("image", size), &scene, |b, scene| {
+            b.iter(|| simulator.image(scene).expect("a valid scene"));
+        });
+        group.bench_with_input(BenchmarkId::new("once", size), &scene, |b, scene| {
+            b.iter(|| simulate(scene).expect("a valid scene"));
+        });
     }
     group.finish();
 }

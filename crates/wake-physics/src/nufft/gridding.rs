@@ -13,13 +13,13 @@ const ROUNDING: [f64; 2] = [12.0, 1.2];
 
 /// Kernel, lattice and precision of one synthesis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gridding {
+pub(crate) struct Gridding {
     /// The kernel.
-    pub kernel: Kernel,
+    pub(crate) kernel: Kernel,
     /// Points of the lattice along y and along x.
-    pub lattice: [usize; 2],
+    pub(crate) lattice: [usize; 2],
     /// Whether the transform runs in `f64`.
-    pub double_precision: bool,
+    pub(crate) double_precision: bool,
 }
 
 /// The error fields may have, relative to the sizes of their strengths.

@@ -17,15 +17,15 @@ pub(crate) const WIDEST: usize = 16;
 /// Beatty, Nishimura and Pauly (2005), IEEE Trans. Med. Imaging 24(6), 799, Eq. 5 (for β); Fessler and Sutton
 /// (2003), IEEE Trans. Signal Process. 51(2), 560 (for the transform).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Kernel {
+pub(crate) struct Kernel {
     /// Lattice points the kernel covers along an axis.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Oversampling σ: lattice points along an axis over pixels.
-    pub oversampling: f64,
+    pub(crate) oversampling: f64,
     /// Bound on the error along an axis, relative to the sum of all |strength|.
-    pub error: f64,
+    pub(crate) error: f64,
     /// How much larger the factor that undoes the kernel is at the raster's edge than in its middle.
-    pub amplification: f64,
+    pub(crate) amplification: f64,
     beta: f64,
 }
 

@@ -19,14 +19,11 @@ mod gridding;
 mod kernel;
 mod spread;
 
-pub use gridding::Gridding;
-pub use kernel::Kernel;
-
 use crate::fft::{Real, Synthesis};
 use crate::raster::{Field, Raster};
 use crate::waves::{PlaneWaves, Quantity, Transfer, strengths};
 use crate::workspace::Workspace;
-use gridding::Demand;
+use gridding::{Demand, Gridding};
 use num_complex::{Complex, Complex64};
 use spread::Footprints;
 use std::f64::consts::TAU;
@@ -112,21 +109,6 @@ pub(crate) fn synthesize_each(
         todo = again;
     }
     reached
-}
-
-/// The first choice of kernel and lattice that [`synthesize`] makes.
-#[must_use]
-pub fn gridding(
-    waves: &PlaneWaves,
-    transfer: &Transfer,
-    quantities: &[Quantity],
-    raster: &Raster,
-    tolerance: f64,
-) -> Gridding {
-    let sums = CentredSums::new(waves, transfer, quantities, raster);
-    let sizes = sums.sizes.iter().map(|&s| (s, s.expected_rms()));
-    let demand = Demand::strictest(sizes.filter(|s| s.1 > 0.0), tolerance);
-    Gridding::fastest(&demand, raster, [waves.len(), quantities.len()])
 }
 
 /// Sum of the magnitudes and root of the sum of squares of the strengths of a field.

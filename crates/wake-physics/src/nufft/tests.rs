@@ -102,7 +102,12 @@ fn tolerance_is_met_at_every_level() {
 fn work_follows_the_tolerance() {
     let raster = Raster::image(128, 128, 2.5);
     let waves = scattered(&raster, 500);
-    let plan = |tolerance| gridding(&waves, &TRANSFER, &ALL, &raster, tolerance);
+    let sums = CentredSums::new(&waves, &TRANSFER, &ALL, &raster);
+    let plan = |tolerance| {
+        let sizes = sums.sizes.iter().map(|&s| (s, s.expected_rms()));
+        let demand = Demand::strictest(sizes, tolerance);
+        Gridding::fastest(&demand, &raster, [waves.len(), ALL.len()])
+    };
     assert!(plan(1e-1).kernel.width < plan(1e-4).kernel.width);
     assert!(!plan(1e-3).double_precision && plan(1e-6).double_precision);
     assert!(errors(&waves, &raster, 1e-1).iter().any(|&e| e > 1e-6));
