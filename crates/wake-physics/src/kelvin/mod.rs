@@ -25,7 +25,6 @@ pub use panels::{WakePlan, Zone};
 use crate::constants::GRAVITY;
 use crate::hull::Hull;
 use crate::track::Track;
-use crate::waves::PlaneWaves;
 use num_complex::Complex64;
 use steady::{SteadyWave, SteadyWaves};
 
@@ -101,22 +100,6 @@ impl KelvinWake {
             .michell_integral(wave.along, wave.wavenumber, self.depth);
         let filter = (-wave.wavenumber * self.filter_depth).exp();
         -michell.conj() * (wave.weight * filter)
-    }
-
-    /// The plane waves at the nodes of a plan, phases and time included.
-    #[must_use]
-    pub fn waves(&self, plan: &WakePlan) -> PlaneWaves {
-        let mut out = PlaneWaves::default();
-        let steady = self.steady_waves();
-        let [x, y] = self.track.position;
-        for (u, weight) in plan.quadrature() {
-            let wave = steady.at(u);
-            let k = self.track.turned([wave.along, wave.across]);
-            let phase = Complex64::cis(-(k[0] * x + k[1] * y));
-            let amplitude = self.free_wave(&wave) * phase * weight;
-            out.push(k, self.speed * wave.along, amplitude);
-        }
-        out
     }
 }
 

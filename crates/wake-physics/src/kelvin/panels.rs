@@ -4,6 +4,8 @@ use super::zones::{Piece, Reach};
 use super::{CUSP_ANGLE, KelvinWake};
 use crate::quadrature::{GaussLegendre, largest_phase};
 use crate::raster::Raster;
+use crate::waves::PlaneWaves;
+use num_complex::Complex64;
 
 /// Nodes of a panel: large panels need the fewest nodes a period (2.4 here, 2 is the limit for none smaller).
 const PANEL_NODES: usize = 32;
@@ -97,6 +99,22 @@ impl KelvinWake {
             steady.at(plan.largest_u()).wavenumber,
         ];
         plan
+    }
+
+    /// The plane waves at the nodes of a plan, phases and time included.
+    #[must_use]
+    pub fn waves(&self, plan: &WakePlan) -> PlaneWaves {
+        let mut out = PlaneWaves::default();
+        let steady = self.steady_waves();
+        let [x, y] = self.track.position;
+        for (u, weight) in plan.quadrature() {
+            let wave = steady.at(u);
+            let k = self.track.turned([wave.along, wave.across]);
+            let phase = Complex64::cis(-(k[0] * x + k[1] * y));
+            let amplitude = self.free_wave(&wave) * phase * weight;
+            out.push(k, self.speed * wave.along, amplitude);
+        }
+        out
     }
 
     /// Largest |u|: by the band of the raster, or where the filter leaves nothing.

@@ -1,6 +1,5 @@
 //! Which kernel, which lattice, which precision: the fastest that keeps a demand.
 
-use super::Size;
 use super::kernel::{Kernel, WIDEST};
 use crate::raster::Raster;
 
@@ -10,6 +9,20 @@ const OVERSAMPLING: [f64; 5] = [1.2, 1.35, 1.5, 1.75, 2.0];
 /// Largest rounding error at a pixel over (machine epsilon · root of the sum of squares of the strengths), as
 /// ROUNDING[0] + ROUNDING[1]·amplification²; measured, see the tests.
 const ROUNDING: [f64; 2] = [12.0, 1.2];
+
+/// Sum of the magnitudes and root of the sum of squares of the strengths of a field.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Size {
+    pub(crate) sum: f64,
+    pub(crate) root: f64,
+}
+
+impl Size {
+    /// rms of waves of unrelated phases.
+    pub(crate) fn expected_rms(self) -> f64 {
+        self.root * std::f64::consts::FRAC_1_SQRT_2
+    }
+}
 
 /// Kernel, lattice and precision of one synthesis.
 #[derive(Debug, Clone, Copy, PartialEq)]

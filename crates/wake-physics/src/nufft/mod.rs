@@ -23,7 +23,7 @@ use crate::fft::{Real, Synthesis};
 use crate::raster::{Field, Raster};
 use crate::waves::{PlaneWaves, Quantity, Transfer, strengths};
 use crate::workspace::Workspace;
-use gridding::{Demand, Gridding};
+use gridding::{Demand, Gridding, Size};
 use num_complex::{Complex, Complex64};
 use spread::Footprints;
 use std::f64::consts::TAU;
@@ -109,20 +109,6 @@ pub(crate) fn synthesize_each(
         todo = again;
     }
     reached
-}
-
-/// Sum of the magnitudes and root of the sum of squares of the strengths of a field.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Size {
-    pub(crate) sum: f64,
-    pub(crate) root: f64,
-}
-
-impl Size {
-    /// rms of waves of unrelated phases.
-    fn expected_rms(self) -> f64 {
-        self.root * std::f64::consts::FRAC_1_SQRT_2
-    }
 }
 
 /// Waves with their phases counted from the raster's middle pixel.

@@ -18,7 +18,7 @@ pub use accuracy::{Accuracy, Reached};
 pub use clock::Seconds;
 pub use label::labels_of;
 pub use linear_sea::LinearSea;
-pub use simulation::{SarImage, Simulation};
+pub use simulation::{Method, SarImage, Simulation};
 
 use crate::error::Result;
 use crate::models::Models;
@@ -30,19 +30,7 @@ use crate::scene::{Scene, Term};
 use crate::survey::Survey;
 use crate::workspace::Workspace;
 use clock::Clock;
-use serde::Serialize;
 use stages::{Stages, Wanted};
-
-/// How fields are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// FFT, non-uniform FFT, table, scattered kernels.
-    Fast,
-    /// The oracles: harmonic sums over the same waves, σ⁰ by quadrature at each pixel, the dense bunching
-    /// integral. Cost grows with waves × pixels.
-    Direct,
-}
 
 /// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
 ///
@@ -94,7 +82,12 @@ impl Simulator {
         let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
         let stages = Stages::new(scene, &models, &plan, method, Wanted::Fields);
         seconds.plan = clock.lap();
-        let mut drawn = stages.draw(self, &mut clock, &mut seconds);
+        let mut drawn = stages.draw(
+            &mut self.workspace,
+            &mut self.table,
+            &mut clock,
+            &mut seconds,
+        );
         let mut speckled = self.workspace.field(&models.image);
         speckled.values.copy_from_slice(&drawn.intensity.values);
         if plan.uses(Term::Speckle) {
@@ -173,7 +166,12 @@ impl Simulator {
     /// The intensity before speckle, and no other field.
     fn intensity(&mut self, scene: &Scene, models: &Models, plan: &Plan) -> (Field, Accuracy) {
         let stages = Stages::new(scene, models, plan, Method::Fast, Wanted::Image);
-        let drawn = stages.draw(self, &mut Clock::start(), &mut Seconds::default());
+        let drawn = stages.draw(
+            &mut self.workspace,
+            &mut self.table,
+            &mut Clock::start(),
+            &mut Seconds::default(),
+        );
         let accuracy = drawn.accuracy;
         (drawn.give_back(&mut self.workspace), accuracy)
     }

@@ -1,6 +1,5 @@
 //! What comes out of a simulation, and how it is written.
 
-use super::Method;
 use super::accuracy::Accuracy;
 use super::clock::Seconds;
 use crate::error::Result;
@@ -11,8 +10,20 @@ use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::sar::speckle::speckle;
 use crate::scene::Scene;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
+
+/// How fields are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// FFT, non-uniform FFT, table, scattered kernels.
+    Fast,
+    /// The oracles: harmonic sums over the same waves, σ⁰ by quadrature at each pixel, the dense bunching
+    /// integral. Cost grows with waves × pixels.
+    Direct,
+}
 
 /// Everything a simulation makes. Fields are `[rows, columns]` of the image.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
 use super::label::echo_displacement;
-use super::{Method, Simulator};
+use super::simulation::Method;
 use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
 use crate::models::{Models, turbulent_wake};
@@ -169,11 +169,11 @@ impl<'a> Stages<'a> {
     /// All stages up to the intensity before speckle, in their order; the clock runs since the plan was made.
     pub(super) fn draw(
         &self,
-        simulator: &mut Simulator,
+        workspace: &mut Workspace,
+        last_table: &mut Option<BackscatterTable>,
         clock: &mut Clock,
         seconds: &mut Seconds,
     ) -> Drawn {
-        let workspace = &mut simulator.workspace;
         let mut accuracy = Accuracy::default();
         let mut fields = self.sea(workspace);
         seconds.sea = clock.lap();
@@ -181,8 +181,8 @@ impl<'a> Stages<'a> {
         seconds.kelvin = clock.lap();
         let damping = self.damping(workspace);
         seconds.turbulent = clock.lap();
-        let sigma0 = self.sigma0(simulator, &fields, damping.as_ref(), &mut accuracy);
-        let workspace = &mut simulator.workspace;
+        let damping_field = damping.as_ref();
+        let sigma0 = self.sigma0(workspace, last_table, &fields, damping_field, &mut accuracy);
         damping.into_iter().for_each(|field| workspace.give(field));
         seconds.backscatter = clock.lap();
         let radial_velocity = self.radial_velocity(workspace, &fields);
@@ -291,7 +291,8 @@ impl<'a> Stages<'a> {
 
     fn sigma0(
         &self,
-        simulator: &mut Simulator,
+        workspace: &mut Workspace,
+        last_table: &mut Option<BackscatterTable>,
         fields: &SurfaceFields,
         damping: Option<&Field>,
         accuracy: &mut Accuracy,
@@ -311,7 +312,7 @@ impl<'a> Stages<'a> {
         }
         let asked = SHARES.table * self.scene.model.tolerance;
         let slopes = [facets.slope_x, facets.slope_y];
-        let (last, mean) = (simulator.table.take(), self.plan.mean_sigma0);
+        let (last, mean) = (last_table.take(), self.plan.mean_sigma0);
         let table = BackscatterTable::covering_or(last, backscatter, slopes, asked * mean);
         accuracy.table = Some(Reached {
             asked,
@@ -322,9 +323,9 @@ impl<'a> Stages<'a> {
             },
         });
         accuracy.table_nodes = table.size();
-        let mut sigma0 = simulator.workspace.field(&self.raster);
+        let mut sigma0 = workspace.field(&self.raster);
         table.fill_sigma0(&mut sigma0, &facets);
-        simulator.table = Some(table);
+        *last_table = Some(table);
         sigma0
     }
 
