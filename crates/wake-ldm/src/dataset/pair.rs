@@ -3,9 +3,10 @@
 use super::parameters::Parameters;
 use super::scenes::Simulated;
 use crate::error::Result;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
-use wake_physics::{Field, labels_of, simulate};
+use wake_physics::{Field, Simulator, labels_of};
 
 /// A picture in grey 0…1.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +34,12 @@ pub struct Pair {
     pub labels: Labels,
 }
 
+/// Simulators that wait for the next pair, each with its memory; no more than ever worked at once.
+fn idle() -> MutexGuard<'static, Vec<Simulator>> {
+    static IDLE: Mutex<Vec<Simulator>> = Mutex::new(Vec::new());
+    IDLE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Simulated {
     /// Simulates pair number `index`.
     ///
@@ -41,14 +48,17 @@ impl Simulated {
     /// [`Error::Scene`](crate::Error::Scene) if the grid does not fit in memory.
     pub fn pair(&self, index: u64) -> Result<Pair> {
         let scene = self.scene(index);
-        let simulation = simulate(&scene)?;
+        let mut simulator = idle().pop().unwrap_or_default();
+        let image = simulator.image(&scene);
+        idle().push(simulator);
+        let image = image?;
         let power = if self.recipe().speckle {
-            &simulation.speckled
+            image.speckled()
         } else {
-            &simulation.intensity
+            image.intensity
         };
         Ok(Pair {
-            image: Grey::of_power(power, &GreyScale::default()),
+            image: Grey::of_power(&power, &GreyScale::default()),
             ..self.pair_without_image(index)?
         })
     }

@@ -1,11 +1,44 @@
 //! All of σ⁰, evaluated exactly: the oracle of the table, and the figures by which a plan leaves terms out.
 
 use crate::raster::Field;
-use crate::scattering::{FacetFields, SlopeCovariance, Specular, TwoScale};
+use crate::scattering::hydrodynamic::bragg_factor;
+use crate::scattering::{SlopeCovariance, Specular, TwoScale};
 use rayon::prelude::*;
 
 /// Spacing of slopes for figures that need two digits only \[1\].
 const COARSE_SLOPES: f64 = 0.06;
+
+/// Fields of one size that determine σ⁰.
+#[derive(Debug, Clone, Copy)]
+pub struct FacetFields<'a> {
+    /// Slope ∂ζ/∂x, along the look direction \[1\].
+    pub slope_x: &'a Field,
+    /// Slope ∂ζ/∂y \[1\].
+    pub slope_y: &'a Field,
+    /// Hydrodynamic modulation m of the Bragg waves \[1\], where it counts.
+    pub modulation: Option<&'a Field>,
+    /// Share of the Bragg waves that the turbulent wake leaves, 0 to 1, where it counts.
+    pub damping: Option<&'a Field>,
+}
+
+impl FacetFields<'_> {
+    /// Slope of pixel `n`, counted row after row.
+    #[inline(always)]
+    pub(crate) fn slope(&self, n: usize) -> [f64; 2] {
+        [
+            f64::from(self.slope_x.values[n]),
+            f64::from(self.slope_y.values[n]),
+        ]
+    }
+
+    /// σ⁰ of pixel `n` from its Bragg and specular parts: only the Bragg part is modulated and damped.
+    #[inline(always)]
+    pub(crate) fn combine(&self, n: usize, [bragg, specular]: [f64; 2]) -> f32 {
+        let modulation = self.modulation.map_or(1.0, |m| bragg_factor(m.values[n]));
+        let damping = self.damping.map_or(1.0, |d| d.values[n]);
+        (bragg * f64::from(modulation * damping) + specular) as f32
+    }
+}
 
 /// Backscatter of facets: Bragg return averaged over unresolved tilt, and specular return.
 #[derive(Debug, Clone, PartialEq)]

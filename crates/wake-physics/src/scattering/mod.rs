@@ -12,7 +12,6 @@
 //! rises away from the radar, faces it and is bright.
 
 pub mod bragg;
-mod facet_fields;
 pub mod hydrodynamic;
 mod slope_lattice;
 mod slopes;
@@ -25,8 +24,7 @@ mod bicubic;
 #[cfg(test)]
 mod cmod5n;
 
-pub use backscatter::{Backscatter, Sensitivity};
-pub use facet_fields::FacetFields;
+pub use backscatter::{Backscatter, FacetFields, Sensitivity};
 pub use slopes::SlopeCovariance;
 pub use specular::Specular;
 pub use table::BackscatterTable;
