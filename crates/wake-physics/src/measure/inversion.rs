@@ -50,15 +50,15 @@ pub fn mean_sigma0(scene: &Scene) -> crate::Result<f64> {
 }
 
 fn brightness(scene: &Scene) -> f64 {
-    let setup = Models::new(scene);
-    let band = Raster::nyquist_wavenumber(&setup.image);
-    let moments = setup.sea.moments(0.0, band, setup.incidence);
+    let models = Models::new(scene);
+    let band = Raster::nyquist_wavenumber(&models.image);
+    let moments = models.sea.moments(0.0, band, models.incidence);
     let resolved = SlopeCovariance {
         xx: moments.slope_xx,
         xy: moments.slope_xy,
         yy: moments.slope_yy,
     };
-    let [bragg, specular] = setup.backscatter(true, true).mean_over(&resolved);
+    let [bragg, specular] = models.backscatter(true, true).mean_over(&resolved);
     bragg + specular
 }
 
