@@ -361,6 +361,7 @@ fn coherence_is_bunching_by_unresolved_waves() {
 }
 
 #[test]
+#[allow(clippy::float_cmp, reason = "whole numbers and exact fractions")]
 fn positions_are_a_floor_and_a_rest() {
     let values = [0.0, 0.25, -0.25, 3.0, -3.0, -2.75];
     let (mut whole, mut rest) = ([0; 6], [0.0; 6]);
