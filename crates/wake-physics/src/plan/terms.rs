@@ -108,7 +108,7 @@ mod tests {
             effect(Term::Bunching, 1.0),
         ];
         let needed = Terms::Rule(TermRule::Needed);
-        // 0.1 + 0.15 fit into half of 1; with 0.3 it would be 0.55.
+        // 0.1 + 0.15 fit into 0.3 of 1; with 0.3 it would be 0.55.
         assert_eq!(used(&effects, &needed), [true, false, false, true]);
         assert_eq!(used(&effects, &Terms::Rule(TermRule::All)), [true; 4]);
         let list = Terms::List(vec![Term::Kelvin]);
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn speckle_is_judged_alone() {
-        let effects = [effect(Term::Sea, 0.4e-3), effect(Term::Speckle, 0.9e-3)];
+        let effects = [effect(Term::Sea, 0.2e-3), effect(Term::Speckle, 0.9e-3)];
         assert_eq!(
             used(&effects, &Terms::Rule(TermRule::Needed)),
             [false, false]
