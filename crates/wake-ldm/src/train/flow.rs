@@ -20,7 +20,7 @@ use crate::noise::NoiseSource;
 /// φ = πσ/2,    x = cos φ r + sin φ n,    loss = |v(x, σ, numbers) − (cos φ n − sin φ r)|²
 /// ```
 ///
-/// with n of [`sea_noise`]. A batch whose noise cannot be made has a loss that is not a number, and is passed over.
+/// with n Gaussian noise like the scene's sea. A batch whose noise cannot be made has a loss that is not a number, and is passed over.
 ///
 /// # References
 ///

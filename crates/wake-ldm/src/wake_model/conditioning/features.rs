@@ -46,7 +46,7 @@ const NUMBERS: usize = 6;
 const DIRECTIONS: usize = 2;
 
 /// Length of [`features`].
-pub const FEATURES: usize =
+pub(crate) const FEATURES: usize =
     2 + NUMBERS * (2 + 2 * WAVES_PER_NUMBER) + DIRECTIONS * (1 + 2 * HARMONICS);
 
 /// What is known of a scene as a vector; unknown values are 0.
@@ -58,7 +58,7 @@ pub const FEATURES: usize =
 ///
 /// Ranges: speed 0 to 16 m/s, place ±512 m, wind 0 to 12 m/s, log₁₀ fetch 3 to 6, incidence 10 to 40°. Values
 /// beyond a range repeat those within for the shorter waves.
-pub fn features(conditions: &Conditions) -> Vec<f32> {
+pub(crate) fn features(conditions: &Conditions) -> Vec<f32> {
     let mut out = Vec::with_capacity(FEATURES);
     out.push(if conditions.ship.is_some() { 1.0 } else { 0.0 });
     out.push(if conditions.ship == Some(true) {

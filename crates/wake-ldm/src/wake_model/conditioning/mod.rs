@@ -19,9 +19,14 @@ mod vocabulary;
 use wake_text::Tokenizer;
 
 pub use conditions::Conditions;
-pub use features::{FEATURES, features};
-pub use position_maps::{MapGrid, PATCH, PLACES, WEDGE, places};
-pub use statement::{QUANTITIES, statement};
+pub(crate) use features::{FEATURES, features};
+pub use position_maps::MapGrid;
+#[cfg(feature = "train")]
+pub(crate) use position_maps::WEDGE;
+pub(crate) use position_maps::{PATCH, PLACES, places};
+pub(crate) use statement::QUANTITIES;
+#[cfg(feature = "train")]
+pub(crate) use statement::statement;
 pub use vocabulary::Vocabulary;
 
 /// CLIP's ids of a prompt, with marks and padding.

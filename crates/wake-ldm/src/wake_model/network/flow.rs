@@ -18,7 +18,7 @@ const STEPS: f64 = 1000.0;
 
 /// The flow that turns noise n into the residual r of a scene's latents, along x = cos φ r + sin φ n, φ = πσ/2.
 ///
-/// The noise is [`SeaNoise`](super::SeaNoise). Were the residual like it, the velocity would be 0 everywhere: the flow only
+/// The noise is Gaussian, correlated as the sea is (`sea.rs`). Were the residual like it, the velocity would be 0 everywhere: the flow only
 /// has to learn what tells the two apart.
 ///
 /// The numbers enter every residual block, and every attention as its only token; the places in the ship's frame and

@@ -15,5 +15,6 @@ pub use known::{Known, expected_grey, expected_latents};
 pub use model::WakeModel;
 pub use patches::{PatchTransform, Shares};
 pub use prior::{Expected, Prior};
-pub use prompt_parser::{PromptParser, windows};
-pub use sea::{SeaNoise, sea_noise};
+pub use prompt_parser::PromptParser;
+pub(crate) use prompt_parser::windows;
+pub(crate) use sea::sea_noise;

@@ -66,7 +66,7 @@ impl PromptParser {
     /// # Shapes
     ///
     /// `windows`: as [`windows`] gives them; result `[batch, 3 · QUANTITIES]`.
-    pub fn forward(&self, windows: Tensor<2, Int>, tokens: usize) -> Tensor<2> {
+    pub(crate) fn forward(&self, windows: Tensor<2, Int>, tokens: usize) -> Tensor<2> {
         let batch = windows.dims()[0] / tokens;
         let seen = self.embedding.forward(windows);
         let [_, _, width] = seen.dims();
@@ -84,7 +84,7 @@ impl PromptParser {
 /// # Shapes
 ///
 /// `prompts`: CLIP's ids, each of the same number of tokens; result `[prompts · tokens, 13]` and that number.
-pub fn windows(
+pub(crate) fn windows(
     prompts: &[Vec<u32>],
     vocabulary: &Vocabulary,
     device: &Device,

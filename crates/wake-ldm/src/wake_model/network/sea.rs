@@ -28,7 +28,7 @@ const LEAST_SHARE: f64 = 1e-5;
 /// Lee et al. (2022), "`PriorGrad`", section 3 (noise with the variance that the data have); Kollovieh et al. (2024), "Flow
 /// Matching with Gaussian Process Priors for Probabilistic Time Series Forecasting".
 #[derive(Debug, Clone)]
-pub struct SeaNoise {
+struct SeaNoise {
     sea: LinearSea,
     /// Factors of f, and of g, in each channel.
     shares: Vec<[f32; 2]>,
@@ -40,7 +40,7 @@ impl SeaNoise {
     /// # Errors
     ///
     /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
-    pub fn new(scene: &Scene, patches: &PatchTransform) -> Result<Self> {
+    fn new(scene: &Scene, patches: &PatchTransform) -> Result<Self> {
         let sea = LinearSea::new(scene)?;
         let variances = variances(&sea, &patches.encoder_rows());
         let share = |variance: f64| match variance {
@@ -58,7 +58,7 @@ impl SeaNoise {
     /// # Shapes
     ///
     /// `[1, channels, rows / 8, columns / 8]` of the scene, on the device of `patches`
-    pub fn draw(&self, source: NoiseSource, patches: &PatchTransform) -> Tensor<4> {
+    fn draw(&self, source: NoiseSource, patches: &PatchTransform) -> Tensor<4> {
         let device = patches.device();
         let field = self
             .sea
@@ -85,7 +85,7 @@ impl SeaNoise {
 /// # Errors
 ///
 /// As [`SeaNoise::new`].
-pub fn sea_noise(
+pub(crate) fn sea_noise(
     scenes: &[Scene],
     sources: &[NoiseSource],
     patches: &PatchTransform,

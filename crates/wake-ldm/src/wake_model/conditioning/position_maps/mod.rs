@@ -3,18 +3,19 @@
 use super::conditions::Conditions;
 
 /// Side of the squares of pixels that become one latent pixel.
-pub const PATCH: usize = 8;
+pub(crate) const PATCH: usize = 8;
 /// Maps at the size of the latents.
-pub const PLACES: usize = 8;
+pub(crate) const PLACES: usize = 8;
 /// Which of them says whether a place is in the wedge.
-pub const WEDGE: usize = 5;
+#[cfg(any(test, feature = "train"))]
+pub(crate) const WEDGE: usize = 5;
 /// Half-width of the band behind the stern \[m\].
 const BAND: f64 = 40.0;
 
 /// Size of an image in pixels, and of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapGrid {
-    /// Rows and columns of the image, a multiple of [`PATCH`].
+    /// Rows and columns of the image, a multiple of 8.
     pub size: usize,
     /// Side of a pixel \[m\].
     pub spacing: f64,
@@ -49,7 +50,7 @@ struct Frame {
 /// # References
 ///
 /// Kelvin (1887), "On Ship Waves": the wedge.
-pub fn places(conditions: &Conditions, grid: MapGrid, cells: &[usize]) -> Vec<f32> {
+pub(crate) fn places(conditions: &Conditions, grid: MapGrid, cells: &[usize]) -> Vec<f32> {
     let mut maps = vec![0.0; PLACES * cells.len()];
     let Some(frame) = Frame::of(conditions) else {
         return maps;
