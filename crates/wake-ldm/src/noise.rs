@@ -25,8 +25,32 @@ pub const INITIAL_STREAM: u32 = 0;
 pub const POSTERIOR_STREAM: u32 = 1;
 /// The white share of the noise that a flow starts from.
 pub(crate) const WHITE_STREAM: u32 = 2;
+/// The noise of fine-tuning.
+#[cfg(feature = "train")]
+pub(crate) const FINE_TUNE_STREAM: u32 = 3;
 /// The noise of the first step; that of step i is `STEP_STREAM + i`.
 pub const STEP_STREAM: u32 = 16;
+
+/// Streams of uniform numbers; they never meet the normal ones, which have another counter.
+#[cfg(feature = "train")]
+pub(crate) mod uniform {
+    /// The values of a data set's scene: value v has stream v, below 16.
+    pub(crate) const VALUES: u32 = 0;
+    /// Seeds of scenes.
+    pub(crate) const SEEDS: u32 = 1000;
+    /// Wordings of scenes.
+    pub(crate) const WORDINGS: u32 = 1001;
+    /// Prompts without images.
+    pub(crate) const PROMPTS: u32 = 1002;
+    /// Noise levels of examples.
+    pub(crate) const LEVELS: u32 = 2000;
+    /// Latent pixels of examples.
+    pub(crate) const CELLS: u32 = 2001;
+    /// Training steps of fine-tuning.
+    pub(crate) const STEPS: u32 = 2100;
+    /// The order of examples; round i of the shuffle has `ORDER + i`.
+    pub(crate) const ORDER: u32 = 1 << 20;
+}
 
 /// Noise that follows from a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,6 +172,34 @@ mod tests {
             ),
         ] {
             assert_eq!(philox(counter, key), answer);
+        }
+    }
+
+    /// Each purpose has numbers of its own; the last one may count up without end.
+    #[test]
+    #[cfg(feature = "train")]
+    fn streams_do_not_overlap() {
+        let one = |stream| (stream, 1);
+        let normal = [
+            one(INITIAL_STREAM),
+            one(POSTERIOR_STREAM),
+            one(WHITE_STREAM),
+            one(FINE_TUNE_STREAM),
+            (STEP_STREAM, u32::MAX - STEP_STREAM),
+        ];
+        let uniform = [
+            (uniform::VALUES, 16),
+            one(uniform::SEEDS),
+            one(uniform::WORDINGS),
+            one(uniform::PROMPTS),
+            one(uniform::LEVELS),
+            one(uniform::CELLS),
+            one(uniform::STEPS),
+            (uniform::ORDER, u32::MAX - uniform::ORDER),
+        ];
+        for streams in [&normal[..], &uniform] {
+            let ends = streams.windows(2).all(|w| w[0].0 + w[0].1 <= w[1].0);
+            assert!(ends, "{streams:?}");
         }
     }
 
