@@ -1,4 +1,4 @@
-//! A scene as a prompt and its 77 CLIP tokens; a prompt as the values it states.
+//! A scene as a prompt and its 77 CLIP tokens; a prompt as the values it states, and what of it stays unread.
 //!
 //! ```text
 //! cargo run --no-default-features --example prompt -- --set ship.speed=12
@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_physics::Scene;
-use wake_text::{PartialScene, TOKENS, Tokenizer, Tokens};
+use wake_text::{Reading, TOKENS, Tokenizer, Tokens};
 
 /// Turns a scene into a prompt and its CLIP tokens, or reads a prompt back.
 #[derive(Parser)]
@@ -29,7 +29,8 @@ struct Arguments {
     /// Sets a value of the scene, such as ship.speed=12; may be repeated.
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "text")]
     set: Vec<String>,
-    /// Prints one JSON object: prompt, ids, count, whether cut off, and the scene read back (or null).
+    /// Prints one JSON object: prompt, ids, count, whether cut off, the stated values, the scene with them (null if
+    /// none is stated), and the parts of the prompt that stay unread.
     #[arg(long)]
     json: bool,
 }
@@ -60,12 +61,12 @@ fn answer(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
             (wake_text::prompt(&scene)?, scene)
         }
     };
-    let said = PartialScene::read(&prompt)?;
+    let reading = Reading::of(&prompt)?;
     let tokens = Tokenizer::clip().encode(&prompt);
     if arguments.json {
-        return Ok(as_json(&prompt, &tokens, &said, &base)?.to_string());
+        return Ok(as_json(&prompt, &tokens, &reading, &base)?.to_string());
     }
-    Ok(as_text(&prompt, &tokens, &said))
+    Ok(as_text(&prompt, &tokens, &reading))
 }
 
 fn read_scene(arguments: &Arguments) -> wake_physics::Result<Scene> {
@@ -80,20 +81,23 @@ fn read_scene(arguments: &Arguments) -> wake_physics::Result<Scene> {
 fn as_json(
     prompt: &str,
     tokens: &Tokens,
-    said: &PartialScene,
+    reading: &Reading,
     base: &Scene,
 ) -> Result<Value, Box<dyn Error>> {
-    let scene = (!said.is_empty()).then(|| said.onto(base)).transpose()?;
+    let scene = (!reading.states_nothing()).then(|| reading.scene.onto(base));
+    let scene = scene.transpose()?;
     Ok(json!({
         "prompt": prompt,
         "token_ids": tokens.ids.to_vec(),
         "token_count": tokens.token_count,
         "truncated": tokens.truncated(),
+        "stated": reading.scene,
         "scene": scene,
+        "unread": reading.unread,
     }))
 }
 
-fn as_text(prompt: &str, tokens: &Tokens, said: &PartialScene) -> String {
+fn as_text(prompt: &str, tokens: &Tokens, reading: &Reading) -> String {
     let mut lines = vec![prompt.to_owned(), String::new()];
     lines.push(format!("{} of {TOKENS} tokens", tokens.token_count));
     if let Some(at) = tokens.truncated_at {
@@ -102,27 +106,6 @@ fn as_text(prompt: &str, tokens: &Tokens, said: &PartialScene) -> String {
     let ids: Vec<String> = tokens.ids.iter().map(u32::to_string).collect();
     lines.extend(ids.chunks(11).map(|row| row.join(" ")));
     lines.push(String::new());
-    lines.extend(stated(said));
+    lines.push(reading.to_string());
     lines.join("\n")
-}
-
-/// The stated values under their keys in a scene file.
-fn stated(said: &PartialScene) -> Vec<String> {
-    let values = [
-        ("ship.speed", said.ship_speed, "m/s"),
-        ("ship.heading", said.ship_heading, "degrees"),
-        ("sea.wind_speed", said.wind_speed, "m/s"),
-        ("sea.wind_toward", said.wind_toward, "degrees"),
-        ("sea.fetch", said.fetch, "m"),
-        ("radar.incidence", said.incidence, "degrees"),
-    ];
-    let ship = match said.ship {
-        Some(true) => "there is a ship",
-        Some(false) => "there is no ship",
-        None => "nothing is said of a ship",
-    };
-    let values = values
-        .into_iter()
-        .filter_map(|(key, value, unit)| Some(format!("{key} = {} {unit}", value?)));
-    std::iter::once(ship.to_owned()).chain(values).collect()
 }

@@ -389,7 +389,7 @@ mod tests {
         assert_eq!(Hull::full(1.0, 0.1, 0.0625, 4.0 / 9.0), wigley);
     }
 
-    /// The reference value S/L² = 0.148791 at B/L = 0.1, T/L = 0.0625, given with six digits.
+    /// S/L² = 0.148791 at B/L = 0.1, T/L = 0.0625 by a plain double sum, `tests/reference/ship.py`; six digits.
     #[test]
     fn wetted_surface_of_the_standard_hull() {
         let hull = Hull::wigley(1.0, 0.1, 0.0625);

@@ -108,7 +108,7 @@ fn ratio_at_15_degrees(s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Values of an independent programme; five digits.
+    /// Values of our own second implementation, `tests/reference/sea_and_scattering.py`; five digits.
     #[test]
     fn permittivity_meets_the_reference() {
         for (frequency, re, im) in [

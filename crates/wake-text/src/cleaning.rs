@@ -20,6 +20,7 @@
 //!
 //! A prompt of printable ASCII without `&` only becomes lower case, as with every CLIP tokenizer.
 
+use std::ops::Range;
 use unicode_normalization::{
     IsNormalized, UnicodeNormalization, char::canonical_combining_class, is_nfc_quick,
 };
@@ -39,6 +40,19 @@ impl Cleaned {
             Some(origin) => origin.get(at).copied().unwrap_or(at),
             None => at,
         }
+    }
+}
+
+impl Cleaned {
+    /// The bytes of the prompt that a range of the text came from; never empty unless the range is.
+    pub(crate) fn span(&self, range: Range<usize>, prompt: &str) -> Range<usize> {
+        let Some(last) = range.end.checked_sub(1).filter(|_| !range.is_empty()) else {
+            return 0..0;
+        };
+        let last = self.origin(last);
+        let next = (range.end..self.text.len()).map(|at| self.origin(at));
+        let end = next.into_iter().find(|&at| at > last);
+        self.origin(range.start)..end.unwrap_or(prompt.len())
     }
 }
 

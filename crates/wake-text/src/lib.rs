@@ -4,24 +4,24 @@
 
 mod error;
 
-// Scene → prompt.
+// Scene → prompt → what it states.
+mod cleaning;
+mod pieces;
+mod amounts;
+mod compass;
+mod subjects;
 mod statement;
 mod wording;
-
-// Prompt → stated values.
-mod pieces;
-mod quantities;
+mod sentence;
 mod reading;
-mod subjects;
 
 // Prompt → tokens.
-mod cleaning;
-mod tokenizer;
-mod vocabulary;
 mod vocabulary_files;
-mod words;
+mod vocabulary;
+mod tokenizer;
 
 pub use error::{Error, Result};
+pub use reading::{Reading, Unread};
 pub use statement::PartialScene;
 pub use tokenizer::{TOKENS, Tokenizer, Tokens};
 pub use wording::{Wording, prompt};

@@ -1,8 +1,120 @@
 //! A prompt as numbers, words and punctuation.
 
+use crate::cleaning::{Cleaned, clean};
 use std::ops::Range;
 
-/// A number, a word or a mark, and its place in the prompt.
+/// A prompt in lower case and usual forms, as CLIP's cleaning leaves it, with the places its bytes came from.
+#[derive(Debug)]
+pub(crate) struct Text<'p> {
+    prompt: &'p str,
+    cleaned: Cleaned,
+}
+
+impl<'p> Text<'p> {
+    pub(crate) fn of(prompt: &'p str) -> Self {
+        Self {
+            prompt,
+            cleaned: clean(prompt),
+        }
+    }
+
+    /// The bytes of the prompt that a range of the text came from.
+    pub(crate) fn span(&self, range: Range<usize>) -> Range<usize> {
+        self.cleaned.span(range, self.prompt)
+    }
+
+    /// The pieces of the text; hyphens between words are spaces.
+    pub(crate) fn pieces(&self) -> Vec<Piece<'_>> {
+        let text = self.cleaned.text.as_str();
+        let mut found: Vec<Piece<'_>> = Vec::new();
+        let mut at = 0;
+        while let Some(c) = text[at..].chars().next() {
+            let (kind, length) = if let Some(read) = number(text, at) {
+                (Some(read.0), read.1)
+            } else if let Some((word, length)) = word(&text[at..]) {
+                (Some(Kind::Word(word)), length)
+            } else {
+                self.mark(at, c, found.last())
+            };
+            let place = at..at + length;
+            at += length;
+            match kind.map(|kind| Piece { kind, place }) {
+                Some(piece) if !join_spelt(&mut found, &piece) => found.push(piece),
+                _ => {}
+            }
+        }
+        found
+    }
+
+    /// The mark at a place, if it is one, and its length.
+    fn mark(&self, at: usize, c: char, last: Option<&Piece<'_>>) -> (Option<Kind<'static>>, usize) {
+        let rest = &self.cleaned.text[at..];
+        let dots = rest.len() - rest.trim_start_matches('.').len();
+        let marks = ["+/-", "+-"]
+            .into_iter()
+            .filter(|mark| rest.starts_with(mark));
+        let length = marks.map(str::len).next().unwrap_or(dots.max(c.len_utf8()));
+        let before_number = || {
+            let next = rest[length..].trim_start().chars().next();
+            next.is_some_and(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | '\u{2212}'))
+        };
+        let after_number = || last.is_some_and(|last| matches!(last.kind, Kind::Number(_)));
+        let kind = match c {
+            '.' if dots > 1 && before_number() => Some(Kind::Dash),
+            '.' if self.is_abbreviation(at, last) => None,
+            '.' | '!' | '?' => Some(Kind::Stop),
+            ',' | ';' | '(' | ')' | '[' | ']' => Some(Kind::Comma),
+            ':' | '=' => Some(Kind::Colon),
+            '-' | '\u{2010}'..='\u{2015}' | '\u{2212}' | '\u{2026}' => {
+                before_number().then_some(Kind::Dash)
+            }
+            '~' if after_number() => before_number().then_some(Kind::Dash),
+            '\u{B1}' => Some(Kind::PlusMinus),
+            '+' if length > 1 => Some(Kind::PlusMinus),
+            '<' | '>' | '\u{2264}' | '\u{2265}' => Some(Kind::Bound),
+            '/' | '\u{D7}' | '*' => Some(Kind::Cross),
+            _ => None,
+        };
+        (kind, length)
+    }
+
+    /// Whether the full stop at a place shortens the word before it and ends no sentence: the next letter is
+    /// no capital.
+    fn is_abbreviation(&self, at: usize, last: Option<&Piece<'_>>) -> bool {
+        let Some(Piece {
+            kind: Kind::Word(word),
+            place,
+        }) = last
+        else {
+            return false;
+        };
+        if place.end != at || !ABBREVIATIONS.contains(word) {
+            return false;
+        }
+        let text = &self.cleaned.text;
+        let next = text[at + 1..].find(|c: char| !c.is_whitespace());
+        next.is_some_and(|next| {
+            let origin = self.cleaned.origin(at + 1 + next);
+            let capital = self.prompt[origin..].chars().next();
+            !capital.is_some_and(char::is_uppercase)
+        })
+    }
+}
+
+/// Words that a full stop may follow within a sentence.
+const ABBREVIATIONS: [&str; 32] = [
+    "deg", "degs", "kt", "kts", "kn", "m", "km", "nm", "nmi", "mi", "ft", "m/s", "km/h", "kmh",
+    "kph", "mph", "mps", "sec", "s", "hr", "h", "approx", "ca", "incl", "inc", "incid", "dir",
+    "spd", "vel", "max", "min", "avg",
+];
+
+/// Dotted abbreviations without their dots.
+const DOTTED: [&str; 26] = [
+    "mph", "kph", "kmh", "mps", "nm", "nmi", "kt", "kts", "kn", "fps", "n", "e", "s", "w", "ne",
+    "se", "sw", "nw", "nne", "ene", "ese", "sse", "ssw", "wsw", "wnw", "nnw",
+];
+
+/// A number, a word or a mark, and its place in the text.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Piece<'a> {
     pub(crate) kind: Kind<'a>,
@@ -13,7 +125,9 @@ pub(crate) struct Piece<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Kind<'a> {
     Number(f64),
-    /// Letters, with slashes between them; or `°`.
+    /// Digits that are not one number, such as `1.2.3`.
+    Figure,
+    /// Letters, with slashes and apostrophes between them; or `°`.
     Word(&'a str),
     /// Punctuation within a sentence.
     Comma,
@@ -21,70 +135,116 @@ pub(crate) enum Kind<'a> {
     Colon,
     /// The end of a sentence.
     Stop,
+    /// A dash or dots before a number.
+    Dash,
+    PlusMinus,
+    /// `<`, `>`, `≤` or `≥`.
+    Bound,
+    /// `×`, `*`, or a slash that joins no words.
+    Cross,
 }
 
-/// The pieces of a text in lower case; hyphens between words are spaces.
-pub(crate) fn pieces(text: &str) -> Vec<Piece<'_>> {
-    let mut found = Vec::new();
-    let mut at = 0;
-    while let Some(c) = text[at..].chars().next() {
-        let rest = &text[at..];
-        let before = text[..at].chars().next_back();
-        let (kind, length) = if let Some((value, length)) = number(rest, before) {
-            (Some(Kind::Number(value)), length)
-        } else if let Some(length) = word(rest) {
-            (Some(Kind::Word(&rest[..length])), length)
-        } else {
-            (mark(c), c.len_utf8())
-        };
-        let place = at..at + length;
-        found.extend(kind.map(|kind| Piece { kind, place }));
-        at += length;
-    }
-    found
-}
-
-fn mark(c: char) -> Option<Kind<'static>> {
-    match c {
-        '.' | '!' | '?' => Some(Kind::Stop),
-        ',' | ';' | '(' | ')' => Some(Kind::Comma),
-        ':' | '=' => Some(Kind::Colon),
-        _ => None,
-    }
-}
-
-/// The number a text starts with, and its length. A sign counts where no letter or digit stands before it.
-fn number(text: &str, before: Option<char>) -> Option<(f64, usize)> {
-    let after_word = before.is_some_and(char::is_alphanumeric);
+/// The number at a place of a text, and its length. A sign counts where no letter or digit stands before it.
+fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
+    let rest = &text[at..];
+    let after_word = text[..at]
+        .chars()
+        .next_back()
+        .is_some_and(char::is_alphanumeric);
     let sign = ['-', '+', '\u{2212}']
         .into_iter()
-        .find(|&sign| !after_word && text.starts_with(sign));
+        .find(|&sign| !after_word && rest.starts_with(sign));
     let sign_length = sign.map_or(0, char::len_utf8);
-    let unsigned = &text[sign_length..];
-    let length = unsigned_length(unsigned)?;
-    let value: f64 = unsigned[..length].replace(',', "").parse().ok()?;
-    let negative = sign.is_some_and(|sign| sign != '+');
-    Some((if negative { -value } else { value }, sign_length + length))
+    let (value, length) = unsigned(&rest[sign_length..])?;
+    let value = if sign.is_some_and(|sign| sign != '+') {
+        -value
+    } else {
+        value
+    };
+    let kind = if value.is_nan() {
+        Kind::Figure
+    } else {
+        Kind::Number(value)
+    };
+    Some((kind, sign_length + length))
 }
 
-/// Length of `12`, `1,200`, `1.5`, `.5` or `1.5e3`.
-fn unsigned_length(text: &str) -> Option<usize> {
+/// Value and length of `12`, `1,200`, `12 000`, `1.5`, `1,5`, `.5`, `1.5e3`, `1/2`, `8 1/2` or `8½`; not a
+/// number for digits that are joined in another way.
+fn unsigned(text: &str) -> Option<(f64, usize)> {
+    let (whole, mut length) = match decimal(text) {
+        Some(read) => read,
+        None => vulgar(text).or_else(|| other_digits(text))?,
+    };
+    let (mut value, rest) = (whole, &text[length..]);
+    let is_whole = text[..length].bytes().all(|byte| byte.is_ascii_digit());
+    if is_whole && let Some((fraction, more)) = slashed(text) {
+        (value, length) = (fraction, more);
+    } else if is_whole && let Some((fraction, more)) = fraction_after(rest) {
+        (value, length) = (whole + fraction, length + more);
+    }
+    let rest = &text[length..];
+    let raised = |c: char| c.is_numeric() && !c.is_ascii_digit();
+    let tail = match rest.strip_prefix('^') {
+        Some(power) => 1 + digits(power.as_bytes()),
+        None => rest.find(|c| !raised(c)).unwrap_or(rest.len()),
+    };
+    Some(if tail > 0 {
+        (f64::NAN, length + tail)
+    } else {
+        (value, length)
+    })
+}
+
+/// Digits with points, commas and spaces between them, and an exponent.
+fn decimal(text: &str) -> Option<(f64, usize)> {
     let bytes = text.as_bytes();
-    let mut length = digits(bytes);
-    while (1..=3).contains(&length) || bytes.get(..length)?.contains(&b',') {
-        let [b',', group @ ..] = &bytes[length..] else {
-            break;
-        };
-        if digits(group) != 3 {
-            break;
+    let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
+    let mut length = 0;
+    while digit(length) || (matches!(bytes.get(length), Some(b'.' | b',')) && digit(length + 1)) {
+        length += 1;
+    }
+    if length == 0 {
+        return None;
+    }
+    let mut number = text[..length].to_owned();
+    if length <= 3 && number.bytes().all(|byte| byte.is_ascii_digit()) {
+        while let Some(group) = spaced_group(&text[length..]) {
+            length += group;
+            number.push_str(&text[length - 3..length]);
         }
-        length += 4;
     }
-    if let [b'.', decimals @ ..] = &bytes[length..] {
-        let count = digits(decimals);
-        length += if count > 0 { 1 + count } else { 0 };
+    let exponent = exponent_length(&bytes[length..]);
+    let value = plain_number(&number).map(|number| number + &text[length..length + exponent]);
+    let value = value.and_then(|number| number.parse().ok());
+    Some((value.unwrap_or(f64::NAN), length + exponent))
+}
+
+/// Length of a space and three digits that continue a number such as `10 000`.
+fn spaced_group(text: &str) -> Option<usize> {
+    let space = text
+        .chars()
+        .next()
+        .filter(|c| matches!(c, ' ' | '\u{A0}' | '\u{2009}' | '\u{202F}'))?;
+    let group = &text.as_bytes()[space.len_utf8()..];
+    let is_group = digits(group) == 3 && !matches!(group.get(3), Some(b'.' | b',' | b'/'));
+    is_group.then(|| space.len_utf8() + 3)
+}
+
+/// Digits as Rust writes them: commas between groups of three go, a single other comma is a decimal point.
+fn plain_number(number: &str) -> Option<String> {
+    let (whole, decimals) = number.split_once('.').unwrap_or((number, ""));
+    let groups: Vec<&str> = whole.split(',').collect();
+    let grouped = groups[0].len() <= 3
+        && groups[0] != "0"
+        && groups[1..].iter().all(|group| group.len() == 3);
+    if decimals.contains(['.', ',']) {
+        None
+    } else if groups.len() == 1 || grouped {
+        Some(number.replace(',', ""))
+    } else {
+        (groups.len() == 2 && !number.contains('.')).then(|| number.replace(',', "."))
     }
-    (length > 0).then(|| length + exponent_length(&bytes[length..]))
 }
 
 fn exponent_length(text: &[u8]) -> usize {
@@ -103,16 +263,190 @@ fn digits(text: &[u8]) -> usize {
     text.iter().take_while(|byte| byte.is_ascii_digit()).count()
 }
 
-/// Length of the word a text starts with.
-fn word(text: &str) -> Option<usize> {
-    if text.starts_with('°') {
-        return Some('°'.len_utf8());
+/// `1/2` and other halves, quarters and eighths; other digits with slashes, such as dates, are no number.
+fn slashed(text: &str) -> Option<(f64, usize)> {
+    let length = text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '/' | '\u{2044}')));
+    let all = &text[..length.unwrap_or(text.len())];
+    let all = all.trim_end_matches(['/', '\u{2044}']);
+    let (above, below) = all.split_once(['/', '\u{2044}'])?;
+    let (above, below): (f64, f64) = match (above.parse(), below) {
+        (Ok(above), "2" | "3" | "4" | "8") => (above, below.parse().ok()?),
+        _ => (1.0, 0.0),
+    };
+    let value = if above < below {
+        above / below
+    } else {
+        f64::NAN
+    };
+    Some((value, all.len()))
+}
+
+/// A fraction below one right after a whole number, or after one space.
+fn fraction_after(text: &str) -> Option<(f64, usize)> {
+    let space = usize::from(text.starts_with([' ', '-']));
+    let (value, length) =
+        vulgar(&text[space..]).or_else(|| slashed(&text[space..]).filter(|_| space > 0))?;
+    (value < 1.0).then_some((value, space + length))
+}
+
+/// `½` and its like.
+fn vulgar(text: &str) -> Option<(f64, usize)> {
+    let c = text.chars().next()?;
+    let value = match c {
+        '\u{BC}' => 0.25,
+        '\u{BD}' => 0.5,
+        '\u{BE}' => 0.75,
+        '\u{2153}' => 1.0 / 3.0,
+        '\u{2154}' => 2.0 / 3.0,
+        '\u{215B}' => 0.125,
+        '\u{215C}' => 0.375,
+        '\u{215D}' => 0.625,
+        '\u{215E}' => 0.875,
+        _ => return None,
+    };
+    Some((value, c.len_utf8()))
+}
+
+/// Numbers in words.
+const SPELT: [&str; 28] = [
+    "zero",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+    "thirteen",
+    "fourteen",
+    "fifteen",
+    "sixteen",
+    "seventeen",
+    "eighteen",
+    "nineteen",
+    "twenty",
+    "thirty",
+    "forty",
+    "fifty",
+    "sixty",
+    "seventy",
+    "eighty",
+    "ninety",
+];
+
+/// The number a word spells; `one` is an article.
+fn spelt(word: &str) -> Option<f64> {
+    let rank = SPELT.iter().position(|&spelt| spelt == word)?;
+    Some(if rank < 20 {
+        rank as f64
+    } else {
+        10.0 * (rank - 18) as f64
+    })
+}
+
+/// Whether "five" goes on from "twenty", "thirty" from "two hundred".
+fn continues(value: f64, more: f64) -> bool {
+    let step = if more < 10.0 { 10.0 } else { 100.0 };
+    more > 0.0 && value >= step + 10.0 && value % step == 0.0
+}
+
+/// Takes a word that spells a number, or continues one ("twenty-five", "ten thousand"), as that number.
+fn join_spelt<'a>(found: &mut Vec<Piece<'a>>, piece: &Piece<'a>) -> bool {
+    let Kind::Word(word) = piece.kind else {
+        return false;
+    };
+    let last = found.last_mut().and_then(|last| match &mut last.kind {
+        Kind::Number(value) => Some((value, &mut last.place.end)),
+        _ => None,
+    });
+    let factor = match word {
+        "hundred" => 100.0,
+        "thousand" => 1000.0,
+        _ => 0.0,
+    };
+    match (last, spelt(word)) {
+        (Some((value, end)), _) if factor > 0.0 => {
+            (*value, *end) = (*value * factor, piece.place.end)
+        }
+        (Some((value, end)), Some(more)) if continues(*value, more) => {
+            (*value, *end) = (*value + more, piece.place.end);
+        }
+        (_, Some(value)) if word != "one" => found.push(Piece {
+            kind: Kind::Number(value),
+            place: piece.place.clone(),
+        }),
+        _ => return false,
     }
-    let end = text.find(|c: char| !(c.is_alphabetic() || c == '/'));
-    let length = text[..end.unwrap_or(text.len())]
-        .trim_end_matches('/')
-        .len();
-    (length > 0 && !text.starts_with('/')).then_some(length)
+    true
+}
+
+/// Digits of other scripts, and raised ones: no number that is read.
+fn other_digits(text: &str) -> Option<(f64, usize)> {
+    let length = text.find(|c: char| !c.is_numeric() || c.is_ascii_digit());
+    let length = length.unwrap_or(text.len());
+    (length > 0).then_some((f64::NAN, length))
+}
+
+/// The word a text starts with, and its length: without the dots of `m.p.h.` and the `'s` of `ship's`, with the
+/// power of `s-1`.
+fn word(text: &str) -> Option<(&str, usize)> {
+    if let Some(sign) = text.chars().next().filter(|c| matches!(c, '°' | 'º' | '˚')) {
+        return Some(("°", sign.len_utf8()));
+    }
+    if let Some(found) = dotted(text) {
+        return Some(found);
+    }
+    let end = text.find(|c: char| !(c.is_alphabetic() || matches!(c, '/' | '\'')));
+    let whole = text[..end.unwrap_or(text.len())].trim_end_matches(['/', '\'']);
+    if whole.is_empty() || whole.starts_with(['/', '\'']) {
+        return None;
+    }
+    let rest = &text[whole.len()..];
+    let powers = ["-1", "^-1", "\u{2212}1", "\u{207B}\u{B9}"];
+    let power = powers.iter().find(|power| {
+        let after = rest.strip_prefix(**power).map(|after| after.chars().next());
+        matches!(whole, "s" | "ms" | "h" | "kmh")
+            && after.is_some_and(|next| !next.is_some_and(char::is_alphanumeric))
+    });
+    Some(match power {
+        Some(power) => (per(whole), whole.len() + power.len()),
+        None => (whole.strip_suffix("'s").unwrap_or(whole), whole.len()),
+    })
+}
+
+/// What `s-1` and its like mean.
+fn per(word: &str) -> &'static str {
+    match word {
+        "s" => "/s",
+        "ms" => "m/s",
+        "h" => "/h",
+        _ => "km/h",
+    }
+}
+
+/// An abbreviation such as `m.p.h.` or `n.e.`, and its length.
+fn dotted(text: &str) -> Option<(&'static str, usize)> {
+    let mut length = 0;
+    for pair in text.as_bytes().chunks_exact(2).take(5) {
+        if !pair[0].is_ascii_lowercase() || pair[1] != b'.' {
+            break;
+        }
+        length += 2;
+    }
+    let after = text[length..].chars().next();
+    let last = usize::from(after.is_some_and(|c| c.is_ascii_lowercase()));
+    let ends = !text[length + last..].starts_with(char::is_alphanumeric);
+    if length + last < 3 || !ends {
+        return None;
+    }
+    let letters = || text[..length + last].bytes().filter(|&byte| byte != b'.');
+    let word = DOTTED.into_iter().find(|word| word.bytes().eq(letters()))?;
+    Some((word, length + last))
 }
 
 /// The word at a place of a sentence, if there is one.
@@ -127,9 +461,21 @@ pub(crate) fn word_at<'a>(sentence: &[Piece<'a>], at: usize) -> Option<&'a str> 
 mod tests {
     use super::*;
 
-    fn kinds(text: &str) -> Vec<Kind<'_>> {
-        pieces(text).into_iter().map(|piece| piece.kind).collect()
+    fn with_pieces<T>(text: &str, check: impl Fn(Vec<Piece<'_>>) -> T) -> T {
+        check(Text::of(text).pieces())
     }
+
+    fn assert_kinds(text: &str, expected: &[Kind<'_>]) {
+        let text_of = Text::of(text);
+        let kinds: Vec<Kind<'_>> = text_of
+            .pieces()
+            .into_iter()
+            .map(|piece| piece.kind)
+            .collect();
+        assert_eq!(kinds, expected, "{text}");
+    }
+
+    use Kind::{Colon, Comma, Cross, Dash, Figure, Number, PlusMinus, Stop, Word};
 
     #[test]
     fn numbers_in_all_their_forms() {
@@ -142,57 +488,143 @@ mod tests {
             ("+3", 3.0),
             ("10,000", 10_000.0),
             ("1,000,000.5", 1_000_000.5),
+            ("10 000", 10_000.0),
+            ("1\u{202F}000\u{A0}000", 1_000_000.0),
+            ("7,5", 7.5),
+            ("0,125", 0.125),
+            ("1000,5", 1000.5),
             ("1e4", 1e4),
             ("2.5e-3", 2.5e-3),
             ("1e400", f64::INFINITY),
+            ("8 1/2", 8.5),
+            ("8\u{BD}", 8.5),
+            ("8 \u{BE}", 8.75),
+            ("8-1/2", 8.5),
+            ("1/2", 0.5),
+            ("\u{BC}", 0.25),
+            ("ten", 10.0),
+            ("twenty-five", 25.0),
+            ("ten thousand", 10_000.0),
+            ("two hundred thirty one", 231.0),
+            ("\u{FF11}\u{FF10}\u{FF0E}\u{FF15}", 10.5),
         ];
         for (text, value) in cases {
-            assert_eq!(kinds(text), [Kind::Number(value)], "{text}");
+            assert_kinds(text, &[Number(value)]);
         }
     }
 
     #[test]
-    fn a_hyphen_between_words_is_a_space() {
-        let expected = [
-            Kind::Number(32.0),
-            Kind::Word("degree"),
-            Kind::Number(5.0),
-            Kind::Number(10.0),
-        ];
-        assert_eq!(kinds("32-degree 5-10"), expected);
+    fn digits_that_are_no_one_number_are_figures() {
+        for text in [
+            "1.2.3",
+            "1,2,3",
+            "1.000,5",
+            "1.000.000",
+            "10^4",
+            "10\u{2074}",
+            "1/2/2024",
+            "5/7",
+            "\u{663}",
+        ] {
+            assert_kinds(text, &[Figure]);
+        }
+    }
+
+    #[test]
+    fn a_hyphen_between_words_is_a_space_and_between_numbers_a_dash() {
+        assert_kinds(
+            "north-easterly 32-degree 5-10 5\u{2013}7 5...7 5 - 7",
+            &[
+                Word("north"),
+                Word("easterly"),
+                Number(32.0),
+                Word("degree"),
+                Number(5.0),
+                Dash,
+                Number(10.0),
+                Number(5.0),
+                Dash,
+                Number(7.0),
+                Number(5.0),
+                Dash,
+                Number(7.0),
+                Number(5.0),
+                Dash,
+                Number(7.0),
+            ],
+        );
+        assert_kinds("5 +/- 1", &[Number(5.0), PlusMinus, Number(1.0)]);
+        assert_kinds(
+            "5\u{B1}1 2 \u{D7} 3",
+            &[
+                Number(5.0),
+                PlusMinus,
+                Number(1.0),
+                Number(2.0),
+                Cross,
+                Number(3.0),
+            ],
+        );
     }
 
     #[test]
     fn punctuation_does_not_stick_to_numbers_and_units() {
-        use Kind::{Comma, Number, Stop, Word};
-        let expected = [
-            Number(10.0),
-            Word("m/s"),
-            Comma,
-            Number(32.0),
-            Word("°"),
-            Stop,
-        ];
-        assert_eq!(kinds("10m/s, 32°."), expected);
-        assert_eq!(kinds("at 10."), [Word("at"), Number(10.0), Stop]);
-        assert_eq!(kinds("1,2"), [Number(1.0), Comma, Number(2.0)]);
-        assert_eq!(
-            kinds("10mps/ 3e"),
-            [Number(10.0), Word("mps"), Number(3.0), Word("e")]
+        assert_kinds(
+            "10m/s, 32°.",
+            &[
+                Number(10.0),
+                Word("m/s"),
+                Comma,
+                Number(32.0),
+                Word("°"),
+                Stop,
+            ],
+        );
+        assert_kinds("at 10.", &[Word("at"), Number(10.0), Stop]);
+        assert_kinds("1, 2", &[Number(1.0), Comma, Number(2.0)]);
+        assert_kinds(
+            "10mps/ 3e",
+            &[Number(10.0), Word("mps"), Cross, Number(3.0), Word("e")],
+        );
+        assert_kinds("ship's: isn't", &[Word("ship"), Colon, Word("isn't")]);
+    }
+
+    #[test]
+    fn stops_of_abbreviations_end_no_sentence() {
+        assert_kinds("45 deg. at", &[Number(45.0), Word("deg"), Word("at")]);
+        assert_kinds("45 deg. At", &[Number(45.0), Word("deg"), Stop, Word("at")]);
+        assert_kinds("45 deg.", &[Number(45.0), Word("deg"), Stop]);
+        assert_kinds(
+            "12 m.p.h. N.E. wind",
+            &[Number(12.0), Word("mph"), Word("ne"), Word("wind")],
+        );
+        assert_kinds("12 M.P.H", &[Number(12.0), Word("mph")]);
+        assert_kinds(
+            "5 m s-1, 5 ms\u{207B}\u{B9}",
+            &[
+                Number(5.0),
+                Word("m"),
+                Word("/s"),
+                Comma,
+                Number(5.0),
+                Word("m/s"),
+            ],
         );
     }
 
     #[test]
     fn places_are_those_in_the_text() {
-        let text = "é 1,000 m\u{2019}s 3";
-        for piece in pieces(text) {
-            match piece.kind {
-                Kind::Word(word) => assert_eq!(&text[piece.place], word),
-                Kind::Number(value) => {
-                    assert_eq!(text[piece.place].replace(',', "").parse(), Ok(value));
-                }
-                _ => {}
-            }
-        }
+        with_pieces("é 1,000 m\u{2019}s 3", |pieces| {
+            let places: Vec<Range<usize>> = pieces.into_iter().map(|piece| piece.place).collect();
+            assert_eq!(places, [0..2, 3..8, 9..12, 13..14]);
+        });
+        let text = Text::of("\u{FF11} &amp; e\u{301}x");
+        assert_eq!(text.span(0..1), 0..3);
+        let places: Vec<Range<usize>> = text
+            .pieces()
+            .into_iter()
+            .map(|piece| text.span(piece.place))
+            .collect();
+        assert_eq!(places, [0..3, 10..14]);
     }
 }

@@ -1,22 +1,58 @@
-//! Prompt → the values it states.
+//! Prompt → the values it states, and what of it stays unread.
 //!
-//! Every number with a unit belongs to a subject: to the one named right after it ("3 mps wind"), else to
-//! the last one named before it in its sentence ("a ship moving at 10 mps"), else to the next one. Subject
-//! and unit together say which value it is; where they say none, nothing is stated.
+//! Every number with a unit and every compass word belongs to a subject: to the one named right after it ("3 mps
+//! wind"), else to the last one named before it in its sentence ("a ship moving at 10 mps"), else to the next one.
+//! Subject and unit together say which value it is; where they say none, it stays unread.
 
-use crate::error::{Error, Result};
-use crate::pieces::{Kind, Piece, pieces, word_at};
-use crate::quantities::{Dimension, Quantity, owner, quantity};
-use crate::statement::PartialScene;
-use crate::subjects::{Named, Subject, subjects};
+use crate::error::Result;
+use crate::pieces::{Kind, Text};
+use crate::sentence::Sentence;
+use crate::statement::{PartialScene, Statement};
+use serde::Serialize;
+use std::fmt;
 use std::ops::Range;
 
-impl PartialScene {
-    /// The values a prompt states.
+/// What was understood of a prompt, and what was not.
+///
+/// Every number and every word of the field in a prompt (ships, wakes, wind, waves, fetch, incidence, directions,
+/// units and their like) is either a part of `scene` or named in `unread`.
+///
+/// | in a prompt | read as |
+/// | --- | --- |
+/// | speeds in m/s, mps, knots, km/h, mph, ft/s; lengths in m, km, nautical miles, miles, feet, yards; angles in degrees, radians | SI units and degrees |
+/// | `10,000`, `10 000`, `7.5`, `7,5`, `8 1/2`, `8½`, `1e4`, "twenty-five", full-width digits | numbers; three digits after a single comma are thousands |
+/// | north, NNE, north-easterly, southbound, westwards … | multiples of 22.5 degrees; north is 0 degrees, the azimuth direction, up in the image |
+/// | "wind from 270 degrees", "wind from the west", "westerly wind", "west wind" | wind toward 90 degrees |
+/// | "no ship", "without any vessels", "ship-free", "not a ship" | no ship |
+/// | "no wind", "windless" | wind of 0 m/s |
+/// | "stationary ship", "anchored", "at rest" | a ship of 0 m/s |
+/// | "wake" | a ship, unless the prompt says that there is none |
+/// | "5 ± 1 m/s" | 5 m/s; the margin stays unread |
+/// | "5 to 7 m/s", "at least 5 m/s", numbers without a unit, what is denied ("not at 10 m/s") | unread |
+///
+/// A compass word and a number may state the same direction up to half a point (11.25 degrees); the number counts.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Reading {
+    /// The values the prompt states.
+    pub scene: PartialScene,
+    /// What stays unread, in the order of the prompt.
+    pub unread: Vec<Unread>,
+}
+
+/// A part of a prompt that was not understood.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unread {
+    /// Its bytes in the prompt.
+    pub place: Range<usize>,
+    /// Its text.
+    pub text: String,
+}
+
+impl Reading {
+    /// Reads a prompt: every [`Wording`](crate::Wording) and free text like it, in any case and spacing, the
+    /// sentences in any order.
     ///
-    /// Understands every [`Wording`](crate::Wording) and free text like it: any case and spacing, the
-    /// sentences in any order, speeds in `mps`, `m/s` or knots, directions in degrees, a fetch in metres or
-    /// kilometres. "Wind from 270 degrees" blows toward 90. A text that states nothing is no error.
+    /// A text that states nothing is no error; see [`Reading::states_nothing`].
     ///
     /// # Errors
     ///
@@ -26,182 +62,90 @@ impl PartialScene {
     /// # Examples
     ///
     /// ```
-    /// use wake_text::PartialScene;
+    /// use wake_text::Reading;
     ///
-    /// let said = PartialScene::read("A ship at 7.5 m/s, heading 20 deg, in a light breeze")?;
-    /// assert_eq!(said.ship_speed, Some(7.5));
-    /// assert_eq!(said.ship_heading, Some(20.0));
-    /// assert_eq!(said.wind_speed, None);
+    /// let reading = Reading::of("A ship at 18 km/h heading north-east, in a swell of 2 m")?;
+    /// assert_eq!(reading.scene.ship_speed, Some(5.0));
+    /// assert_eq!(reading.scene.ship_heading, Some(45.0));
+    /// assert_eq!(reading.unread[0].text, "swell of 2 m");
+    /// assert!(Reading::of("a photo of a cat")?.states_nothing());
     /// # Ok::<(), wake_text::Error>(())
     /// ```
-    pub fn read(prompt: &str) -> Result<Self> {
-        let lower = prompt.to_ascii_lowercase();
-        let pieces = pieces(&lower);
-        let mut reading = Reading::new(prompt);
-        for sentence in pieces.split(|piece| piece.kind == Kind::Stop) {
-            let mut subjects = subjects(sentence);
-            for subject in &subjects {
-                reading.name(subject)?;
-            }
-            let absent = [Subject::NoShip, Subject::NoWind];
-            subjects.retain(|named| !absent.contains(&named.subject));
-            for at in 0..sentence.len() {
-                if let Some(quantity) = quantity(sentence, at) {
-                    reading.measure(sentence, &subjects, quantity)?;
-                }
-            }
+    pub fn of(prompt: &str) -> Result<Self> {
+        let text = Text::of(prompt);
+        let pieces = text.pieces();
+        let mut statement = Statement::new(prompt, &text);
+        let mut sentences = Vec::new();
+        for pieces in pieces.split(|piece| piece.kind == Kind::Stop) {
+            let mut sentence = Sentence::new(pieces);
+            sentence.read(&mut statement)?;
+            sentences.push(sentence);
         }
-        reading.finish()
+        let scene = statement.finish()?;
+        let unread = sentences
+            .iter()
+            .flat_map(|sentence| sentence.unread(&scene));
+        let unread = unread.map(|place| {
+            let place = text.span(place);
+            let text = prompt[place.clone()].to_owned();
+            Unread { place, text }
+        });
+        Ok(Self {
+            scene,
+            unread: unread.collect(),
+        })
+    }
+
+    /// Whether the prompt states nothing of a scene.
+    pub fn states_nothing(&self) -> bool {
+        self.scene.is_empty()
     }
 }
 
-/// One of the values a prompt can state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Value {
-    ShipSpeed,
-    ShipHeading,
-    WindSpeed,
-    WindToward,
-    Fetch,
-    Incidence,
-}
-
-impl Value {
-    fn of(subject: Subject, dimension: Dimension) -> Option<Self> {
-        match (subject, dimension) {
-            (Subject::Ship | Subject::Heading, Dimension::Speed) => Some(Self::ShipSpeed),
-            (Subject::Ship | Subject::Heading, Dimension::Angle) => Some(Self::ShipHeading),
-            (Subject::Wind | Subject::Fetch, Dimension::Speed) => Some(Self::WindSpeed),
-            (Subject::Wind | Subject::Fetch, Dimension::Angle) => Some(Self::WindToward),
-            (Subject::Fetch, Dimension::Length) => Some(Self::Fetch),
-            (Subject::Incidence, Dimension::Angle) => Some(Self::Incidence),
-            _ => None,
+impl fmt::Display for Reading {
+    /// The stated values under their keys in a scene file, one a line, and a line of what stays unread.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.states_nothing() {
+            write!(f, "the prompt states nothing of a scene")?;
+        } else {
+            write!(f, "{}", self.scene)?;
         }
-    }
-
-    fn slot(self, said: &mut PartialScene) -> &mut Option<f64> {
-        match self {
-            Self::ShipSpeed => &mut said.ship_speed,
-            Self::ShipHeading => &mut said.ship_heading,
-            Self::WindSpeed => &mut said.wind_speed,
-            Self::WindToward => &mut said.wind_toward,
-            Self::Fetch => &mut said.fetch,
-            Self::Incidence => &mut said.incidence,
-        }
-    }
-}
-
-/// The values found so far and the words that state them.
-struct Reading<'a> {
-    prompt: &'a str,
-    said: PartialScene,
-    values: Vec<(Value, Range<usize>)>,
-    /// Words that speak of a ship, and words that say there is none.
-    ship: [Option<Range<usize>>; 2],
-}
-
-impl<'a> Reading<'a> {
-    fn new(prompt: &'a str) -> Self {
-        Self {
-            prompt,
-            said: PartialScene::default(),
-            values: Vec::new(),
-            ship: [None, None],
-        }
-    }
-
-    /// Takes in that a subject is named.
-    fn name(&mut self, named: &Named) -> Result<()> {
-        match named.subject {
-            Subject::Ship => self.ship[0] = Some(named.place.clone()),
-            Subject::NoShip => self.ship[1] = Some(named.place.clone()),
-            Subject::NoWind => {
-                return self.set(Value::WindSpeed, 0.0, named.place.clone());
-            }
-            _ => {}
+        if !self.unread.is_empty() {
+            let parts: Vec<String> = self.unread.iter().map(Unread::to_string).collect();
+            write!(f, "\nnot read: {}", parts.join(", "))?;
         }
         Ok(())
     }
+}
 
-    /// Takes in a quantity.
-    fn measure(
-        &mut self,
-        sentence: &[Piece<'_>],
-        subjects: &[Named],
-        quantity: Quantity,
-    ) -> Result<()> {
-        let Some((owner, right_after)) = owner(sentence, subjects, &quantity) else {
-            return Ok(());
-        };
-        let Some(value) = Value::of(owner.subject, quantity.dimension) else {
-            return Ok(());
-        };
-        let Range { start, end } = quantity.pieces;
-        let last = if right_after { owner.at } else { end - 1 };
-        let first = sentence[start].place.start;
-        let from = start > 0 && word_at(sentence, start - 1) == Some("from");
-        let turn = if from && value == Value::WindToward {
-            180.0
-        } else {
-            0.0
-        };
-        self.set(
-            value,
-            quantity.value + turn,
-            first..sentence[last].place.end,
+impl fmt::Display for Unread {
+    /// The text in quotes, escaped, at most its first 80 characters.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let end = self.text.char_indices().nth(80).map(|(at, _)| at);
+        let more = if end.is_some() { " …" } else { "" };
+        write!(
+            f,
+            "{:?}{more}",
+            &self.text[..end.unwrap_or(self.text.len())]
         )
     }
+}
 
-    /// Notes a value, which must be possible and the same as one noted before.
-    fn set(&mut self, value: Value, number: f64, place: Range<usize>) -> Result<()> {
-        let mut alone = PartialScene::default();
-        *value.slot(&mut alone) = Some(number);
-        alone.check(&self.prompt[place.clone()])?;
-        let number = match value {
-            Value::ShipHeading | Value::WindToward => number.rem_euclid(360.0) % 360.0,
-            _ => number,
-        };
-        match value.slot(&mut self.said).replace(number) {
-            Some(old) if (old - number).abs() > 1e-9 * old.abs() => {
-                let first = self.values.iter().find(|(other, _)| *other == value);
-                let first = first.map_or(place.clone(), |(_, place)| place.clone());
-                Err(self.contradiction(first, place))
-            }
-            _ => {
-                self.values.push((value, place));
-                Ok(())
-            }
-        }
-    }
-
-    fn finish(mut self) -> Result<PartialScene> {
-        let [named, absent] = self.ship.clone();
-        let of_ship = [Value::ShipSpeed, Value::ShipHeading];
-        let stated = self
-            .values
-            .iter()
-            .find(|(value, _)| of_ship.contains(value));
-        let present = stated.map(|(_, place)| place.clone()).or(named);
-        match (present, absent) {
-            (Some(present), Some(absent)) => return Err(self.contradiction(absent, present)),
-            (Some(_), None) => self.said.ship = Some(true),
-            (None, Some(_)) => self.said.ship = Some(false),
-            (None, None) => {}
-        }
-        Ok(self.said)
-    }
-
-    fn contradiction(&self, first: Range<usize>, second: Range<usize>) -> Error {
-        Error::Contradiction {
-            first: self.prompt[first].to_owned(),
-            second: self.prompt[second].to_owned(),
-        }
+impl PartialScene {
+    /// The values a prompt states: the scene of [`Reading::of`], which also says what stays unread.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reading::of`].
+    pub fn read(prompt: &str) -> Result<Self> {
+        Reading::of(prompt).map(|reading| reading.scene)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Error;
     use proptest::prelude::*;
     use wake_physics::Scene;
 
@@ -237,7 +181,7 @@ mod tests {
              incidence.",
             "CAPTURED AT 32 DEGREE INCIDENCE.  OCEAN WAVES ARE SHAPED BY 3 MPS WIND DIRECTING TOWARD 90 \
              DEGREES AND 10 KM FETCH. WAKES FROM A SHIP MOVING AT 10 M/S TOWARD 135 DEG.",
-            "A vessel heads toward 135° at 10m/s in a 3-mps northerly wind toward 90°, fetch 10,000 m, \
+            "A vessel heads toward 135° at 10m/s in a 3-mps westerly wind toward 90°, fetch 10,000 m, \
              incidence angle 32 deg",
             "Wind 3 meters per second toward 90 deg over 10 kilometres of fetch; ship speed 10.0 mps, \
              heading 135 degrees; angle of incidence 32 degrees",
@@ -265,7 +209,7 @@ mod tests {
         ];
         for prompt in prompts {
             assert_eq!(read(prompt), NOTHING, "{prompt}");
-            assert!(read(prompt).is_empty());
+            assert!(Reading::of(prompt).unwrap().states_nothing());
         }
     }
 
@@ -318,6 +262,75 @@ mod tests {
         assert_eq!(read("no wind at all, wind 0 mps").wind_speed, Some(0.0));
     }
 
+    /// A line of `tests/prompts.txt` in the notation of that file.
+    fn in_short(reading: Result<Reading>) -> String {
+        let reading = match reading {
+            Ok(reading) => reading,
+            Err(Error::Contradiction { .. }) => return "!contradiction".to_owned(),
+            Err(_) => return "!impossible".to_owned(),
+        };
+        let said = reading.scene;
+        let ship = said
+            .ship
+            .map(|ship| if ship { "ship" } else { "no-ship" }.to_owned());
+        let values = [
+            ("v", said.ship_speed),
+            ("h", said.ship_heading),
+            ("w", said.wind_speed),
+            ("d", said.wind_toward),
+            ("f", said.fetch),
+            ("i", said.incidence),
+        ];
+        // Five significant digits and the place of the fourth decimal: what the file writes.
+        let values = values
+            .into_iter()
+            .filter_map(|(key, value)| Some(format!("{key}={:.3}", value?)));
+        let mut words: Vec<String> = ship.into_iter().chain(values).collect();
+        words.sort();
+        let unread = reading
+            .unread
+            .into_iter()
+            .map(|unread| format!(" | {}", unread.text));
+        words.join(" ") + &unread.collect::<String>()
+    }
+
+    #[test]
+    fn a_corpus_of_prompts_is_read_as_by_hand() {
+        let (mut count, mut wrong) = (0, Vec::new());
+        for line in include_str!("../tests/prompts.txt").lines() {
+            let Some((prompt, expected)) =
+                line.split_once(" =>").filter(|_| !line.starts_with('#'))
+            else {
+                continue;
+            };
+            let (said, unread) = expected.split_once('|').unwrap_or((expected, ""));
+            let number = |word: &str| match word.split_once('=') {
+                Some((key, value)) => format!("{key}={:.3}", value.parse::<f64>().unwrap()),
+                None => word.to_owned(),
+            };
+            let mut said: Vec<String> = said.split_whitespace().map(number).collect();
+            said.sort();
+            let unread = unread
+                .split('|')
+                .map(str::trim)
+                .filter(|part| !part.is_empty());
+            let expected =
+                said.join(" ") + &unread.map(|part| format!(" | {part}")).collect::<String>();
+            let found = in_short(Reading::of(prompt));
+            if found != expected {
+                wrong.push(format!("{prompt}\n  by hand {expected}\n  read    {found}"));
+            }
+            count += 1;
+        }
+        assert!(
+            wrong.is_empty(),
+            "{} of {count}:\n{}",
+            wrong.len(),
+            wrong.join("\n")
+        );
+        assert!(count >= 80, "only {count} prompts");
+    }
+
     proptest! {
         #[test]
         fn any_text_is_read_or_refused(prompt in any::<String>()) {
@@ -345,6 +358,130 @@ mod tests {
         }
     }
 
+    /// A number that is not named as unread counts: another in its place is another reading.
+    #[test]
+    fn no_number_is_dropped_in_silence() {
+        let words = "[1-9][0-9]?(\\.5|,5)?|mps|m/s|km/h|knots|km|miles|degrees|deg\\.|°|±|to|between|and|ship|no|not|\
+                     without|a|wind|fetch|of|incidence|angle|heading|from|toward|the|north|westerly|waves|length|at|[.,:-]";
+        let prompts = prop::collection::vec(words, 0..12);
+        proptest!(ProptestConfig::with_cases(2000), |(words in prompts, extra in 3..40_u32)| {
+            let prompt = words.join(" ");
+            let reading = Reading::of(&prompt);
+            for (at, word) in words.iter().enumerate().filter(|(_, word)| word.starts_with(|c: char| c.is_ascii_digit())) {
+                let start = words[..at].iter().map(|word| word.len() + 1).sum::<usize>();
+                let is_named = |reading: &Reading| reading.unread.iter().any(|unread| unread.place.contains(&start));
+                if reading.as_ref().is_ok_and(is_named) {
+                    continue;
+                }
+                let mut others = words.clone();
+                others[at] = format!("{}{}", extra, word);
+                let other = Reading::of(&others.join(" "));
+                prop_assert!(reading.is_err() || reading != other, "{} and {}: {:?}", prompt, others.join(" "), reading);
+            }
+        });
+    }
+
+    /// Speeds, lengths and directions as people write them, and what they are in SI and degrees.
+    fn speeds() -> impl Strategy<Value = (String, f64)> {
+        let units = [
+            (" m/s", 1.0),
+            ("mps", 1.0),
+            (" knots", 1852.0 / 3600.0),
+            (" kts", 1852.0 / 3600.0),
+            (" km/h", 1.0 / 3.6),
+            (" kilometres per hour", 1.0 / 3.6),
+            (" mph", 0.44704),
+            (" m s-1", 1.0),
+        ];
+        let numbers = (0..=25_u32, 0..10_u32, prop::sample::select(vec![".", ","]));
+        (numbers, prop::sample::select(units.to_vec())).prop_map(
+            |((whole, tenth, point), (unit, factor))| {
+                let value = f64::from(whole) + f64::from(tenth) / 10.0;
+                (format!("{whole}{point}{tenth}{unit}"), value * factor)
+            },
+        )
+    }
+
+    fn fetches() -> impl Strategy<Value = (String, f64)> {
+        let units = [
+            (" m", 1.0),
+            (" km", 1e3),
+            (" nautical miles", 1852.0),
+            (" miles", 1609.344),
+            (" ft", 0.3048),
+        ];
+        (400..5000_u32, prop::sample::select(units.to_vec())).prop_map(|(value, (unit, factor))| {
+            (format!("{value}{unit}"), f64::from(value) * factor)
+        })
+    }
+
+    /// A direction something goes to, and its degrees.
+    fn goals() -> impl Strategy<Value = (String, f64)> {
+        let names = [
+            "north",
+            "north-northeast",
+            "NE",
+            "east-north-east",
+            "east",
+            "ESE",
+            "south-east",
+            "south southeast",
+            "south",
+            "SSW",
+            "southwest",
+            "west-southwest",
+            "west",
+            "WNW",
+            "north west",
+            "NNW",
+        ];
+        let points =
+            (0..16_usize).prop_map(move |rank| (names[rank].to_owned(), 22.5 * rank as f64));
+        let degrees = (
+            0..360_u32,
+            prop::sample::select(vec![" degrees", "°", " deg."]),
+        );
+        let degrees =
+            degrees.prop_map(|(value, unit)| (format!("{value}{unit}"), f64::from(value)));
+        prop_oneof![points, degrees]
+    }
+
+    proptest! {
+        /// Units and compass words in free text come back as numbers.
+        #[test]
+        fn units_and_compass_words_go_round(
+            (ship, ship_speed) in speeds(), (wind, wind_speed) in speeds(), (goal, heading) in goals(),
+            (origin, from) in goals(), (fetch, metres) in fetches(), incidence in 5..=75_u32, order in 0..3_usize
+        ) {
+            let wind_first = [
+                format!("Wind of {wind} from {origin} over a fetch of {fetch}"),
+                format!("The wind blows at {wind} out of the {origin}, fetch {fetch}"),
+                format!("{fetch} fetch under a wind from {origin} at {wind}"),
+            ];
+            let ship_words = [
+                format!("a ship moving toward {goal} at {ship}"),
+                format!("A vessel at {ship} sails to the {goal}"),
+                format!("ship speed: {ship}, heading: {goal}"),
+            ];
+            let seen = format!("Incidence of {incidence} degrees");
+            let mut sentences = [wind_first[order].clone(), ship_words[(order + incidence as usize) % 3].clone(), seen];
+            sentences.rotate_left(order);
+            let prompt = sentences.join(". ").replace(".. ", ". ");
+            let reading = Reading::of(&prompt);
+            let reading = reading.map_err(|e| TestCaseError::fail(format!("{prompt}: {e}")))?;
+            let said = reading.scene;
+            prop_assert!(reading.unread.is_empty(), "{}: {:?}", prompt, reading);
+            prop_assert_eq!(said.ship, Some(true));
+            // Products in another order differ by a few units in the last place.
+            let near = |found: Option<f64>, value: f64| found.is_some_and(|found| (found - value).abs() <= 1e-12 * value.abs());
+            prop_assert!(near(said.ship_speed, ship_speed) && near(said.wind_speed, wind_speed), "{}: {:?}", prompt, said);
+            prop_assert!(near(said.fetch, metres), "{}: {:?}", prompt, said);
+            prop_assert_eq!(said.ship_heading, Some(heading));
+            prop_assert_eq!(said.wind_toward, Some((from + 180.0) % 360.0));
+            prop_assert_eq!(said.incidence, Some(f64::from(incidence)));
+        }
+    }
+
     #[test]
     fn long_hostile_prompts_are_read_in_linear_time() {
         for unit in [
@@ -360,6 +497,17 @@ mod tests {
             let prompt = unit.repeat(30_000);
             let _ = PartialScene::read(&prompt);
         }
+    }
+
+    #[test]
+    fn a_reading_prints_its_keys_and_what_it_left() {
+        let reading = Reading::of("ship at 8 m/s in a swell of 2 m\u{1b}").unwrap();
+        let expected = "there is a ship\nship.speed = 8 m/s\nnot read: \"swell of 2 m\\u{1b}\"";
+        assert_eq!(reading.to_string(), expected);
+        let nothing = Reading::of("a photo of a cat").unwrap();
+        assert_eq!(nothing.to_string(), "the prompt states nothing of a scene");
+        let long = Reading::of(&"depth ".repeat(100)).unwrap();
+        assert!(long.to_string().chars().count() < 140, "{long}");
     }
 
     #[test]

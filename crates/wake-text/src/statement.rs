@@ -1,7 +1,12 @@
-//! What a prompt states of a scene.
+//! What a prompt states of a scene, and how its statements come together.
 
+use crate::amounts::Dimension;
 use crate::error::{Error, Result};
+use crate::pieces::Text;
+use crate::subjects::Subject;
 use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::ops::Range;
 use wake_physics::{Scene, scene::Ship};
 
 /// The values a prompt states; what it does not say is `None`.
@@ -79,13 +84,207 @@ impl PartialScene {
     }
 
     /// Checks that some scene can have the stated values, which the prompt gives in `words`.
-    pub(crate) fn check(&self, words: &str) -> Result<()> {
+    fn check(&self, words: &str) -> Result<()> {
         let mut scene = Scene::default();
         self.set(&mut scene);
         scene.validate().map_err(|source| Error::Impossible {
             words: words.to_owned(),
             source,
         })
+    }
+}
+
+impl fmt::Display for PartialScene {
+    /// Whether there is a ship, then the stated values under their keys in a scene file, one a line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self.ship {
+            Some(true) => "there is a ship",
+            Some(false) => "there is no ship",
+            None => "nothing is said of a ship",
+        })?;
+        let values = [
+            ("ship.speed", self.ship_speed, "m/s"),
+            ("ship.heading", self.ship_heading, "degrees"),
+            ("sea.wind_speed", self.wind_speed, "m/s"),
+            ("sea.wind_toward", self.wind_toward, "degrees"),
+            ("sea.fetch", self.fetch, "m"),
+            ("radar.incidence", self.incidence, "degrees"),
+        ];
+        for (key, value, unit) in values {
+            if let Some(value) = value {
+                write!(f, "\n{key} = {value} {unit}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One of the values a prompt can state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Value {
+    ShipSpeed,
+    ShipHeading,
+    WindSpeed,
+    WindToward,
+    Fetch,
+    Incidence,
+}
+
+impl Value {
+    pub(crate) fn of(subject: Subject, dimension: Dimension) -> Option<Self> {
+        match (subject, dimension) {
+            (Subject::Ship | Subject::Heading, Dimension::Speed) => Some(Self::ShipSpeed),
+            (Subject::Ship | Subject::Heading, Dimension::Angle) => Some(Self::ShipHeading),
+            (Subject::Wind | Subject::Fetch, Dimension::Speed) => Some(Self::WindSpeed),
+            (Subject::Wind | Subject::Fetch, Dimension::Angle) => Some(Self::WindToward),
+            (Subject::Fetch, Dimension::Length) => Some(Self::Fetch),
+            (Subject::Incidence, Dimension::Angle) => Some(Self::Incidence),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn is_direction(self) -> bool {
+        matches!(self, Self::ShipHeading | Self::WindToward)
+    }
+
+    fn slot(self, said: &mut PartialScene) -> &mut Option<f64> {
+        match self {
+            Self::ShipSpeed => &mut said.ship_speed,
+            Self::ShipHeading => &mut said.ship_heading,
+            Self::WindSpeed => &mut said.wind_speed,
+            Self::WindToward => &mut said.wind_toward,
+            Self::Fetch => &mut said.fetch,
+            Self::Incidence => &mut said.incidence,
+        }
+    }
+}
+
+/// A value as stated: within `margin` of `number`, by the words at a place.
+struct Stated {
+    value: Value,
+    number: f64,
+    margin: f64,
+    place: Range<usize>,
+}
+
+/// The values found so far and the words that state them.
+pub(crate) struct Statement<'p> {
+    prompt: &'p str,
+    text: &'p Text<'p>,
+    values: Vec<Stated>,
+    ship: Option<Range<usize>>,
+    wake: bool,
+    no_ship: Option<Range<usize>>,
+}
+
+impl<'p> Statement<'p> {
+    pub(crate) fn new(prompt: &'p str, text: &'p Text<'p>) -> Self {
+        Self {
+            prompt,
+            text,
+            values: Vec::new(),
+            ship: None,
+            wake: false,
+            no_ship: None,
+        }
+    }
+
+    /// Takes in that a subject is named.
+    pub(crate) fn name(&mut self, subject: Subject, place: Range<usize>) {
+        match subject {
+            Subject::Ship => self.ship = Some(place),
+            Subject::Wake => self.wake = true,
+            _ => {}
+        }
+    }
+
+    /// Takes in that there is no ship.
+    pub(crate) fn deny_ship(&mut self, place: Range<usize>) {
+        self.no_ship = Some(place);
+    }
+
+    /// Notes a value, which must be possible and agree with one noted before; the closer one counts.
+    pub(crate) fn set(
+        &mut self,
+        value: Value,
+        number: f64,
+        margin: f64,
+        place: Range<usize>,
+    ) -> Result<()> {
+        let mut alone = PartialScene::default();
+        *value.slot(&mut alone) = Some(number);
+        alone.check(&self.words(&place))?;
+        let number = if value.is_direction() {
+            number.rem_euclid(360.0) % 360.0
+        } else {
+            number
+        };
+        let old = self.values.iter_mut().find(|old| old.value == value);
+        let Some(old) = old else {
+            self.values.push(Stated {
+                value,
+                number,
+                margin,
+                place,
+            });
+            return Ok(());
+        };
+        let apart = (number - old.number).abs();
+        let apart = if value.is_direction() {
+            apart.min(360.0 - apart)
+        } else {
+            apart
+        };
+        let allowed = if margin > 0.0 && old.margin > 0.0 {
+            0.0
+        } else {
+            margin.max(old.margin)
+        };
+        if apart > allowed + 1e-9 * old.number.abs() {
+            let first = old.place.clone();
+            return Err(self.contradiction(first, place));
+        }
+        if margin < old.margin {
+            *old = Stated {
+                value,
+                number,
+                margin,
+                place,
+            };
+        }
+        Ok(())
+    }
+
+    pub(crate) fn finish(self) -> Result<PartialScene> {
+        let mut said = PartialScene::default();
+        for stated in &self.values {
+            *stated.value.slot(&mut said) = Some(stated.number);
+        }
+        let of_ship =
+            |stated: &&Stated| matches!(stated.value, Value::ShipSpeed | Value::ShipHeading);
+        let stated = self
+            .values
+            .iter()
+            .find(of_ship)
+            .map(|stated| stated.place.clone());
+        said.ship = match (stated.or(self.ship.clone()), self.no_ship.clone()) {
+            (Some(present), Some(absent)) => return Err(self.contradiction(absent, present)),
+            (Some(_), None) => Some(true),
+            (None, Some(_)) => Some(false),
+            (None, None) => self.wake.then_some(true),
+        };
+        Ok(said)
+    }
+
+    fn words(&self, place: &Range<usize>) -> String {
+        self.prompt[self.text.span(place.clone())].to_owned()
+    }
+
+    fn contradiction(&self, first: Range<usize>, second: Range<usize>) -> Error {
+        Error::Contradiction {
+            first: self.words(&first),
+            second: self.words(&second),
+        }
     }
 }
 

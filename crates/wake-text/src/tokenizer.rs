@@ -3,10 +3,10 @@
 use crate::cleaning::{Cleaned, clean};
 use crate::error::Result;
 use crate::vocabulary::{END_MARK, START_MARK, Vocabulary, to_symbols};
-use crate::words::for_words;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::LazyLock;
+use tokenizers::utils::SysRegex;
 
 /// Number of tokens the text encoder of CLIP takes, start and end mark included.
 pub const TOKENS: usize = 77;
@@ -64,38 +64,18 @@ impl Tokenizer {
     }
 
     /// A tokenizer with the vocabulary of a folder, such as that of a Stable Diffusion model or its
-    /// subfolder `tokenizer`.
+    /// subfolder `tokenizer`. Only vocabulary and merges are taken from it; cleaning and splitting are CLIP's.
     ///
     /// It reads `vocab.json` and `merges.txt`, else `tokenizer.json`; and, where there is a
     /// `special_tokens_map.json`, its padding token.
     ///
     /// # Errors
     ///
-    /// [`Error::NoVocabulary`](crate::Error::NoVocabulary) if none of these files is there, else as
-    /// [`Tokenizer::from_files`].
+    /// [`Error::NoVocabulary`](crate::Error::NoVocabulary) if none of these files is there,
+    /// [`Error::File`](crate::Error::File) if one cannot be read,
+    /// [`Error::Vocabulary`](crate::Error::Vocabulary) with the line where one is broken.
     pub fn from_folder(folder: &Path) -> Result<Self> {
         Vocabulary::from_folder(folder).map(Self::new)
-    }
-
-    /// A tokenizer with another vocabulary, from `vocab.json` and `merges.txt`.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::File`](crate::Error::File) if a file cannot be read,
-    /// [`Error::Vocabulary`](crate::Error::Vocabulary) with the line where it is broken.
-    pub fn from_files(vocab: &Path, merges: &Path) -> Result<Self> {
-        Vocabulary::from_files(vocab, merges).map(Self::new)
-    }
-
-    /// A tokenizer with another vocabulary, from `tokenizer.json`.
-    ///
-    /// Only vocabulary and merges are taken from the file; cleaning and splitting are CLIP's.
-    ///
-    /// # Errors
-    ///
-    /// As [`Tokenizer::from_files`].
-    pub fn from_tokenizer_json(path: &Path) -> Result<Self> {
-        Vocabulary::from_tokenizer_json(path).map(Self::new)
     }
 
     /// Writes the files that transformers' `CLIPTokenizer` and [`Tokenizer::from_folder`] read:
@@ -153,15 +133,23 @@ impl Tokenizer {
     }
 
     fn push_words(&self, text: &str, range: std::ops::Range<usize>, row: &mut Row) {
-        for_words(&text[range.clone()], |word| {
-            let start = range.start + word.start;
-            let word = &text[start..range.start + word.end];
+        for (from, to) in words().find_iter(&text[range.clone()]) {
+            let start = range.start + from;
+            let word = &text[start..range.start + to];
             let symbols = to_symbols(word);
             self.vocabulary.for_tokens(&symbols, |id, at| {
                 row.push(id, || start + symbols[..at].chars().count());
             });
-        });
+        }
     }
+}
+
+/// CLIP's words: an English contraction, a run of letters, one digit, or a run of anything else but white space.
+fn words() -> &'static SysRegex {
+    const WORD: &str = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+";
+    static PATTERN: LazyLock<SysRegex> =
+        LazyLock::new(|| SysRegex::new(WORD).expect("a constant pattern"));
+    &PATTERN
 }
 
 /// The 77 ids while they are filled.
@@ -270,6 +258,20 @@ mod tests {
         assert_eq!(encode("").token_count, 2);
         assert_eq!(encode(&words).token_count, 2_002);
         assert_eq!(encode(&digits).token_count, 10_002);
+    }
+
+    #[test]
+    fn contractions_are_words_of_their_own() {
+        let text = "i've 's'll !'s 'x don't 12";
+        let found: Vec<&str> = words()
+            .find_iter(text)
+            .into_iter()
+            .map(|(from, to)| &text[from..to])
+            .collect();
+        let expected = [
+            "i", "'ve", "'s", "'ll", "!'", "s", "'", "x", "don", "'t", "1", "2",
+        ];
+        assert_eq!(found, expected);
     }
 
     #[test]

@@ -6,7 +6,6 @@
 
 use crate::error::{Error, Result};
 use crate::vocabulary_files::{parse_merges, parse_pad, parse_tokenizer, parse_vocab, read};
-use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::io::Read;
@@ -21,9 +20,6 @@ pub(crate) const END_MARK: &str = "<|endoftext|>";
 /// Marks the last symbol of a word.
 const WORD_END: &str = "</w>";
 
-/// Words of several tokens that each thread remembers.
-const CACHED_WORDS: usize = 10_000;
-
 const CLIP_NAME: &str = "assets/clip_merges.txt.gz";
 const CLIP_MERGES: &[u8] = include_bytes!("../assets/clip_merges.txt.gz");
 
@@ -31,8 +27,6 @@ const CLIP_MERGES: &[u8] = include_bytes!("../assets/clip_merges.txt.gz");
 #[derive(Debug, Clone)]
 pub(crate) struct Vocabulary {
     bpe: BPE,
-    /// The words that end up as one token, as symbols: most words of a prompt, found without merging.
-    whole_words: Vocab,
     pub(crate) start: u32,
     pub(crate) end: u32,
     pub(crate) pad: u32,
@@ -51,15 +45,15 @@ impl Vocabulary {
         Ok((clip_vocab(&merges), merges))
     }
 
-    pub(crate) fn from_files(vocab_path: &Path, merges_path: &Path) -> Result<Self> {
+    fn from_files(vocab_path: &Path, merges_path: &Path) -> Result<Self> {
         let vocab = parse_vocab(vocab_path, &read(vocab_path)?)?;
         let merges = parse_merges(merges_path, &read(merges_path)?, Some(&vocab))?;
-        Self::build(vocab_path, vocab, merges).map(Self::checked)
+        Self::build(vocab_path, vocab, merges)
     }
 
-    pub(crate) fn from_tokenizer_json(path: &Path) -> Result<Self> {
+    fn from_tokenizer_json(path: &Path) -> Result<Self> {
         let (vocab, merges) = parse_tokenizer(path, &read(path)?)?;
-        Self::build(path, vocab, merges).map(Self::checked)
+        Self::build(path, vocab, merges)
     }
 
     pub(crate) fn from_folder(folder: &Path) -> Result<Self> {
@@ -116,7 +110,6 @@ impl Vocabulary {
     }
 
     fn build(path: &Path, vocab: Vocab, merges: Merges) -> Result<Self> {
-        let whole_words = word_ends(&vocab);
         let bpe = BPE::builder()
             .vocab_and_merges(vocab, merges)
             .unk_token(END_MARK.to_owned())
@@ -130,33 +123,14 @@ impl Vocabulary {
         let end = id(&bpe, path, END_MARK)?;
         Ok(Self {
             bpe,
-            whole_words,
             start,
             end,
             pad: end,
         })
     }
 
-    /// Keeps only those whole words that the merges do make: in CLIP's vocabulary all, in another perhaps not.
-    fn checked(mut self) -> Self {
-        self.bpe.resize_cache(0); // its places are for words of several tokens
-        let words: Vec<_> = self.whole_words.into_iter().collect();
-        let bpe = &self.bpe;
-        let is_made = |(word, id): &(String, u32)| match bpe.tokenize(word).as_deref() {
-            Ok([token]) => token.id == *id,
-            _ => false,
-        };
-        let made: Vec<_> = words.into_par_iter().filter(is_made).collect();
-        self.whole_words = made.into_iter().collect();
-        self.bpe.resize_cache(CACHED_WORDS);
-        self
-    }
-
     /// The tokens of a word spelt in symbols: id, and first byte in the symbols.
     pub(crate) fn for_tokens(&self, word: &str, mut each: impl FnMut(u32, usize)) {
-        if let Some(&id) = self.whole_words.get(word) {
-            return each(id, 0);
-        }
         // Cannot fail: an unknown symbol becomes the end mark, which is in every vocabulary.
         for token in self.bpe.tokenize(word).unwrap_or_default() {
             each(token.id, token.offsets.0);
@@ -177,14 +151,6 @@ fn marks_json(pad: &str) -> Value {
     json!({
         "bos_token": START_MARK, "eos_token": END_MARK, "unk_token": END_MARK, "pad_token": pad,
     })
-}
-
-/// The tokens that end a word, without the mark, and their ids.
-fn word_ends(vocab: &Vocab) -> Vocab {
-    let ends = vocab
-        .iter()
-        .filter_map(|(token, &id)| Some((token.strip_suffix(WORD_END)?, id)));
-    ends.map(|(word, id)| (word.to_owned(), id)).collect()
 }
 
 fn embedded_merges() -> Result<String> {
@@ -324,28 +290,6 @@ mod tests {
             [id("!"), id("ship</w>"), id("jekyll</w>")],
             [Some(0), Some(1158), Some(49_405)]
         );
-    }
-
-    #[test]
-    fn every_whole_word_is_what_the_merges_make() {
-        let all = embedded();
-        assert_eq!(all.whole_words.len(), 34_483);
-        let checked = embedded().checked();
-        assert_eq!(checked.whole_words, all.whole_words);
-    }
-
-    #[test]
-    fn a_word_the_merges_do_not_make_is_not_whole() {
-        // "ab" has a token, but "b" and the word's end merge first, so that "a" stays alone.
-        let tokens = ["a", "b</w>", "ab", "ab</w>", "b", START_MARK, END_MARK];
-        let vocab: Vocab = tokens.map(str::to_owned).into_iter().zip(0..).collect();
-        let vocabulary = Vocabulary::build(Path::new(""), vocab, Merges::new()).unwrap();
-        assert!(vocabulary.whole_words.contains_key("ab"));
-        let mut ids = Vec::new();
-        vocabulary
-            .checked()
-            .for_tokens("ab", |id, at| ids.push((id, at)));
-        assert_eq!(ids, [(0, 0), (1, 1)]);
     }
 
     #[test]
@@ -497,7 +441,6 @@ mod tests {
         let again = Vocabulary::from_folder(saved.path()).unwrap();
         let clip = embedded();
         assert_eq!(again.bpe.get_vocab(), clip.bpe.get_vocab());
-        assert_eq!(again.whole_words, clip.whole_words);
         assert_eq!(
             (again.start, again.end, again.pad),
             (clip.start, clip.end, 0)
@@ -532,7 +475,7 @@ mod tests {
             not_utf8.contains("vocab.json, line 2, column 2: this is not UTF-8"),
             "{not_utf8}"
         );
-        let missing = Tokenizer::from_tokenizer_json(Path::new("nowhere.json")).unwrap_err();
+        let missing = Vocabulary::from_tokenizer_json(Path::new("nowhere.json")).unwrap_err();
         assert!(matches!(missing, Error::File { .. }));
     }
 

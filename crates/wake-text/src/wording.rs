@@ -164,7 +164,7 @@ fn brief(ship: Ship, wind: Wind, incidence: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{TOKENS, Tokenizer};
+    use crate::{Reading, TOKENS, Tokenizer};
     use proptest::prelude::*;
     use wake_physics::scene::{Ship, paper_grid};
 
@@ -253,7 +253,9 @@ mod tests {
                 "{} tokens: {prompt}",
                 tokens.token_count
             );
-            let said = PartialScene::read(&prompt).unwrap();
+            let reading = Reading::of(&prompt).unwrap();
+            assert_eq!(reading.unread, [], "{prompt}");
+            let said = reading.scene;
             assert_eq!(said, PartialScene::of(scene), "{prompt}");
             assert_states(&said, scene);
             let again = said.onto(&Scene::default()).unwrap();

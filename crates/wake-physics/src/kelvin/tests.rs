@@ -41,7 +41,7 @@ fn elevations(wake: &KelvinWake, raster: &Raster, places: &[[f64; 2]], tolerance
 }
 
 /// The value quoted by Doctors and Beck (1987), Table 1, within the 1e-3 by which Michell's integral itself
-/// differs from it, and the other entries of the reference table to their last digit.
+/// differs from it, and all entries by our own second implementation, `tests/reference/ship.py`, to their last digit.
 #[test]
 fn wave_resistance_of_the_standard_hull() {
     let hull = Hull::wigley(1.0, 0.1, 0.0625);
@@ -70,7 +70,7 @@ fn wave_resistance_of_the_standard_hull() {
     }
 }
 
-/// Newtons for the scene's ship, from the reference table with four digits (truncated at λ = 60).
+/// Newtons for the scene's ship, by `tests/reference/ship.py`: four digits (truncated at λ = 60).
 #[test]
 fn wave_resistance_of_the_scene_ship() {
     for (speed, expected) in [

@@ -76,7 +76,7 @@ mod tests {
     use crate::constants::SPEED_OF_LIGHT;
     use crate::permittivity::sea_water;
 
-    /// |g|² and `k_B` of an independent programme at 9.6 GHz, 20 °C, 35 psu.
+    /// |g|² and `k_B` by our own second implementation, `tests/reference/sea_and_scattering.py`, at 9.6 GHz, 20 °C, 35 psu.
     #[test]
     fn coefficients_meet_the_reference() {
         let table = [

@@ -295,7 +295,7 @@ mod tests {
         );
     }
 
-    /// Six-digit values of an independent programme.
+    /// Six-digit values of our own second implementation, `tests/reference/sea_and_scattering.py`.
     #[test]
     fn curvature_and_anisotropy_meet_the_reference() {
         let k = [1.0, 10.0, 100.0, 200.0, 370.0];
@@ -309,7 +309,7 @@ mod tests {
         }
     }
 
-    /// Wave height, peak and slope variances of the same programme; four digits, hence half a unit of the last.
+    /// Wave height, peak and slope variances of the same; four digits, hence half a unit of the last.
     #[test]
     fn moments_meet_the_reference() {
         let table = [
@@ -340,6 +340,7 @@ mod tests {
         4.0 * sum.sqrt()
     }
 
+    /// Growing seas, by the same.
     #[test]
     fn a_fetch_makes_the_reference_seas() {
         let table = [

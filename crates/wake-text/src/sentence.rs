@@ -1,0 +1,490 @@
+//! A sentence of a prompt while it is read.
+
+use crate::amounts::{Amount, Dimension, Group, group, is_unit};
+use crate::compass::{Compass, Form, POINT, compass, is_compass};
+use crate::error::Result;
+use crate::pieces::{Kind, Piece, word_at};
+use crate::statement::{PartialScene, Statement, Value};
+use crate::subjects::{
+    Denied, Named, Subject, denials, is_at_rest, is_link, is_motion, noun, subjects, word_before,
+};
+use std::ops::Range;
+
+/// Subjects on each side among which the owner of a number is sought.
+const NEAR: usize = 64;
+
+/// Whether a piece has been taken in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mark {
+    Open,
+    Used,
+    Unread,
+    /// Says that there is no wake: used where there is no ship.
+    NoWake,
+}
+
+/// Where a direction points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Toward,
+    From,
+}
+
+/// A sentence while it is read.
+pub(crate) struct Sentence<'t, 'a> {
+    pieces: &'t [Piece<'a>],
+    marks: Vec<Mark>,
+    subjects: Vec<Named>,
+}
+
+impl<'t, 'a> Sentence<'t, 'a> {
+    pub(crate) fn new(pieces: &'t [Piece<'a>]) -> Self {
+        Self {
+            pieces,
+            marks: vec![Mark::Open; pieces.len()],
+            subjects: subjects(pieces),
+        }
+    }
+
+    pub(crate) fn read(&mut self, statement: &mut Statement<'_>) -> Result<()> {
+        for denied in denials(self.pieces) {
+            self.deny(&denied, statement)?;
+        }
+        for named in &self.subjects {
+            statement.name(named.subject, self.place(named.at..named.at + 1));
+        }
+        let mut at = 0;
+        while at < self.pieces.len() {
+            if self.marks[at] != Mark::Open {
+                at += 1;
+            } else if let Some(group) = group(self.pieces, at) {
+                at = match group {
+                    Group::One(amount, end) => {
+                        self.mark(amount.pieces.end..end, Mark::Unread);
+                        self.measure(&amount, statement)?;
+                        end
+                    }
+                    Group::NoValue(end) => {
+                        self.mark(at..end, Mark::Unread);
+                        end
+                    }
+                };
+            } else if let Some(compass) = compass(self.pieces, at) {
+                at = self.point(&compass, statement)?;
+            } else {
+                self.rest(at, statement)?;
+                at += 1;
+            }
+        }
+        Ok(())
+    }
+
+    fn place(&self, pieces: Range<usize>) -> Range<usize> {
+        self.pieces[pieces.start].place.start..self.pieces[pieces.end - 1].place.end
+    }
+
+    fn mark(&mut self, pieces: Range<usize>, mark: Mark) {
+        self.marks[pieces].fill(mark);
+    }
+
+    /// Takes in what is denied; its subjects own nothing.
+    fn deny(&mut self, denied: &Denied, statement: &mut Statement<'_>) -> Result<()> {
+        self.subjects
+            .retain(|named| !denied.pieces.contains(&named.at));
+        let place = self.place(denied.pieces.clone());
+        let mark = match denied.subject {
+            None | Some(Subject::Wave) => Mark::Unread,
+            Some(Subject::Wake) => Mark::NoWake,
+            Some(_) => Mark::Used,
+        };
+        self.mark(denied.pieces.clone(), mark);
+        match denied.subject {
+            Some(Subject::Ship) => statement.deny_ship(place),
+            Some(Subject::Wind) => statement.set(Value::WindSpeed, 0.0, 0.0, place)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Takes in a number with its unit.
+    fn measure(&mut self, amount: &Amount, statement: &mut Statement<'_>) -> Result<()> {
+        let pieces = amount.pieces.clone();
+        let owner = amount
+            .dimension
+            .and_then(|dimension| self.owner(pieces.clone(), dimension));
+        let value = owner
+            .zip(amount.dimension)
+            .and_then(|((named, _), dimension)| Value::of(named.subject, dimension));
+        let Some(((owner, right_after), value)) = owner.zip(value) else {
+            if let Some((owner, right_after)) = owner.filter(|(owner, _)| is_own(owner.subject)) {
+                // What a foreign thing has is named with it.
+                let end = if right_after {
+                    owner.at + 1
+                } else {
+                    pieces.end
+                };
+                let near = owner.at < pieces.start && pieces.start - owner.at <= 3;
+                self.mark(
+                    if near { owner.at } else { pieces.start }..end,
+                    Mark::Unread,
+                );
+            }
+            self.mark(pieces, Mark::Unread);
+            return Ok(());
+        };
+        let end = if right_after {
+            owner.at + 1
+        } else {
+            pieces.end
+        };
+        let (way, start) = self.way(pieces.start);
+        let turned = value.is_direction() && way == Some(Way::From);
+        let number = if turned {
+            amount.value + 180.0
+        } else {
+            amount.value
+        };
+        statement.set(value, number, 0.0, self.place(pieces.start..end))?;
+        self.mark(
+            if value.is_direction() {
+                start
+            } else {
+                pieces.start
+            }..pieces.end,
+            Mark::Used,
+        );
+        self.mark(owner.at..owner.at + 1, Mark::Used);
+        Ok(())
+    }
+
+    /// Takes in a compass word; the piece after it.
+    fn point(&mut self, compass: &Compass, statement: &mut Statement<'_>) -> Result<usize> {
+        let Range { start, end } = compass.pieces;
+        let (way, from) = self.way(start);
+        let found = self.direction(compass, way);
+        // "se" may be a word of another language; after "wind" or "5 m/s" it is a direction.
+        let letters =
+            end == start + 1 && word_at(self.pieces, start).is_some_and(|word| !is_compass(word));
+        let leading = self.before(start).and_then(|at| word_at(self.pieces, at));
+        let foreign = letters
+            && !leading
+                .is_some_and(|word| noun(word).is_some() || is_attribute(word) || is_unit(word));
+        match found {
+            Some((value, way)) => {
+                let turn = if way == Way::From { 180.0 } else { 0.0 };
+                let place = self.place(start..end);
+                statement.set(value, compass.degrees + turn, 0.5 * POINT, place)?;
+                self.mark(from..end, Mark::Used);
+            }
+            None if foreign && way.is_none() => {}
+            None => {
+                let heading =
+                    |at: &usize| word_at(self.pieces, *at).and_then(noun) == Some(Subject::Heading);
+                let leading = self.before(start).filter(heading).unwrap_or(start);
+                self.mark(leading.min(from)..end, Mark::Unread);
+            }
+        }
+        Ok(end)
+    }
+
+    /// Which direction a compass word states.
+    fn direction(&self, found: &Compass, way: Option<Way>) -> Option<(Value, Way)> {
+        let Range { start, end } = found.pieces.clone();
+        if self.is_of_many(&found.pieces) {
+            return None;
+        }
+        let next = self.described(end);
+        let leading = self.before(start).and_then(|at| word_at(self.pieces, at));
+        let moves = leading.is_some_and(leads);
+        if let (Some(subject), None) = (next, way) {
+            return match (subject, found.form) {
+                // "heading north wind": of ship or wind?
+                (Subject::Wind, _) if moves => None,
+                (Subject::Wind, Form::Ward) => Some((Value::WindToward, Way::Toward)),
+                (Subject::Wind, _) => Some((Value::WindToward, Way::From)),
+                (Subject::Heading, _) | (Subject::Ship, Form::Ward) => {
+                    Some((Value::ShipHeading, Way::Toward))
+                }
+                _ => None,
+            };
+        }
+        let (owner, _) = self.owner(start..end, Dimension::Angle)?;
+        let value = Value::of(owner.subject, Dimension::Angle)?;
+        if next.is_none() && !self.may_follow(end) {
+            return None;
+        }
+        let before = self.before(start);
+        let of_wind = value == Value::WindToward;
+        match (way, found.form) {
+            (Some(Way::From), _)
+                if of_wind
+                    || before
+                        .is_some_and(|at| word_before(self.pieces, at).is_some_and(is_motion)) =>
+            {
+                Some((value, Way::From))
+            }
+            (Some(Way::From), _) => None,
+            (Some(Way::Toward), _) | (None, Form::Ward) => Some((value, Way::Toward)),
+            (None, Form::Erly) if of_wind => Some((value, Way::From)),
+            (None, Form::Ern) => None,
+            (None, _) => moves.then_some((value, Way::Toward)),
+        }
+    }
+
+    /// Whether a compass word is one of several: "north to east".
+    fn is_of_many(&self, pieces: &Range<usize>) -> bool {
+        let joins =
+            |at: usize| matches!(word_at(self.pieces, at), Some("to" | "or" | "and" | "by"));
+        let (start, end) = (pieces.start, pieces.end);
+        let after = compass(self.pieces, end + usize::from(joins(end))).is_some();
+        let join = start
+            .checked_sub(1)
+            .filter(|&at| joins(at))
+            .unwrap_or(start);
+        let before = (join.saturating_sub(3)..join).filter_map(|at| compass(self.pieces, at));
+        after || before.into_iter().any(|before| before.pieces.end == join)
+    }
+
+    /// The subject that the words from a piece on describe, across its strength and a number.
+    fn described(&self, from: usize) -> Option<Subject> {
+        let strengths = [
+            "light", "gentle", "moderate", "fresh", "strong", "stiff", "weak", "steady",
+        ];
+        let mut at = from;
+        while let Some(Group::One(_, end)) = group(self.pieces, at) {
+            at = end;
+        }
+        while word_at(self.pieces, at).is_some_and(|word| strengths.contains(&word)) {
+            at += 1;
+        }
+        let word = word_at(self.pieces, at)?;
+        noun(word).filter(|_| !is_motion(word))
+    }
+
+    /// Whether a compass word may end before a piece: "the north of", "the North Sea" are places.
+    fn may_follow(&self, at: usize) -> bool {
+        match word_at(self.pieces, at) {
+            None => true,
+            Some(word) => {
+                is_link(word)
+                    || word.ends_with("ly")
+                    || matches!(word, "direction" | "directions" | "course")
+            }
+        }
+    }
+
+    /// The piece before one, across words that say nothing.
+    fn before(&self, at: usize) -> Option<usize> {
+        let fills = |at: &usize| {
+            matches!(self.pieces[*at].kind, Kind::Colon)
+                || word_at(self.pieces, *at).is_some_and(is_filler)
+        };
+        (0..at).rev().find(|at| !fills(at))
+    }
+
+    /// Whether a preposition before a piece says where a direction points, and where it starts.
+    fn way(&self, at: usize) -> (Option<Way>, usize) {
+        let Some(before) = self.before(at) else {
+            return (None, at);
+        };
+        match word_at(self.pieces, before) {
+            Some("from") => (Some(Way::From), before),
+            Some("out") if word_at(self.pieces, before + 1) == Some("of") => {
+                (Some(Way::From), before)
+            }
+            Some("to" | "toward" | "towards") => (Some(Way::Toward), before),
+            _ => (None, at),
+        }
+    }
+
+    /// The subject that a quantity belongs to, and whether it stands right after it.
+    fn owner(&self, quantity: Range<usize>, dimension: Dimension) -> Option<(Named, bool)> {
+        let able = |named: &&Named| named.subject.can_have(dimension);
+        let start = self
+            .subjects
+            .partition_point(|named| named.at < quantity.start);
+        let (before, after) = self.subjects.split_at(start);
+        let before = before.iter().rev().take(NEAR).find(able);
+        let next = after.iter().take(NEAR).find(able);
+        let right_after = next
+            .filter(|named| self.is_one_phrase(quantity.end..named.at) && !self.is_label(named.at));
+        match right_after {
+            Some(named) => Some((*named, true)),
+            None => before.or(next).map(|named| (*named, false)),
+        }
+    }
+
+    /// Whether a colon follows a word, perhaps after two more: "wind speed: 3 mps".
+    fn is_label(&self, at: usize) -> bool {
+        let mut next = self.pieces.iter().skip(at + 1).take(3);
+        let mark = next.find(|piece| !matches!(piece.kind, Kind::Word(_)));
+        mark.is_some_and(|piece| piece.kind == Kind::Colon)
+    }
+
+    /// Whether what stands between a unit and a noun is at most two words that describe the noun.
+    fn is_one_phrase(&self, between: Range<usize>) -> bool {
+        between.len() <= 2
+            && between
+                .into_iter()
+                .all(|at| word_at(self.pieces, at).is_some_and(|word| !is_link(word)))
+    }
+
+    /// Takes in that a ship makes no way.
+    fn rest(&mut self, at: usize, statement: &mut Statement<'_>) -> Result<()> {
+        let Some(word) = word_at(self.pieces, at) else {
+            return Ok(());
+        };
+        let two = word == "at" && matches!(word_at(self.pieces, at + 1), Some("rest" | "anchor"));
+        let has_ship = self
+            .subjects
+            .iter()
+            .any(|named| named.subject == Subject::Ship);
+        if has_ship && (two || is_at_rest(word)) {
+            let pieces = at..at + 1 + usize::from(two);
+            statement.set(Value::ShipSpeed, 0.0, 0.0, self.place(pieces.clone()))?;
+            self.mark(pieces, Mark::Used);
+        }
+        Ok(())
+    }
+
+    /// The places of what was not taken in; neighbours are one.
+    pub(crate) fn unread(&self, scene: &PartialScene) -> Vec<Range<usize>> {
+        let unread = |at: &usize| self.is_unread(*at, scene);
+        let mut places: Vec<Range<usize>> = Vec::new();
+        let mut last = usize::MAX;
+        for at in (0..self.pieces.len()).filter(unread) {
+            let place = self.pieces[at].place.clone();
+            match places.last_mut() {
+                Some(before) if last + 1 == at => before.end = place.end,
+                _ => places.push(place),
+            }
+            last = at;
+        }
+        places
+    }
+
+    fn is_unread(&self, at: usize, scene: &PartialScene) -> bool {
+        let word = match (self.marks[at], self.pieces[at].kind) {
+            (Mark::Used, _) => return false,
+            (Mark::NoWake, _) => return scene.ship != Some(false),
+            (Mark::Unread, _) | (_, Kind::Number(_) | Kind::Figure | Kind::PlusMinus) => {
+                return true;
+            }
+            (Mark::Open, Kind::Word(word)) => word,
+            _ => return false,
+        };
+        let near = |way: usize| {
+            let near = at.saturating_sub(way)..self.pieces.len().min(at + way + 1);
+            self.marks[near].contains(&Mark::Used)
+        };
+        match noun(word) {
+            Some(Subject::Ship | Subject::Wake | Subject::Bystander) => false,
+            Some(Subject::Wind) => scene.wind_speed.or(scene.wind_toward).is_none(),
+            Some(Subject::Wave) => scene.wind_speed.is_none(),
+            Some(Subject::Fetch) => scene.fetch.is_none(),
+            Some(Subject::Incidence) => scene.incidence.is_none(),
+            Some(Subject::Heading | Subject::Angle) => !near(4),
+            Some(_) => true,
+            None if is_attribute(word) => !near(4),
+            None => is_unit(word) || is_compass(word) || is_at_rest(word) || is_unstated(word),
+        }
+    }
+}
+
+/// Whether a compass word after this one says where something goes.
+fn leads(word: &str) -> bool {
+    is_motion(word) || matches!(word, "heading" | "course" | "blowing" | "blows")
+}
+
+/// Whether a subject is named with the numbers that stay unread.
+fn is_own(subject: Subject) -> bool {
+    matches!(
+        subject,
+        Subject::Wave | Subject::Length | Subject::Degrees | Subject::Other
+    )
+}
+
+/// Whether a word between "from" and a direction says nothing.
+fn is_filler(word: &str) -> bool {
+    matches!(
+        word,
+        "about"
+            | "approximately"
+            | "approx"
+            | "around"
+            | "roughly"
+            | "nearly"
+            | "almost"
+            | "some"
+            | "ca"
+            | "circa"
+            | "a"
+            | "an"
+            | "the"
+            | "direction"
+            | "directions"
+            | "bearing"
+            | "of"
+            | "true"
+            | "due"
+            | "exactly"
+            | "is"
+            | "mainly"
+            | "generally"
+    )
+}
+
+/// Whether a word speaks of speed or direction, and so of a number nearby.
+fn is_attribute(word: &str) -> bool {
+    matches!(
+        word,
+        "speed"
+            | "speeds"
+            | "velocity"
+            | "direction"
+            | "directions"
+            | "directed"
+            | "directing"
+            | "toward"
+            | "towards"
+            | "angles"
+            | "bound"
+    )
+}
+
+/// Whether a word speaks of sea or radar, but of nothing a prompt can state.
+fn is_unstated(word: &str) -> bool {
+    matches!(
+        word,
+        "calm"
+            | "rough"
+            | "beaufort"
+            | "bft"
+            | "drifting"
+            | "polarization"
+            | "polarisation"
+            | "polarized"
+            | "polarised"
+            | "frequency"
+            | "ghz"
+            | "looks"
+            | "windy"
+            | "breezy"
+            | "wavy"
+            | "offshore"
+            | "downwind"
+            | "upwind"
+            | "crosswind"
+            | "leeward"
+            | "nadir"
+            | "northeasterlies"
+            | "westerlies"
+            | "easterlies"
+            | "trades"
+            | "hurricane"
+            | "buoy"
+            | "island"
+            | "coast"
+            | "ice"
+    )
+}
