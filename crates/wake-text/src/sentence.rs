@@ -334,7 +334,10 @@ impl<'t, 'a> Sentence<'t, 'a> {
         let Some(word) = word_at(self.pieces, at) else {
             return Ok(());
         };
-        let two = word == "at" && matches!(word_at(self.pieces, at + 1), Some("rest" | "anchor"));
+        let next = word_at(self.pieces, at + 1).unwrap_or_default();
+        let no_motion = (word == "not" || word.ends_with("n't"))
+            && matches!(next, "moving" | "sailing" | "underway");
+        let two = (word == "at" && matches!(next, "rest" | "anchor")) || no_motion;
         let has_ship = self
             .subjects
             .iter()
