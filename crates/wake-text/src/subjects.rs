@@ -1,6 +1,7 @@
 //! What a sentence speaks of, and what it denies.
 
 use crate::amounts::Dimension;
+use crate::compass::is_compass;
 use crate::pieces::{Kind, Piece, word_at};
 use std::ops::Range;
 
@@ -204,7 +205,7 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
             {
                 plain = 0
             }
-            _ if is_link(word) => understood = false,
+            _ if is_link(word) || is_at_rest(word) || is_compass(word) => understood = false,
             _ => plain += 1,
         }
     }
@@ -215,9 +216,7 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
 fn denied_nothing(sentence: &[Piece<'_>], pieces: Range<usize>) -> Option<Denied> {
     let says = |at: usize| match sentence[at].kind {
         Kind::Number(_) | Kind::Figure => true,
-        Kind::Word(word) => {
-            crate::compass::is_compass(word) || noun(word).is_some() || is_at_rest(word)
-        }
+        Kind::Word(word) => is_compass(word) || noun(word).is_some() || is_at_rest(word),
         _ => false,
     };
     pieces.clone().any(says).then_some(Denied {
