@@ -371,7 +371,7 @@ fn join_spelt<'a>(found: &mut Vec<Piece<'a>>, piece: &Piece<'a>) -> bool {
     };
     match (last, spelt(word)) {
         (Some((value, end)), _) if factor > 0.0 => {
-            (*value, *end) = (*value * factor, piece.place.end)
+            (*value, *end) = (*value * factor, piece.place.end);
         }
         (Some((value, end)), Some(more)) if continues(*value, more) => {
             (*value, *end) = (*value + more, piece.place.end);

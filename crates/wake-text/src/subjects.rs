@@ -203,7 +203,7 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
                 "of" | "sign" | "signs" | "trace" | "traces" | "kind" | "evidence"
             ) =>
             {
-                plain = 0
+                plain = 0;
             }
             _ if is_link(word) || is_at_rest(word) || is_compass(word) => understood = false,
             _ => plain += 1,
