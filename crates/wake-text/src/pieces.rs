@@ -292,19 +292,17 @@ fn fraction_after(text: &str) -> Option<(f64, usize)> {
 /// `½` and its like.
 fn vulgar(text: &str) -> Option<(f64, usize)> {
     let c = text.chars().next()?;
-    let value = match c {
-        '\u{BC}' => 0.25,
-        '\u{BD}' => 0.5,
-        '\u{BE}' => 0.75,
-        '\u{2153}' => 1.0 / 3.0,
-        '\u{2154}' => 2.0 / 3.0,
-        '\u{215B}' => 0.125,
-        '\u{215C}' => 0.375,
-        '\u{215D}' => 0.625,
-        '\u{215E}' => 0.875,
-        _ => return None,
-    };
-    Some((value, c.len_utf8()))
+    let eighths = [
+        ('¼', 2.0),
+        ('½', 4.0),
+        ('¾', 6.0),
+        ('⅛', 1.0),
+        ('⅜', 3.0),
+        ('⅝', 5.0),
+        ('⅞', 7.0),
+    ];
+    let (_, count) = eighths.into_iter().find(|&(sign, _)| sign == c)?;
+    Some((count / 8.0, c.len_utf8()))
 }
 
 /// Numbers in words.
@@ -408,25 +406,14 @@ fn word(text: &str) -> Option<(&str, usize)> {
     }
     let rest = &text[whole.len()..];
     let powers = ["-1", "^-1", "\u{2212}1", "\u{207B}\u{B9}"];
-    let power = powers.iter().find(|power| {
-        let after = rest.strip_prefix(**power).map(|after| after.chars().next());
-        matches!(whole, "s" | "ms" | "h" | "kmh")
-            && after.is_some_and(|next| !next.is_some_and(char::is_alphanumeric))
+    let means = [("s", "/s"), ("ms", "m/s"), ("h", "/h"), ("kmh", "km/h")];
+    let power = powers.iter().find_map(|power| {
+        let after = rest.strip_prefix(power)?.chars().next();
+        let ends = !after.is_some_and(char::is_alphanumeric);
+        let (_, per) = means.into_iter().find(|(unit, _)| ends && *unit == whole)?;
+        Some((per, whole.len() + power.len()))
     });
-    Some(match power {
-        Some(power) => (per(whole), whole.len() + power.len()),
-        None => (whole.strip_suffix("'s").unwrap_or(whole), whole.len()),
-    })
-}
-
-/// What `s-1` and its like mean.
-fn per(word: &str) -> &'static str {
-    match word {
-        "s" => "/s",
-        "ms" => "m/s",
-        "h" => "/h",
-        _ => "km/h",
-    }
+    Some(power.unwrap_or((whole.strip_suffix("'s").unwrap_or(whole), whole.len())))
 }
 
 /// An abbreviation such as `m.p.h.` or `n.e.`, and its length.

@@ -6,7 +6,8 @@ use crate::error::Result;
 use crate::pieces::{Kind, Piece, word_at};
 use crate::statement::{PartialScene, Statement, Value};
 use crate::subjects::{
-    Denied, Named, Subject, denials, is_at_rest, is_link, is_motion, noun, subjects, word_before,
+    Denied, Named, Subject, denials, is_at_rest, is_attribute, is_filler, is_link, is_motion,
+    is_unstated, leads, noun, subjects, word_before,
 };
 use std::ops::Range;
 
@@ -394,100 +395,10 @@ impl<'t, 'a> Sentence<'t, 'a> {
     }
 }
 
-/// Whether a compass word after this one says where something goes.
-fn leads(word: &str) -> bool {
-    is_motion(word) || matches!(word, "heading" | "course" | "blowing" | "blows")
-}
-
 /// Whether a subject is named with the numbers that stay unread.
 fn is_own(subject: Subject) -> bool {
     matches!(
         subject,
         Subject::Wave | Subject::Length | Subject::Degrees | Subject::Other
-    )
-}
-
-/// Whether a word between "from" and a direction says nothing.
-fn is_filler(word: &str) -> bool {
-    matches!(
-        word,
-        "about"
-            | "approximately"
-            | "approx"
-            | "around"
-            | "roughly"
-            | "nearly"
-            | "almost"
-            | "some"
-            | "ca"
-            | "circa"
-            | "a"
-            | "an"
-            | "the"
-            | "direction"
-            | "directions"
-            | "bearing"
-            | "of"
-            | "true"
-            | "due"
-            | "exactly"
-            | "is"
-            | "mainly"
-            | "generally"
-    )
-}
-
-/// Whether a word speaks of speed or direction, and so of a number nearby.
-fn is_attribute(word: &str) -> bool {
-    matches!(
-        word,
-        "speed"
-            | "speeds"
-            | "velocity"
-            | "direction"
-            | "directions"
-            | "directed"
-            | "directing"
-            | "toward"
-            | "towards"
-            | "angles"
-            | "bound"
-    )
-}
-
-/// Whether a word speaks of sea or radar, but of nothing a prompt can state.
-fn is_unstated(word: &str) -> bool {
-    matches!(
-        word,
-        "calm"
-            | "rough"
-            | "beaufort"
-            | "bft"
-            | "drifting"
-            | "polarization"
-            | "polarisation"
-            | "polarized"
-            | "polarised"
-            | "frequency"
-            | "ghz"
-            | "looks"
-            | "windy"
-            | "breezy"
-            | "wavy"
-            | "offshore"
-            | "downwind"
-            | "upwind"
-            | "crosswind"
-            | "leeward"
-            | "nadir"
-            | "northeasterlies"
-            | "westerlies"
-            | "easterlies"
-            | "trades"
-            | "hurricane"
-            | "buoy"
-            | "island"
-            | "coast"
-            | "ice"
     )
 }

@@ -312,70 +312,134 @@ pub(crate) fn word_before<'a>(sentence: &[Piece<'a>], at: usize) -> Option<&'a s
 
 /// Whether this word ends what is said of the noun before it.
 pub(crate) fn is_link(word: &str) -> bool {
-    matches!(
-        word,
-        "a" | "an"
-            | "the"
-            | "and"
-            | "or"
-            | "but"
-            | "while"
-            | "with"
-            | "without"
-            | "at"
-            | "in"
-            | "on"
-            | "by"
-            | "to"
-            | "toward"
-            | "towards"
-            | "from"
-            | "under"
-            | "over"
-            | "into"
-            | "for"
-            | "is"
-            | "are"
-            | "as"
-            | "its"
-            | "that"
-            | "which"
-            | "against"
-            | "through"
-            | "across"
-            | "no"
-    ) || is_motion(word)
+    [
+        "a", "an", "the", "and", "or", "but", "while", "with", "without", "at", "in", "on", "by",
+        "to", "toward", "towards", "from", "under", "over", "into", "for", "is", "are", "as",
+        "its", "that", "which", "against", "through", "across", "no",
+    ]
+    .contains(&word)
+        || is_motion(word)
         || matches!(word, "heading" | "blowing" | "blows")
 }
 
 /// Whether a word says that a ship moves.
 pub(crate) fn is_motion(word: &str) -> bool {
-    matches!(
-        word,
-        "moving"
-            | "moves"
-            | "move"
-            | "sailing"
-            | "sails"
-            | "sail"
-            | "steaming"
-            | "steams"
-            | "travelling"
-            | "traveling"
-            | "travels"
-            | "going"
-            | "goes"
-            | "cruising"
-            | "cruises"
-            | "running"
-            | "runs"
-            | "proceeding"
-            | "proceeds"
-            | "coming"
-            | "comes"
-            | "bound"
-            | "heads"
-            | "head"
-            | "headed"
-    )
+    [
+        "moving",
+        "moves",
+        "move",
+        "sailing",
+        "sails",
+        "sail",
+        "steaming",
+        "steams",
+        "travelling",
+        "traveling",
+        "travels",
+        "going",
+        "goes",
+        "cruising",
+        "cruises",
+        "running",
+        "runs",
+        "proceeding",
+        "proceeds",
+        "coming",
+        "comes",
+        "bound",
+        "heads",
+        "head",
+        "headed",
+    ]
+    .contains(&word)
+}
+
+/// Whether a word between "from" and a direction says nothing.
+pub(crate) fn is_filler(word: &str) -> bool {
+    [
+        "about",
+        "approximately",
+        "approx",
+        "around",
+        "roughly",
+        "nearly",
+        "almost",
+        "some",
+        "ca",
+        "circa",
+        "a",
+        "an",
+        "the",
+        "direction",
+        "directions",
+        "bearing",
+        "of",
+        "true",
+        "due",
+        "exactly",
+        "is",
+        "mainly",
+        "generally",
+    ]
+    .contains(&word)
+}
+
+/// Whether a word speaks of speed or direction, and so of a number nearby.
+pub(crate) fn is_attribute(word: &str) -> bool {
+    [
+        "speed",
+        "speeds",
+        "velocity",
+        "direction",
+        "directions",
+        "directed",
+        "directing",
+        "toward",
+        "towards",
+        "angles",
+        "bound",
+    ]
+    .contains(&word)
+}
+
+/// Whether a word speaks of sea or radar, but of nothing a prompt can state.
+pub(crate) fn is_unstated(word: &str) -> bool {
+    [
+        "calm",
+        "rough",
+        "beaufort",
+        "bft",
+        "drifting",
+        "polarization",
+        "polarisation",
+        "polarized",
+        "polarised",
+        "frequency",
+        "ghz",
+        "looks",
+        "windy",
+        "breezy",
+        "wavy",
+        "offshore",
+        "downwind",
+        "upwind",
+        "crosswind",
+        "leeward",
+        "nadir",
+        "northeasterlies",
+        "westerlies",
+        "easterlies",
+        "trades",
+        "hurricane",
+        "buoy",
+        "island",
+        "coast",
+        "ice",
+    ]
+    .contains(&word)
+}
+
+/// Whether a compass word after this one says where something goes.
+pub(crate) fn leads(word: &str) -> bool {
+    is_motion(word) || matches!(word, "heading" | "course" | "blowing" | "blows")
 }
