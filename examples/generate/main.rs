@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and
-//! `report.json`; the model that lies in `wake-ldm` also writes `labels.json`, and says which scene it drew: what the
-//! prompt states, and the default values of what it leaves open. A prompt that states nothing of a scene is an error.
+//! `report.json`; the model that lies in `wake-ldm` also writes `labels.json`, and says which scene it drew (what the
+//! prompt states, and the default values of what it leaves open) and which parts of the prompt it did not read. A prompt that states nothing of a scene is an error.
 
 mod diffusers;
 #[path = "../common/exit.rs"]

@@ -8,6 +8,7 @@ use serde_json::json;
 use wake_ldm::sampler::WakeImage;
 use wake_ldm::{WakeSampler, device_named};
 use wake_physics::{Scene, output};
+use wake_text::Reading;
 
 use super::{Arguments, finish, image_name, prompt};
 
@@ -18,6 +19,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     refuse_options(arguments)?;
     let scene = arguments.scene.as_deref().map(Scene::read).transpose()?;
     let prompt = prompt(arguments, scene.as_ref())?;
+    let reading = Reading::of(&prompt)?;
     let device = device_named(&arguments.device)?;
     let begin = Instant::now();
     let mut sampler = match &arguments.weights {
@@ -41,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     output::write_json(&arguments.out.join("labels.json"), &labels)?;
     let seconds = images[0].seconds;
     let report = json!({
-        "prompt": prompt, "scene": images[0].scene, "seed": seed, "steps": sampler.steps(), "count": count, "device": arguments.device,
+        "prompt": prompt, "stated": reading.scene, "unread": reading.unread, "scene": images[0].scene, "seed": seed, "steps": sampler.steps(), "count": count, "device": arguments.device,
         "weights": arguments.weights, "files": files,
         "seconds": {
             "load": load, "text": seconds.text, "expect": seconds.expect, "denoise": seconds.denoise,
@@ -49,6 +51,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         },
     });
     if !arguments.json {
+        for part in &reading.unread {
+            println!("not read: {}", part.text);
+        }
         println!("drawn: {}", wake_text::prompt(&images[0].scene)?);
     }
     Ok(finish(arguments, &report)?)

@@ -244,28 +244,23 @@ mod tests {
         });
         assert_eq!(told, None);
         assert_eq!(refused(&|scene| scene.ship = None), None);
-        let other = match base.radar.polarization {
-            Polarization::VV => Polarization::HH,
-            _ => Polarization::VV,
-        };
-        let cases: [(&str, &dyn Fn(&mut Scene)); 5] = [
-            ("grid", &|scene| scene.grid.rows = 128),
-            ("radar.polarization", &|scene| {
-                scene.radar.polarization = other
-            }),
-            ("radar.frequency", &|scene| scene.radar.frequency = 1.27e9),
-            ("sea.depth", &|scene| scene.sea.depth = 10.0),
-            ("ship.length", &|scene| {
-                scene.ship.as_mut().unwrap().length = 80.0
-            }),
-        ];
-        for (name, change) in cases {
+        let named = |name: &str, change: &dyn Fn(&mut Scene)| {
             let message = refused(change).unwrap_or_default();
-            assert!(
-                message.starts_with(&format!("{name} is ")),
-                "{name}: {message}"
-            );
-        }
+            let start = format!("{name} is ");
+            assert!(message.starts_with(&start), "{name}: {message}");
+        };
+        named("grid", &|scene| scene.grid.rows = 128);
+        named("radar.polarization", &|scene| {
+            scene.radar.polarization = match scene.radar.polarization {
+                Polarization::VV => Polarization::HH,
+                _ => Polarization::VV,
+            };
+        });
+        named("radar.frequency", &|scene| scene.radar.frequency = 1.27e9);
+        named("sea.depth", &|scene| scene.sea.depth = 10.0);
+        named("ship.length", &|scene| {
+            scene.ship.as_mut().unwrap().length = 80.0;
+        });
     }
 
     #[test]
