@@ -1,11 +1,12 @@
-//! The one mapping between backscatter and grey.
+//! The mappings between backscatter and grey.
 
 use serde::{Deserialize, Serialize};
 
-/// Grey is linear in decibel between two fixed ends, the same for every scene.
+/// Grey between two fixed ends, the same for every scene: linear in decibel, or in amplitude as quick-looks are.
 ///
 /// ```text
 /// g = (10 log₁₀ σ⁰ − darkest)/(brightest − darkest),     cut to 0…1
+/// g = (√σ⁰ − √σ_d)/(√σ_b − √σ_d) with the ends as σ⁰,    in amplitude
 /// ```
 ///
 /// Brightness carries wind and incidence, so an image is never stretched to its own range. [`GreyScale::default`]
@@ -19,6 +20,30 @@ pub struct GreyScale {
     pub darkest_db: f64,
     /// σ⁰ of grey 1 \[dB\], above `darkest_db`.
     pub brightest_db: f64,
+    /// What grey is linear in.
+    #[serde(default, skip_serializing_if = "Mapping::is_decibel")]
+    pub mapping: Mapping,
+}
+
+/// What grey is linear in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mapping {
+    /// The decibel of σ⁰: every level is the same contrast.
+    #[default]
+    Decibel,
+    /// The amplitude √σ⁰, as in the quick-looks and 8-bit products of real sensors.
+    Amplitude,
+}
+
+impl Mapping {
+    #[expect(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "the signature serde asks for"
+    )]
+    fn is_decibel(&self) -> bool {
+        *self == Self::Decibel
+    }
 }
 
 impl Default for GreyScale {
@@ -26,23 +51,54 @@ impl Default for GreyScale {
         Self {
             darkest_db: -30.0,
             brightest_db: 10.0,
+            mapping: Mapping::Decibel,
         }
     }
 }
 
 impl GreyScale {
+    /// Grey in amplitude for a sea of a mean σ⁰: −60 dB is black and the mean lies at a quarter of the range, so that the
+    /// speckle of one look is not cut (chosen).
+    ///
+    /// - `mean_sigma0` \[1\], above 0; one value for all images that are compared
+    #[must_use]
+    pub fn amplitude_around(mean_sigma0: f64) -> Self {
+        Self {
+            darkest_db: -60.0,
+            brightest_db: 10.0 * mean_sigma0.log10() + 12.0,
+            mapping: Mapping::Amplitude,
+        }
+    }
+
     /// Grey 0…1 of σ⁰ \[1\]; σ⁰ = 0 is black.
     #[must_use]
     pub fn grey(&self, sigma0: f64) -> f64 {
-        let db = 10.0 * sigma0.max(0.0).log10();
-        ((db - self.darkest_db) / (self.brightest_db - self.darkest_db)).clamp(0.0, 1.0)
+        let value = match self.mapping {
+            Mapping::Decibel => 10.0 * sigma0.max(0.0).log10(),
+            Mapping::Amplitude => sigma0.max(0.0).sqrt(),
+        };
+        let [dark, bright] = self.ends();
+        ((value - dark) / (bright - dark)).clamp(0.0, 1.0)
+    }
+
+    /// The ends in what grey is linear in.
+    fn ends(&self) -> [f64; 2] {
+        let ends = [self.darkest_db, self.brightest_db];
+        match self.mapping {
+            Mapping::Decibel => ends,
+            Mapping::Amplitude => ends.map(|db| 10f64.powf(0.05 * db)),
+        }
     }
 
     /// σ⁰ \[1\] of grey: the inverse of [`Self::grey`] between its ends, and its continuation beyond them.
     #[must_use]
     pub fn sigma0(&self, grey: f64) -> f64 {
-        let db = self.darkest_db + grey * (self.brightest_db - self.darkest_db);
-        10f64.powf(0.1 * db)
+        let [dark, bright] = self.ends();
+        let value = dark + grey * (bright - dark);
+        match self.mapping {
+            Mapping::Decibel => 10f64.powf(0.1 * value),
+            Mapping::Amplitude => value.max(0.0).powi(2),
+        }
     }
 
     /// Grey as the nearest level of 8 bits.
@@ -91,6 +147,25 @@ mod tests {
             // Half a level of 40/255 dB.
             assert!(db.abs() < 0.5 * 40.0 / 255.0 + 1e-9);
         }
+    }
+
+    #[test]
+    fn amplitude_is_linear_and_has_its_inverse() {
+        let scale = GreyScale::amplitude_around(0.01);
+        // −60 dB is amplitude 0.001, −8 dB is 0.398107: amplitude 0.1 lies a quarter up.
+        assert!((scale.grey(0.01) - 0.099 / 0.397_107).abs() < 1e-6);
+        // Three equal steps of amplitude are three equal steps of grey.
+        let grey = |amplitude: f64| scale.grey(amplitude * amplitude);
+        assert!((grey(0.2) - grey(0.1) - (grey(0.3) - grey(0.2))).abs() < 1e-12);
+        for level in 0..=255 {
+            assert_eq!(scale.level(scale.sigma0_of_level(level)), level);
+        }
+        for sigma0 in [1.1e-6, 1e-4, 0.02, 0.15] {
+            assert!((scale.sigma0(scale.grey(sigma0)) / sigma0 - 1.0).abs() < 1e-10);
+        }
+        let text = serde_json::to_string(&scale).unwrap();
+        assert!(text.contains(r#""mapping":"amplitude""#), "{text}");
+        assert_eq!(serde_json::from_str::<GreyScale>(&text).unwrap(), scale);
     }
 
     #[test]

@@ -12,7 +12,9 @@ pub mod coherence;
 pub mod direct;
 pub mod echo;
 pub mod geometry;
+pub mod impulse;
 pub mod speckle;
+pub mod window;
 
 mod imaging;
 mod spread;
@@ -20,3 +22,5 @@ mod spread;
 pub use coherence::AzimuthResolution;
 pub use echo::Echo;
 pub use imaging::{Imaging, Sources};
+pub use impulse::ImpulseResponse;
+pub use window::Window;

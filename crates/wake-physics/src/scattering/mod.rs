@@ -12,6 +12,7 @@
 //! rises away from the radar, faces it and is bright.
 
 pub mod bragg;
+pub mod breaking;
 pub mod hydrodynamic;
 mod slope_lattice;
 mod slopes;

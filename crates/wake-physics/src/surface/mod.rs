@@ -4,7 +4,7 @@ mod amplitude;
 mod draw;
 mod factor;
 mod wave_lattice;
-mod vector;
+pub(crate) mod vector;
 
 use crate::dispersion::angular_frequency;
 use crate::fft::{Synthesis, signed_index};

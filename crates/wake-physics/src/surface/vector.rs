@@ -51,7 +51,7 @@ impl Lane for f64 {
 ///
 /// x = 2ⁿ m with m from 1/√2 to √2; ln m = 2 artanh q with q = (m − 1)/(m + 1), |q| < 0.172.
 #[inline(always)]
-pub(super) fn ln(x: f32) -> f32 {
+pub(crate) fn ln(x: f32) -> f32 {
     const LOWEST: u32 = (0.5 * SQRT_2).to_bits();
     let shifted = x.to_bits().wrapping_sub(LOWEST);
     let n = (shifted as i32) >> 23;
@@ -90,7 +90,7 @@ pub(super) fn exp(x: f32) -> f32 {
 ///
 /// The nearest quarter turn is split off exactly; the rest, up to π/4, goes into the Taylor series.
 #[inline(always)]
-pub(super) fn cos_sin(turns: u32) -> [f32; 2] {
+pub(crate) fn cos_sin(turns: u32) -> [f32; 2] {
     let quarter = turns.wrapping_add(1 << 29) >> 30;
     let rest = turns.wrapping_sub(quarter << 30) as i32;
     let x = rest as f32 * (TAU * f32::from_bits((127 - 32) << 23));

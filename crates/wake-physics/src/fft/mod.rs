@@ -1,4 +1,4 @@
-//! The only file that calls an FFT: sign, order and normalisation are stated here, once.
+//! The only module that calls an FFT: sign, order and normalisation are stated here, once.
 //!
 //! # Sign and normalisation
 //!
@@ -13,6 +13,10 @@
 //! The spectrum is stored *transposed*, `[columns, rows]`: entry `S[b·rows + a]`; indices run in FFT order
 //! (0, 1, …, then negative). The field comes out as `[rows, columns]`, row 0 at the largest y. Pixel `[0, 0]`
 //! is the phase reference: multiply the spectrum by `exp(i(kx·x₀ + ky·y₀))` to place it.
+
+mod low_pass;
+
+pub(crate) use low_pass::{Band, LowPass, Point, Window};
 
 use crate::workspace::{Shelf, Workspace};
 use num_complex::Complex;

@@ -10,6 +10,8 @@
 //! It says nothing of the bright edges of the wake (the narrow V), of wind, or of the sea state. Every constant
 //! below carries its source or the word "chosen".
 
+pub mod current;
+
 use crate::kelvin::fade;
 use crate::raster::{Field, Raster};
 use crate::track::Track;

@@ -1,0 +1,406 @@
+//! A separable low-pass filter of a complex field, sampled at every n-th pixel.
+
+use super::fast_length;
+use num_complex::Complex32;
+use rayon::prelude::*;
+use rustfft::{Fft, FftPlanner};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Rows worked on at once: as many as share the cache lines of a transposed column.
+const BLOCK: usize = 16;
+
+/// Weights of one axis of a filter at the frequencies −h…h of an FFT: an odd number of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band(pub Vec<f32>);
+
+impl Band {
+    /// Highest frequency h, in steps of the FFT.
+    #[must_use]
+    pub fn highest(&self) -> usize {
+        self.0.len() / 2
+    }
+}
+
+/// Filters fields of one size and keeps every `step`-th pixel of a window.
+///
+/// ```text
+/// G[i, j] = 1/(MN) Σ_ab W_y[a] W_x[b] Ê[a, b] e^{2πi(a r_i/M + b c_j/N)},   r_i = first row + step·i, c_j likewise
+/// Ê[a, b] = Σ_rc E[r, c] e^{−2πi(a r/M + b c/N)}
+/// ```
+///
+/// The field is continued by zeros to the M × N pixels of the FFT and periodically beyond. Only the frequencies of the
+/// band are computed after the first pass, and only the kept pixels by the last.
+pub struct LowPass {
+    /// Rows and columns of the FFT: M, N.
+    sizes: [usize; 2],
+    step: usize,
+    /// Rows and columns.
+    bands: [Band; 2],
+    /// Analysis and synthesis of each axis.
+    transforms: [[Arc<dyn Fft<f32>>; 2]; 2],
+}
+
+/// Which pixels are kept: `start` and number of rows and of columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// First row and column, of the field.
+    pub start: [usize; 2],
+    /// Number of rows and columns kept.
+    pub keep: [usize; 2],
+}
+
+/// A delta function at a place between the pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Row and column, with fractions, of the field.
+    pub place: [f64; 2],
+    /// Amplitude.
+    pub amplitude: Complex32,
+}
+
+impl std::fmt::Debug for LowPass {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LowPass")
+            .field("sizes", &self.sizes)
+            .field("step", &self.step)
+            .finish_non_exhaustive()
+    }
+}
+
+impl LowPass {
+    /// Rows and columns of the FFT for a field of `size` pixels of which every `step`-th is kept.
+    #[must_use]
+    pub fn sizes(size: [usize; 2], step: usize) -> [usize; 2] {
+        size.map(|n| step * fast_length(n.div_ceil(step)))
+    }
+
+    /// Plans a filter.
+    ///
+    /// - `sizes`: those of [`Self::sizes`]
+    /// - `bands`: of rows and of columns
+    ///
+    /// # Panics
+    ///
+    /// If a size is no multiple of the step, or a band is wider than the FFT.
+    #[must_use]
+    pub fn new(sizes: [usize; 2], step: usize, bands: [Band; 2]) -> Self {
+        let mut planner = FftPlanner::new();
+        for (size, band) in sizes.iter().zip(&bands) {
+            assert!(
+                step > 0 && size.is_multiple_of(step) && band.0.len() <= *size,
+                "{size} values of an FFT for a step of {step} and a band of {}",
+                band.0.len()
+            );
+        }
+        Self {
+            sizes,
+            step,
+            bands,
+            transforms: sizes.map(|n| {
+                [
+                    planner.plan_fft_forward(n),
+                    planner.plan_fft_inverse(n / step),
+                ]
+            }),
+        }
+    }
+
+    /// Filters a field of `rows` rows that `fill` writes one by one, and points between its pixels.
+    ///
+    /// `take` is given each kept row, filtered, and that row of `out`.
+    ///
+    /// # Shapes
+    ///
+    /// - `fill(row, values)`: `values` has the columns of the FFT, all zero
+    /// - `out`: `[keep[0], keep[1]]`, row after row
+    ///
+    /// # Panics
+    ///
+    /// If there are more rows than the FFT has, or `out` has another length.
+    pub fn run<T: Send>(
+        &self,
+        rows: usize,
+        fill: impl Fn(usize, &mut [Complex32]) + Sync,
+        points: &[Point],
+        window: &Window,
+        (out, take): (&mut [T], impl Fn(&[Complex32], &mut [T]) + Sync),
+    ) {
+        let [keep_rows, keep_columns] = window.keep;
+        assert!(rows <= self.sizes[0], "more rows than planned");
+        assert_eq!(
+            out.len(),
+            keep_rows * keep_columns,
+            "output of another size"
+        );
+        if out.is_empty() {
+            return;
+        }
+        let blocks = self.rows_to_band(rows, fill);
+        let lines = self.columns_of_band(&blocks, points, window);
+        drop(blocks);
+        self.band_to_rows(&lines, window, (out, take));
+    }
+
+    /// First pass: transforms each row and keeps its band, `[block][band][BLOCK]`.
+    fn rows_to_band(
+        &self,
+        rows: usize,
+        fill: impl Fn(usize, &mut [Complex32]) + Sync,
+    ) -> Vec<Complex32> {
+        let columns = self.sizes[1];
+        let transform = &self.transforms[1][0];
+        let band = &self.bands[1];
+        let count = band.0.len();
+        let mut blocks = vec![Complex32::ZERO; rows.div_ceil(BLOCK) * count * BLOCK];
+        blocks
+            .par_chunks_mut(count * BLOCK)
+            .enumerate()
+            .for_each_init(
+                || (vec![Complex32::ZERO; columns], scratch(transform)),
+                |(row, scratch), (n, block)| {
+                    for i in 0..BLOCK.min(rows - n * BLOCK) {
+                        row.fill(Complex32::ZERO);
+                        fill(n * BLOCK + i, row);
+                        transform.process_with_scratch(row, scratch);
+                        for (b, &weight) in band.0.iter().enumerate() {
+                            block[b * BLOCK + i] = row[place(b, count, columns)] * weight;
+                        }
+                    }
+                },
+            );
+        blocks
+    }
+
+    /// Second pass: filters the columns of the band and samples them, `[band][keep_rows]`.
+    fn columns_of_band(
+        &self,
+        blocks: &[Complex32],
+        points: &[Point],
+        window: &Window,
+    ) -> Vec<Complex32> {
+        let rows = self.sizes[0];
+        let [analysis, synthesis] = &self.transforms[0];
+        let count = self.bands[1].0.len();
+        let keep = window.keep[0];
+        let shift = self.shifts(0, window.start[0]);
+        let mut lines = vec![Complex32::ZERO; count * keep];
+        lines.par_chunks_mut(keep).enumerate().for_each_init(
+            || {
+                let short = vec![Complex32::ZERO; rows / self.step];
+                let scratch = [scratch(analysis), scratch(synthesis)];
+                (vec![Complex32::ZERO; rows], short, scratch)
+            },
+            |(line, short, scratch), (b, kept)| {
+                line.fill(Complex32::ZERO);
+                for (rows, block) in line
+                    .chunks_mut(BLOCK)
+                    .zip(blocks.chunks_exact(count * BLOCK))
+                {
+                    let values = &block[b * BLOCK..][..rows.len()];
+                    rows.copy_from_slice(values);
+                }
+                analysis.process_with_scratch(line, &mut scratch[0]);
+                self.add_points(b, points, line);
+                fold(line, &shift, short);
+                synthesis.process_with_scratch(short, &mut scratch[1]);
+                for (kept, value) in kept.iter_mut().zip(&*short) {
+                    *kept = *value;
+                }
+            },
+        );
+        lines
+    }
+
+    /// Last pass: sums the band of each kept row.
+    fn band_to_rows<T: Send>(
+        &self,
+        lines: &[Complex32],
+        window: &Window,
+        (out, take): (&mut [T], impl Fn(&[Complex32], &mut [T]) + Sync),
+    ) {
+        let [keep_rows, keep_columns] = window.keep;
+        let short = self.sizes[1] / self.step;
+        let synthesis = &self.transforms[1][1];
+        let shift = self.shifts(1, window.start[1]);
+        out.par_chunks_mut(BLOCK * keep_columns)
+            .enumerate()
+            .for_each_init(
+                || (vec![Complex32::ZERO; BLOCK * short], scratch(synthesis)),
+                |(block, scratch), (n, out)| {
+                    let count = BLOCK.min(keep_rows - n * BLOCK);
+                    let block = &mut block[..count * short];
+                    block.fill(Complex32::ZERO);
+                    for (line, &(_, at, factor)) in lines.chunks_exact(keep_rows).zip(&shift) {
+                        let values = &line[n * BLOCK..][..count];
+                        for (row, value) in block.chunks_exact_mut(short).zip(values) {
+                            row[at] += value * factor;
+                        }
+                    }
+                    synthesis.process_with_scratch(block, scratch);
+                    let rows = block.chunks_exact(short);
+                    for (row, out) in rows.zip(out.chunks_exact_mut(keep_columns)) {
+                        take(&row[..keep_columns], out);
+                    }
+                },
+            );
+    }
+
+    /// For each frequency of an axis: its place in the FFT, in the short FFT, and the factor that moves the first kept
+    /// pixel to place 0, with 1/size; of rows the weight too, which the columns have already.
+    fn shifts(&self, axis: usize, start: usize) -> Vec<(usize, usize, Complex32)> {
+        let (size, band) = (self.sizes[axis], &self.bands[axis]);
+        let count = band.0.len();
+        let frequencies = 0..count;
+        frequencies
+            .map(|b| {
+                let at = place(b, count, size);
+                // Whole turns drop out of the product of whole numbers: exact however large.
+                let turns = (at * start % size) as f64 / size as f64;
+                let (sin, cos) = (TAU * turns).sin_cos();
+                let weight = if axis == 0 { f64::from(band.0[b]) } else { 1.0 } / size as f64;
+                let factor = Complex32::new((weight * cos) as f32, (weight * sin) as f32);
+                (at, at % (size / self.step), factor)
+            })
+            .collect()
+    }
+
+    /// Adds the spectrum of the points to line `b` of the band.
+    fn add_points(&self, b: usize, points: &[Point], line: &mut [Complex32]) {
+        let [rows, columns] = self.sizes;
+        let weight = self.bands[1].0[b];
+        let across = b as f64 - self.bands[1].highest() as f64;
+        let [count, highest] = [self.bands[0].0.len(), self.bands[0].highest()];
+        for point in points {
+            let turn = |frequency: f64, place: f64, size: usize| {
+                let (sin, cos) = (-TAU * (frequency * place / size as f64).fract()).sin_cos();
+                num_complex::Complex64::new(cos, sin)
+            };
+            let step = turn(1.0, point.place[0], rows);
+            let amplitude = point.amplitude * weight;
+            let mut value = num_complex::Complex64::new(amplitude.re.into(), amplitude.im.into())
+                * turn(across, point.place[1], columns)
+                * turn(-(highest as f64), point.place[0], rows);
+            for a in 0..count {
+                line[place(a, count, rows)] += Complex32::new(value.re as f32, value.im as f32);
+                value *= step;
+            }
+        }
+    }
+}
+
+/// Place in an FFT of `size` values of entry `entry` of a band of `count`.
+fn place(entry: usize, count: usize, size: usize) -> usize {
+    (entry + size - count / 2) % size
+}
+
+fn scratch(transform: &Arc<dyn Fft<f32>>) -> Vec<Complex32> {
+    vec![Complex32::ZERO; transform.get_inplace_scratch_len()]
+}
+
+/// Adds the weighted frequencies of a line where sampling puts them.
+fn fold(line: &[Complex32], shift: &[(usize, usize, Complex32)], short: &mut [Complex32]) {
+    short.fill(Complex32::ZERO);
+    for &(from, to, factor) in shift {
+        short[to] += line[from] * factor;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_complex::Complex64;
+
+    /// The sum of the definition, frequency by frequency, with points as e^{−2πi(a r/M + b c/N)}.
+    fn direct(
+        plan: &LowPass,
+        field: &[Complex32],
+        columns: usize,
+        points: &[Point],
+        window: &Window,
+    ) -> Vec<Complex64> {
+        let wide = |v: Complex32| Complex64::new(v.re.into(), v.im.into());
+        let wave = |turns: f64| Complex64::from_polar(1.0, TAU * turns);
+        let [m, n] = plan.sizes.map(|size| size as f64);
+        let mut out = Vec::new();
+        let deltas: Vec<([f64; 2], Complex64)> = field
+            .iter()
+            .enumerate()
+            .map(|(at, &v)| ([(at / columns) as f64, (at % columns) as f64], wide(v)))
+            .chain(points.iter().map(|p| (p.place, wide(p.amplitude))))
+            .collect();
+        for i in 0..window.keep[0] {
+            for j in 0..window.keep[1] {
+                let [row, column] =
+                    [(0, i), (1, j)].map(|(axis, at)| (window.start[axis] + plan.step * at) as f64);
+                let kernel = |axis: usize, size: f64, distance: f64| -> Complex64 {
+                    let band = &plan.bands[axis];
+                    let terms = band.0.iter().enumerate().map(|(b, &w)| {
+                        let frequency = b as f64 - band.highest() as f64;
+                        f64::from(w) * wave(frequency * distance / size)
+                    });
+                    terms.sum::<Complex64>() / size
+                };
+                out.push(
+                    deltas
+                        .iter()
+                        .map(|([r, c], v)| v * kernel(0, m, row - r) * kernel(1, n, column - c))
+                        .sum(),
+                );
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn the_filter_is_its_definition() {
+        for (size, step, bands) in [
+            ([18, 15], 1, [7, 5]),
+            ([37, 20], 2, [9, 11]),
+            // Wider than the kept pixels carry: folded.
+            ([20, 33], 3, [13, 25]),
+            ([1, 1], 1, [1, 1]),
+        ] {
+            let sizes = LowPass::sizes(size, step);
+            let band =
+                |count: usize, tilt: f32| Band((0..count).map(|n| 1.0 + tilt * n as f32).collect());
+            let plan = LowPass::new(sizes, step, [band(bands[0], 0.1), band(bands[1], -0.03)]);
+            let value = |n: usize| {
+                let x = n as f32;
+                Complex32::new((1.7 * x + 0.3 * x * x).sin(), (0.9 * x * x).cos())
+            };
+            let field: Vec<_> = (0..size[0] * size[1]).map(value).collect();
+            let points = [
+                Point {
+                    place: [0.3 * size[0] as f64, 0.77 * size[1] as f64],
+                    amplitude: Complex32::new(2.0, -5.0),
+                },
+                Point {
+                    place: [1.25, 0.5],
+                    amplitude: Complex32::new(-1.0, 0.4),
+                },
+            ];
+            let window = Window {
+                start: size.map(|n| n / 5),
+                keep: size.map(|n| ((n - n / 5) / step).max(1)),
+            };
+            let mut out = vec![Complex32::ZERO; window.keep[0] * window.keep[1]];
+            plan.run(
+                size[0],
+                |i, row| row[..size[1]].copy_from_slice(&field[i * size[1]..][..size[1]]),
+                &points,
+                &window,
+                (&mut out, |from, to| to.copy_from_slice(from)),
+            );
+            let expected = direct(&plan, &field, size[1], &points, &window);
+            let rms = (expected.iter().map(Complex64::norm_sqr).sum::<f64>()
+                / expected.len() as f64)
+                .sqrt();
+            for (found, expected) in out.iter().zip(expected) {
+                let found = Complex64::new(found.re.into(), found.im.into());
+                // Some twenty roundings of f32 on the way, of values up to the largest.
+                assert!((found - expected).norm() < 4e-6 * rms.max(1.0), "{size:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! The impulse response of the radar: from a rough surface to a complex image, and looks of it.
+//!
+//! ```text
+//! E = √(I/2) (g₁ + i g₂)                       reflectivity of a rough surface of intensity I, white
+//! S = F⁻¹[F[E] W_x(f_x) W_y(f_y)] / √mean(W²)  single-look complex image
+//! ⟨|S|²⟩ = I ⊛ |h|² / ∫|h|²                    its intensity, in the unit of I
+//! ```
+//!
+//! Sea, noise and ships pass through the same filter. A point of cross-section σ is √σ/Δ in one cell of E, Δ the spacing;
+//! its image integrates to σ.
+
+use super::window::Window;
+use crate::fft::{self, LowPass};
+use crate::random::line_generator;
+use crate::raster::{Field, Raster};
+use crate::surface::vector::{cos_sin, ln};
+use crate::vectorize::vectorized;
+use num_complex::Complex32;
+use rand::Rng;
+
+/// Resolutions between the image and the edge of the sources: sidelobes that come around lie beyond (chosen).
+const GUARD: f64 = 8.0;
+
+/// Lines between two looks in the numbering of random lines.
+const LOOK_LINES: u64 = 1 << 20;
+
+/// The generator's lines of points begin here.
+const POINT_LINES: u64 = 1 << 40;
+
+/// Impulse response along one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Resolution ρ \[m\]: the width at half power of the response to a point.
+    pub resolution: f64,
+    /// Weight over the bandwidth.
+    pub window: Window,
+}
+
+impl Axis {
+    /// Bandwidth B in spatial frequency [1/m].
+    #[must_use]
+    pub fn bandwidth(&self) -> f64 {
+        self.window.width() / self.resolution
+    }
+
+    /// W at the frequencies of an FFT of `size` values, with Σ W² = `size`: white noise keeps its power.
+    fn band(&self, size: usize, spacing: f64) -> fft::Band {
+        let step = 1.0 / (size as f64 * spacing * self.bandwidth());
+        let highest = ((0.5 / step).floor() as usize).min((size - 1) / 2);
+        let weight = |n: usize| self.window.weight((n as f64 - highest as f64) * step);
+        let weights: Vec<f64> = (0..=2 * highest).map(weight).collect();
+        let power: f64 = weights.iter().map(|w| w * w).sum();
+        let scale = (size as f64 / power).sqrt();
+        fft::Band(weights.iter().map(|w| (scale * w) as f32).collect())
+    }
+}
+
+/// Impulse response of a radar in ground range x and azimuth y.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImpulseResponse {
+    /// In ground range.
+    pub range: Axis,
+    /// In azimuth.
+    pub azimuth: Axis,
+}
+
+/// A point that scatters coherently.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointTarget {
+    /// Where it is imaged, (x, y) \[m\].
+    pub position: [f64; 2],
+    /// Radar cross section \[m²\], at least 0.
+    pub cross_section: f64,
+}
+
+/// What the radar looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct Reflectivity<'a> {
+    /// Places of the intensity; at least the image and its guard.
+    pub raster: &'a Raster,
+    /// Mean intensity of the rough surface, noise included, in the unit of σ⁰.
+    pub intensity: &'a Field,
+    /// Ships and their ghosts.
+    pub points: &'a [PointTarget],
+}
+
+/// Looks that are averaged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Looks {
+    /// Equivalent number of looks, at least 1; looks that overlap are worth less than their number, see
+    /// [`Window::overlapping_looks`].
+    pub equivalent: f64,
+    /// Seed: the same numbers whatever the number of threads.
+    pub seed: u64,
+}
+
+impl ImpulseResponse {
+    /// Rows and columns that the sources need around the image, in their own spacing \[m\].
+    #[must_use]
+    pub fn guard(&self, spacing: f64) -> [usize; 2] {
+        [self.azimuth, self.range].map(|axis| (GUARD * axis.resolution / spacing).ceil() as usize)
+    }
+
+    /// Largest spacing of the sources \[m\], ρ/4: the intensity, of twice the bandwidth, is still carried.
+    #[must_use]
+    pub fn largest_spacing(&self) -> f64 {
+        0.25 * self.range.resolution.min(self.azimuth.resolution)
+    }
+
+    /// Mean over all speckle of the image's intensity, I ⊛ |h|²/∫|h|², `[rows, columns]` of the image.
+    ///
+    /// # Panics
+    ///
+    /// As [`Self::multilook`], and if the sources are too coarse for twice the bandwidth.
+    #[must_use]
+    pub fn mean(&self, sources: &Reflectivity<'_>, image: &Raster) -> Field {
+        let view = View::new(sources, image);
+        let raster = sources.raster;
+        let bands = self.bands(&view, raster.spacing).map(|b| power_band(&b));
+        let filter = LowPass::new(view.sizes, view.step, bands);
+        let points: Vec<_> = sources
+            .points
+            .iter()
+            .map(|p| {
+                view.point(
+                    raster,
+                    p.position,
+                    Complex32::new(view.power(p) as f32, 0.0),
+                )
+            })
+            .collect();
+        let fill = |i: usize, row: &mut [Complex32]| {
+            for (value, intensity) in row.iter_mut().zip(view.row(sources, i)) {
+                value.re = *intensity;
+            }
+        };
+        let mut out = Field::constant(image, 0.0);
+        let take = |from: &[Complex32], to: &mut [f32]| {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = from.re.max(0.0);
+            }
+        };
+        filter.run(
+            raster.rows,
+            fill,
+            &points,
+            &view.window,
+            (&mut out.values, take),
+        );
+        out
+    }
+
+    /// One complex image S, `[rows, columns]` of the image; |S|² is its intensity.
+    ///
+    /// # Panics
+    ///
+    /// As [`Self::multilook`].
+    #[must_use]
+    pub fn single_look(
+        &self,
+        sources: &Reflectivity<'_>,
+        image: &Raster,
+        seed: u64,
+    ) -> Vec<Complex32> {
+        let mut out = vec![Complex32::ZERO; image.len()];
+        let look = |from: &[Complex32], to: &mut [Complex32]| to.copy_from_slice(from);
+        self.looks(sources, image, (seed, 0..1), &mut out, |_| look);
+        out
+    }
+
+    /// The mean intensity of independent looks, `[rows, columns]` of the image.
+    ///
+    /// Whole looks weigh the same and the last one less, so that (Σw)²/Σw² is the equivalent number asked for. Mean,
+    /// variance and correlation are those of overlapping bands of one aperture.
+    ///
+    /// # Panics
+    ///
+    /// If the image's spacing is no multiple of the sources', its pixels lie between theirs or outside them, or the
+    /// intensity is not of the raster's size.
+    #[must_use]
+    pub fn multilook(&self, sources: &Reflectivity<'_>, image: &Raster, looks: &Looks) -> Field {
+        let weights = look_weights(looks.equivalent);
+        let mut out = Field::constant(image, 0.0);
+        let numbers = 0..weights.len() as u64;
+        self.looks(
+            sources,
+            image,
+            (looks.seed, numbers),
+            &mut out.values,
+            |n| {
+                let weight = weights[n as usize] as f32;
+                move |from: &[Complex32], to: &mut [f32]| {
+                    for (to, from) in to.iter_mut().zip(from) {
+                        *to += weight * from.norm_sqr();
+                    }
+                }
+            },
+        );
+        out
+    }
+
+    /// Hands the rows of each look to what `take` makes for it.
+    fn looks<T: Send, F: Fn(&[Complex32], &mut [T]) + Sync>(
+        &self,
+        sources: &Reflectivity<'_>,
+        image: &Raster,
+        (seed, numbers): (u64, std::ops::Range<u64>),
+        out: &mut [T],
+        take: impl Fn(u64) -> F,
+    ) {
+        let view = View::new(sources, image);
+        let raster = sources.raster;
+        let filter = LowPass::new(view.sizes, view.step, self.bands(&view, raster.spacing));
+        for look in numbers {
+            let first = look * LOOK_LINES;
+            let mut phases = line_generator(seed, POINT_LINES + look);
+            let points: Vec<_> = sources
+                .points
+                .iter()
+                .map(|p| {
+                    let [cos, sin] = cos_sin((phases.next_u64() >> 32) as u32);
+                    let amplitude = view.power(p).sqrt() as f32;
+                    let amplitude = Complex32::new(amplitude * cos, amplitude * sin);
+                    view.point(raster, p.position, amplitude)
+                })
+                .collect();
+            let fill = |i: usize, row: &mut [Complex32]| {
+                rough_row(view.row(sources, i), (seed, first + i as u64), row);
+            };
+            filter.run(raster.rows, fill, &points, &view.window, (out, take(look)));
+        }
+    }
+
+    /// Weights of rows and columns.
+    fn bands(&self, view: &View, spacing: f64) -> [fft::Band; 2] {
+        [
+            self.azimuth.band(view.sizes[0], spacing),
+            self.range.band(view.sizes[1], spacing),
+        ]
+    }
+}
+
+/// Where the image lies among the sources.
+struct View {
+    sizes: [usize; 2],
+    step: usize,
+    window: fft::Window,
+    /// Area of a source pixel \[m²\].
+    area: f64,
+}
+
+impl View {
+    fn new(sources: &Reflectivity<'_>, image: &Raster) -> Self {
+        let raster = sources.raster;
+        assert_eq!(
+            (sources.intensity.rows, sources.intensity.columns),
+            (raster.rows, raster.columns),
+            "an intensity of another size than its raster"
+        );
+        let step = (image.spacing / raster.spacing).round();
+        assert!(
+            step >= 1.0 && (step * raster.spacing - image.spacing).abs() <= 1e-9 * image.spacing,
+            "an image spacing of {} m on sources of {} m",
+            image.spacing,
+            raster.spacing
+        );
+        let step = step as usize;
+        let start = [
+            raster.origin_row - image.origin_row * step as i64,
+            raster.origin_column - image.origin_column * step as i64,
+        ];
+        let keep = [image.rows, image.columns];
+        let inside = |axis: usize, size: usize| {
+            start[axis] >= 0 && start[axis] as usize + step * (keep[axis] - 1) < size
+        };
+        assert!(
+            inside(0, raster.rows) && inside(1, raster.columns),
+            "an image that leaves its sources"
+        );
+        Self {
+            sizes: LowPass::sizes([raster.rows, raster.columns], step),
+            step,
+            window: fft::Window {
+                start: start.map(|s| s as usize),
+                keep,
+            },
+            area: raster.spacing * raster.spacing,
+        }
+    }
+
+    /// One row of the intensity.
+    fn row<'a>(&self, sources: &Reflectivity<'a>, i: usize) -> &'a [f32] {
+        let columns = sources.raster.columns;
+        &sources.intensity.values[i * columns..(i + 1) * columns]
+    }
+
+    /// Squared amplitude of a point in one cell.
+    fn power(&self, point: &PointTarget) -> f64 {
+        point.cross_section / self.area
+    }
+
+    fn point(&self, raster: &Raster, [x, y]: [f64; 2], amplitude: Complex32) -> fft::Point {
+        let [column, row] = raster.pixel(x, y);
+        fft::Point {
+            place: [row, column],
+            amplitude,
+        }
+    }
+}
+
+/// Weights of looks, with sum 1, so that 1/Σw² is `equivalent`.
+///
+/// m whole looks of weight 1 and one of weight a with (m + a)² = n(m + a²), n the equivalent number.
+fn look_weights(equivalent: f64) -> Vec<f64> {
+    let n = equivalent.max(1.0);
+    let full = n.floor();
+    if n - full < 1e-9 {
+        return vec![1.0 / full; full as usize];
+    }
+    // The root between 0 and 1 of (n − 1)a² − 2ma + m(n − m) = 0.
+    let root = (full * full + (n - 1.0) * full * (full - n))
+        .max(0.0)
+        .sqrt();
+    let last = (full - root) / (n - 1.0);
+    let mut weights = vec![1.0; full as usize];
+    weights.push(last);
+    weights.iter().map(|w| w / (full + last)).collect()
+}
+
+/// Weights of the intensity: the autocorrelation of those of the amplitude, 1 at the frequency 0.
+fn power_band(band: &fft::Band) -> fft::Band {
+    let weights = &band.0;
+    let total: f64 = weights.iter().map(|&w| f64::from(w * w)).sum();
+    let at = |shift: usize| {
+        let pairs = weights.iter().zip(&weights[shift..]);
+        let sum: f64 = pairs.map(|(&a, &b)| f64::from(a) * f64::from(b)).sum();
+        (sum / total) as f32
+    };
+    let highest = weights.len() - 1;
+    fft::Band(
+        (0..=2 * highest)
+            .map(|n: usize| at(n.abs_diff(highest)))
+            .collect(),
+    )
+}
+
+/// One row of the reflectivity √(I/2)(g₁ + i g₂): modulus √(−I ln u), phase uniform (Box and Muller 1958).
+fn rough_row(intensity: &[f32], (seed, line): (u64, u64), row: &mut [Complex32]) {
+    let mut generator = line_generator(seed, line);
+    let bits: Vec<u64> = intensity.iter().map(|_| generator.next_u64()).collect();
+    vectorized(
+        #[inline(always)]
+        || {
+            for ((value, &intensity), bits) in row.iter_mut().zip(intensity).zip(&bits) {
+                let uniform =
+                    ((*bits as u32 >> 1) as i32 as f32 + 0.5) * f32::from_bits((127 - 31) << 23);
+                let length = (-intensity * ln(uniform)).max(0.0).sqrt();
+                let [cos, sin] = cos_sin((*bits >> 32) as u32);
+                *value = Complex32::new(length * cos, length * sin);
+            }
+        },
+    );
+}
+
+#[cfg(test)]
+#[path = "impulse_tests.rs"]
+mod tests;

@@ -1,0 +1,391 @@
+//! Windows over the bandwidth of a radar, and what they do to its impulse response.
+//!
+//! A window weights the spectrum over a bandwidth B: `W(f)` at the frequency f/B from −½ to ½. Distances are in units
+//! of 1/B:
+//!
+//! ```text
+//! h(x)  = ∫W(f) e^{2πifx} df / ∫W df            response in amplitude to a point
+//! ρ²(x) = |∫W² e^{2πifx} df / ∫W² df|²          correlation of the intensity of a rough surface at the distance x
+//! ```
+
+use crate::quadrature::GaussLegendre;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+
+/// Nodes of the integrals over the window: exact to rounding up to the distance [`FARTHEST`].
+const NODES: usize = 96;
+
+/// Farthest sidelobe looked at \[1/B\].
+const FARTHEST: f64 = 20.0;
+
+/// Weight over the bandwidth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Window {
+    /// W = 1: the sharpest response, sidelobes of −13 dB.
+    Uniform,
+    /// W = α + (1 − α) cos 2πf with α from 0.5 to 1; 0.54 is Hamming's own.
+    Hamming(f64),
+    /// W = I₀(β√(1 − 4f²))/I₀(β) with β from 0 to 10.
+    Kaiser(f64),
+}
+
+impl Window {
+    /// W at the frequency f/B; 0 outside −½ to ½.
+    #[must_use]
+    pub fn weight(self, f: f64) -> f64 {
+        if f.abs() > 0.5 {
+            return 0.0;
+        }
+        match self {
+            Self::Uniform => 1.0,
+            Self::Hamming(alpha) => alpha + (1.0 - alpha) * (TAU * f).cos(),
+            Self::Kaiser(beta) => {
+                bessel_i0(beta * (1.0 - 4.0 * f * f).max(0.0).sqrt()) / bessel_i0(beta)
+            }
+        }
+    }
+
+    /// Response in amplitude h, 1 at the distance 0.
+    ///
+    /// - `x`: distance \[1/B\]
+    #[must_use]
+    pub fn response(self, x: f64) -> f64 {
+        match self {
+            Self::Uniform => sinc(x),
+            Self::Hamming(alpha) => {
+                let sides = 0.5 * (1.0 - alpha) * (sinc(x - 1.0) + sinc(x + 1.0));
+                sinc(x) + sides / alpha
+            }
+            Self::Kaiser(beta) => {
+                let of = |square: f64| {
+                    let root = square.abs().sqrt();
+                    match square {
+                        _ if root < 1e-6 => 1.0,
+                        s if s > 0.0 => root.sinh() / root,
+                        _ => root.sin() / root,
+                    }
+                };
+                of(beta * beta - (PI * x).powi(2)) / of(beta * beta)
+            }
+        }
+    }
+
+    /// Resolution ρB: the full width of h² at half its peak \[1/B\].
+    #[must_use]
+    pub fn width(self) -> f64 {
+        let half = |x: f64| self.response(x).powi(2) - 0.5;
+        2.0 * root(half, [0.0, self.first_null()])
+    }
+
+    /// Highest sidelobe of h² over its peak \[dB\].
+    #[must_use]
+    pub fn peak_sidelobe(self) -> f64 {
+        let null = self.first_null();
+        let count = 4000;
+        let step = (FARTHEST - null) / f64::from(count);
+        let at = |i| self.response(null + step * f64::from(i)).powi(2);
+        10.0 * (0..=count).map(at).fold(0.0, f64::max).log10()
+    }
+
+    /// Energy of h² outside the main lobe over all of it \[dB\].
+    #[must_use]
+    pub fn integrated_sidelobes(self) -> f64 {
+        let main = 2.0
+            * GaussLegendre::new(NODES)
+                .integrate([0.0, self.first_null()], |x| self.response(x).powi(2));
+        // Parseval: ∫h² dx = ∫W² df/(∫W df)².
+        let all = self.moment(2) / self.moment(1).powi(2);
+        10.0 * (1.0 - main / all).log10()
+    }
+
+    /// Loss of the peak of a point over that of the matched filter \[dB\]: −10 log₁₀ (∫W df)²/∫W² df.
+    #[must_use]
+    pub fn loss(self) -> f64 {
+        -10.0 * (self.moment(1).powi(2) / self.moment(2)).log10()
+    }
+
+    /// Correlation ρ² of the intensity of a rough surface at a distance x \[1/B\], up to 20.
+    #[must_use]
+    pub fn correlation(self, x: f64) -> f64 {
+        let transform = over_band(|f| self.weight(f).powi(2) * (TAU * f * x).cos());
+        (transform / self.moment(2)).powi(2)
+    }
+
+    /// Length over which the intensity is correlated, ∫ρ² dx = ∫W⁴ df/(∫W² df)² \[1/B\].
+    ///
+    /// A pixel of a smaller spacing holds less than one independent sample.
+    #[must_use]
+    pub fn correlation_length(self) -> f64 {
+        self.moment(4) / self.moment(2).powi(2)
+    }
+
+    /// Largest correlation of two pixels of a row or a column.
+    ///
+    /// - `pixels`: pixel spacing over resolution, above 0
+    ///
+    /// Where it is small, independent pixels suffice: at a spacing of 1.5 resolutions 0.042 (uniform) and 0.002
+    /// (Hamming 0.75), at one resolution 0.016 and 0.099.
+    #[must_use]
+    pub fn pixel_correlation(self, pixels: f64) -> f64 {
+        let step = pixels * self.width();
+        let lags = (FARTHEST / step).floor().max(1.0) as u32;
+        (1..=lags)
+            .map(|lag| self.correlation(f64::from(lag) * step))
+            .fold(0.0, f64::max)
+    }
+
+    /// Looks that the mean of `count` neighbouring pixels of an axis is worth, of `pixels` spacing over resolution.
+    ///
+    /// ```text
+    /// m/(1 + 2 Σ (1 − l/m) ρ²(l δ)),     l = 1 … m − 1
+    /// ```
+    ///
+    /// with lags up to the distance 20/B, where ρ² is below 3·10⁻⁴.
+    #[must_use]
+    pub fn averaged_looks(self, count: u32, pixels: f64) -> f64 {
+        let step = pixels * self.width();
+        equivalent(count, |lag| match f64::from(lag) * step {
+            x if x < FARTHEST => self.correlation(x),
+            _ => 0.0,
+        })
+    }
+
+    /// Equivalent number of `count` looks, each of the bandwidth B, that overlap by a share of it.
+    ///
+    /// ```text
+    /// K/(1 + 2 Σ (1 − k/K) r_k),     r_k = [∫W(f) W(f − k(1 − overlap)) df / ∫W² df]²
+    /// ```
+    ///
+    /// - `count` K, at least 1; `overlap` 0 to 1
+    #[must_use]
+    pub fn overlapping_looks(self, count: u32, overlap: f64) -> f64 {
+        equivalent(count, |k| {
+            self.look_correlation(f64::from(k) * (1.0 - overlap))
+        })
+    }
+
+    /// Correlation of two looks whose bands lie `shift` bandwidths apart.
+    fn look_correlation(self, shift: f64) -> f64 {
+        if shift >= 1.0 {
+            return 0.0;
+        }
+        let common = GaussLegendre::new(NODES).integrate([shift - 0.5, 0.5], |f| {
+            self.weight(f) * self.weight(f - shift)
+        });
+        (common / self.moment(2)).powi(2)
+    }
+
+    /// ∫Wⁿ df.
+    fn moment(self, power: i32) -> f64 {
+        over_band(|f| self.weight(f).powi(power))
+    }
+
+    /// Distance of the first null of h \[1/B\].
+    fn first_null(self) -> f64 {
+        let step = 0.01;
+        let mut x = 0.5;
+        while self.response(x + step) > 0.0 && x < FARTHEST {
+            x += step;
+        }
+        root(|x| self.response(x), [x, x + step])
+    }
+}
+
+/// Number of independent values in the sum of `count`, of which two that are `lag` apart correlate by `correlation(lag)`.
+fn equivalent(count: u32, correlation: impl Fn(u32) -> f64) -> f64 {
+    let n = f64::from(count.max(1));
+    let pairs: f64 = (1..count)
+        .map(|lag| (1.0 - f64::from(lag) / n) * correlation(lag))
+        .sum();
+    n / (1.0 + 2.0 * pairs)
+}
+
+/// ∫ over the bandwidth.
+fn over_band(f: impl Fn(f64) -> f64) -> f64 {
+    GaussLegendre::new(NODES).integrate([-0.5, 0.5], f)
+}
+
+/// The zero of a function that falls from `from` to `to`, by bisection.
+fn root(f: impl Fn(f64) -> f64, [mut from, mut to]: [f64; 2]) -> f64 {
+    for _ in 0..60 {
+        let middle = 0.5 * (from + to);
+        if f(middle) > 0.0 {
+            from = middle;
+        } else {
+            to = middle;
+        }
+    }
+    0.5 * (from + to)
+}
+
+/// sin πx/(πx).
+fn sinc(x: f64) -> f64 {
+    let angle = PI * x;
+    if angle.abs() < 1e-6 {
+        1.0 - angle * angle / 6.0
+    } else {
+        angle.sin() / angle
+    }
+}
+
+/// Modified Bessel function I₀ by its power series Σ (x²/4)ⁿ/n!², for x from 0 to 20.
+fn bessel_i0(x: f64) -> f64 {
+    let quarter = 0.25 * x * x;
+    let (mut term, mut sum) = (1.0, 1.0);
+    for n in 1..60 {
+        term *= quarter / f64::from(n * n);
+        sum += term;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOWS: [Window; 5] = [
+        Window::Uniform,
+        Window::Hamming(0.75),
+        Window::Hamming(0.70),
+        Window::Hamming(0.54),
+        Window::Kaiser(2.5),
+    ];
+
+    /// The figures of the windows, computed elsewhere from the same definitions and printed to the last digit here.
+    #[test]
+    fn resolution_sidelobes_and_loss() {
+        let expected = [
+            [0.886, -13.3, -10.1, 0.0, 1.000],
+            [1.000, -21.2, -16.6, 0.23, 1.201],
+            [1.042, -24.1, -19.0, 0.38, 1.312],
+            [1.303, -42.7, -36.3, 1.34, 1.817],
+            [1.042, -20.9, -18.9, 0.36, 1.264],
+        ];
+        for (window, [width, peak, integrated, loss, length]) in WINDOWS.into_iter().zip(expected) {
+            // Half a unit of the last digit printed.
+            assert!((window.width() - width).abs() < 6e-4, "{window:?}");
+            assert!((window.peak_sidelobe() - peak).abs() < 0.06, "{window:?}");
+            assert!(
+                (window.integrated_sidelobes() - integrated).abs() < 0.06,
+                "{window:?} {}",
+                window.integrated_sidelobes()
+            );
+            assert!((window.loss() - loss).abs() < 6e-3, "{window:?}");
+            assert!(
+                (window.correlation_length() - length).abs() < 6e-4,
+                "{window:?}"
+            );
+        }
+        // In closed form: the first sidelobe of sinc² is −13.26 dB; half power at πx = 1.39156.
+        assert!((Window::Uniform.peak_sidelobe() + 13.2615).abs() < 1e-3);
+        assert!((Window::Uniform.width() - 2.0 * 1.391_557_378 / PI).abs() < 1e-9);
+    }
+
+    #[test]
+    fn correlation_of_pixels() {
+        let expected = [
+            [0.849, 0.500, 0.174, 0.016, 0.042],
+            [0.879, 0.590, 0.293, 0.099, 0.002],
+            [0.887, 0.615, 0.328, 0.130, 0.008],
+            [0.907, 0.674, 0.408, 0.198, 0.022],
+            [0.884, 0.604, 0.308, 0.108, 0.001],
+        ];
+        for (window, expected) in WINDOWS.into_iter().zip(expected) {
+            for (pixels, value) in [0.25, 0.5, 0.75, 1.0, 1.5].into_iter().zip(expected) {
+                let found = window.correlation(pixels * window.width());
+                assert!((found - value).abs() < 6e-4, "{window:?} {pixels}: {found}");
+            }
+        }
+        // Uniform: sinc², in closed form.
+        for x in [0.1, 0.7, 3.3, 17.2] {
+            assert!((Window::Uniform.correlation(x) - sinc(x).powi(2)).abs() < 1e-12);
+        }
+        assert!((Window::Uniform.pixel_correlation(1.5) - 0.042).abs() < 6e-4);
+        assert!((Window::Hamming(0.75).pixel_correlation(1.0) - 0.099).abs() < 6e-4);
+        // Uniform, half a resolution: lag 1; at 1.13 resolutions the nearest lag is a null, the next is too.
+        assert!(Window::Uniform.pixel_correlation(1.0 / Window::Uniform.width()) < 1e-12);
+    }
+
+    /// Closed forms of the response against quadrature over the window.
+    #[test]
+    fn response_is_the_transform_of_the_window() {
+        for window in WINDOWS {
+            for x in [0.0, 0.3, 0.5, 0.795_774_7, 1.0, 2.6, 11.0, -1.4] {
+                let integral = over_band(|f| window.weight(f) * (TAU * f * x).cos());
+                let expected = integral / over_band(|f| window.weight(f));
+                assert!(
+                    (window.response(x) - expected).abs() < 1e-12,
+                    "{window:?} {x}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn limits_are_the_uniform_window() {
+        for f in [-0.5, -0.2, 0.0, 0.37] {
+            assert!((Window::Hamming(1.0).weight(f) - 1.0).abs() < 1e-15);
+            assert!((Window::Kaiser(0.0).weight(f) - 1.0).abs() < 1e-15);
+        }
+        assert!(Window::Uniform.weight(0.500_1).abs() < f64::MIN_POSITIVE);
+        // I₀(1) and I₀(10), Abramowitz and Stegun (1964), table 9.8 and its scaled form.
+        assert!((bessel_i0(1.0) - 1.266_065_877_752_008).abs() < 1e-14);
+        assert!((bessel_i0(10.0) / 2_815.716_628_466_254 - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn looks_that_overlap_are_worth_less() {
+        let hamming = Window::Hamming(0.70);
+        assert!((hamming.look_correlation(0.75) - 0.0138).abs() < 6e-5);
+        for (window, count, overlap, expected) in [
+            (hamming, 3, 0.25, 2.95),
+            (hamming, 4, 0.25, 3.92),
+            (hamming, 5, 0.25, 4.89),
+            (Window::Uniform, 3, 0.25, 2.77),
+            (Window::Uniform, 4, 0.25, 3.66),
+            (Window::Uniform, 5, 0.25, 4.55),
+            (Window::Uniform, 4, 0.5, 2.91),
+            (Window::Uniform, 6, 0.0, 6.0),
+        ] {
+            let found = window.overlapping_looks(count, overlap);
+            assert!((found - expected).abs() < 6e-3, "{window:?}: {found}");
+        }
+        // One band, K times over, is one look.
+        assert!((Window::Uniform.overlapping_looks(7, 1.0) - 1.0).abs() < 1e-12);
+    }
+
+    /// A Sentinel-1 IW GRDH product: slant bandwidth 14.1 MHz at an incidence where ρ is 20.3 m, Hamming 0.70,
+    /// 10 m pixels; azimuth unwindowed, 18.4 m. Measured on its sea: 0.63 0.15 0.01 and 0.43 −0.01, each to ±0.01
+    /// for the size of the crop and ±0.005 of rounding; the annotated width is rounded to 0.05 m.
+    #[test]
+    fn lags_of_a_real_product() {
+        let measured = [(Window::Hamming(0.70), 20.3, [0.63, 0.15, 0.01])];
+        for (window, resolution, lags) in measured {
+            for (n, lag) in lags.into_iter().enumerate() {
+                let distance = (n + 1) as f64 * 10.0 / resolution * window.width();
+                assert!((window.correlation(distance) - lag).abs() < 0.015);
+            }
+        }
+        let step = 10.0 / 18.4 * Window::Uniform.width();
+        assert!((Window::Uniform.correlation(step) - 0.43).abs() < 0.015);
+        assert!((Window::Uniform.correlation(2.0 * step) + 0.01).abs() < 0.015);
+        // Pixels per independent sample, each axis.
+        let pixels = |w: Window, rho: f64| w.correlation_length() * rho / (10.0 * w.width());
+        assert!((pixels(Window::Hamming(0.70), 20.3) - 2.56).abs() < 6e-3);
+        assert!((pixels(Window::Uniform, 18.4) - 2.08).abs() < 6e-3);
+    }
+
+    /// A long mean of correlated pixels is worth its length over the correlation length.
+    #[test]
+    fn averaged_pixels_are_worth_their_independent_samples() {
+        let window = Window::Hamming(0.75);
+        let pixels = 0.5;
+        let count = 2000;
+        let length = window.correlation_length() / (pixels * window.width());
+        // The ends count for 1/count of it, times the sum over lags.
+        let looks = window.averaged_looks(count, pixels) * length / f64::from(count);
+        assert!((looks - 1.0).abs() < 2e-3, "{looks}");
+        assert!((window.averaged_looks(1, pixels) - 1.0).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,440 @@
+//! Imaging satellites: what each sets of a radar, with where every number is from.
+
+use crate::constants::SPEED_OF_LIGHT;
+use crate::sar::window::Window;
+use crate::scene::Polarization;
+use serde::{Deserialize, Serialize};
+
+/// Mean radius of the Earth \[m\] (IUGG, rounded).
+const EARTH_RADIUS: f64 = 6.371e6;
+
+/// Gravitational constant times the mass of the Earth [m³/s²] (IAU 2015 nominal value).
+const EARTH_GRAVITY: f64 = 3.986_004e14;
+
+/// Noise-equivalent cross-section where nothing is published that was read \[dB\]: chosen.
+const CHOSEN_NOISE: f64 = -22.0;
+
+/// A satellite and one of its modes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[expect(missing_docs, reason = "the names of the satellites and their modes")]
+pub enum Sensor {
+    #[serde(rename = "sentinel-1-iw")]
+    Sentinel1Iw,
+    #[serde(rename = "sentinel-1-ew")]
+    Sentinel1Ew,
+    #[serde(rename = "terrasar-x-sm")]
+    TerraSarXSm,
+    #[serde(rename = "cosmo-skymed-hi")]
+    CosmoSkyMedHi,
+    #[serde(rename = "iceye-strip")]
+    IceyeStrip,
+    #[serde(rename = "alos-2-sm3")]
+    Alos2Sm3,
+    #[serde(rename = "alos-2-sm6")]
+    Alos2Sm6,
+    #[serde(rename = "alos-2-sm10")]
+    Alos2Sm10,
+    #[serde(rename = "radarsat-2-s")]
+    Radarsat2S,
+    #[serde(rename = "novasar-1")]
+    NovaSar1,
+    #[serde(rename = "ers-2-pri")]
+    Ers2Pri,
+}
+
+/// What a sensor sets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensorMode {
+    /// Frequency \[Hz\].
+    pub frequency: f64,
+    /// Polarization where the scene names none.
+    pub polarization: Polarization,
+    /// Height of the orbit over a spherical Earth \[m\].
+    pub altitude: f64,
+    /// Incidence where the scene names none, and the range the mode images \[deg\].
+    pub incidence: f64,
+    /// Nearest and farthest incidence \[deg\].
+    pub incidence_range: [f64; 2],
+    /// Pixel spacing in ground range and azimuth \[m\].
+    pub spacing: f64,
+    /// Resolution in ground range at [`Self::incidence`] \[m\], of one look; see [`Self::range_resolution_at`].
+    pub range_resolution: f64,
+    /// Resolution in azimuth \[m\], of one look.
+    pub azimuth_resolution: f64,
+    /// Windows in range and azimuth.
+    pub windows: [Window; 2],
+    /// Number of looks and the share of its band that each has in common with the next.
+    pub looks: (u32, f64),
+    /// Noise-equivalent cross-section σ⁰ \[dB\].
+    pub noise_floor: f64,
+    /// Pulse repetition frequency \[Hz\].
+    pub pulse_rate: f64,
+}
+
+impl Sensor {
+    /// Every sensor.
+    pub const ALL: [Self; 11] = [
+        Self::Sentinel1Iw,
+        Self::Sentinel1Ew,
+        Self::TerraSarXSm,
+        Self::CosmoSkyMedHi,
+        Self::IceyeStrip,
+        Self::Alos2Sm3,
+        Self::Alos2Sm6,
+        Self::Alos2Sm10,
+        Self::Radarsat2S,
+        Self::NovaSar1,
+        Self::Ers2Pri,
+    ];
+
+    /// The numbers of the mode.
+    ///
+    /// Numbers marked "chosen" are of the right size, not from a document.
+    #[must_use]
+    pub fn mode(self) -> SensorMode {
+        match self {
+            Self::Sentinel1Iw => sentinel_1_iw(),
+            Self::Sentinel1Ew => sentinel_1_ew(),
+            Self::TerraSarXSm => terrasar_x_sm(),
+            Self::CosmoSkyMedHi => cosmo_skymed_hi(),
+            Self::IceyeStrip => iceye_strip(),
+            // Spacing 2.5, 3.1, 6.25 m and resolution: distributor's table. Noise, windows: chosen.
+            Self::Alos2Sm3 => alos_2(2.5, [3.0, 3.0], 1, -24.0),
+            Self::Alos2Sm6 => alos_2(3.125, [6.0, 4.3], 1, -28.0),
+            Self::Alos2Sm10 => alos_2(6.25, [9.1, 5.3], 2, -26.0),
+            Self::Radarsat2S => radarsat_2_s(),
+            Self::NovaSar1 => novasar_1(),
+            Self::Ers2Pri => ers_2_pri(),
+        }
+    }
+}
+
+/// Interferometric wide swath, ground range detected, high resolution.
+///
+/// Frequency, windows, looks and overlap (3.5 of 14.1 MHz), noise, pulse rate (of IW1) and resolution: annotation of a
+/// product of 12 June 2022. Azimuth is unwindowed, as its sea was measured.
+fn sentinel_1_iw() -> SensorMode {
+    SensorMode {
+        frequency: 5.405e9,
+        polarization: Polarization::VV,
+        altitude: 698e3,
+        incidence: 38.7,
+        incidence_range: [30.1, 46.0],
+        spacing: 10.0,
+        // 14.1 MHz of slant range, Hamming 0.70.
+        range_resolution: ground_range(slant_resolution(14.1e6, Window::Hamming(0.70)), 38.7),
+        azimuth_resolution: 18.4,
+        windows: [Window::Hamming(0.70), Window::Uniform],
+        looks: (5, 0.25),
+        noise_floor: -25.0,
+        pulse_rate: 1717.0,
+    }
+}
+
+/// Extra-wide swath, ground range detected, medium resolution. Resolution, looks, noise and pulse rate: chosen.
+fn sentinel_1_ew() -> SensorMode {
+    SensorMode {
+        polarization: Polarization::HH,
+        incidence: 33.0,
+        incidence_range: [19.0, 47.0],
+        spacing: 40.0,
+        range_resolution: 93.0,
+        azimuth_resolution: 87.0,
+        looks: (12, 0.25),
+        noise_floor: CHOSEN_NOISE,
+        pulse_rate: 1700.0,
+        ..sentinel_1_iw()
+    }
+}
+
+/// Stripmap. Incidence: product specification TX-GS-DD-3302. Spacing, resolution, window, noise, pulse rate: chosen.
+fn terrasar_x_sm() -> SensorMode {
+    SensorMode {
+        frequency: 9.65e9,
+        polarization: Polarization::VV,
+        altitude: 514e3,
+        incidence: 32.0,
+        incidence_range: [19.7, 45.5],
+        spacing: 1.25,
+        range_resolution: 3.0,
+        azimuth_resolution: 3.3,
+        windows: [Window::Hamming(0.6); 2],
+        looks: (1, 0.0),
+        noise_floor: CHOSEN_NOISE,
+        pulse_rate: 3800.0,
+    }
+}
+
+/// Himage stripmap. Altitude, resolution: the mission's pages. Spacing, window, noise, pulse rate: chosen.
+fn cosmo_skymed_hi() -> SensorMode {
+    SensorMode {
+        frequency: 9.6e9,
+        polarization: Polarization::VV,
+        altitude: 619.6e3,
+        incidence: 35.0,
+        incidence_range: [20.0, 59.0],
+        spacing: 2.5,
+        range_resolution: 3.0,
+        azimuth_resolution: 3.0,
+        windows: [Window::Hamming(0.75); 2],
+        looks: (1, 0.0),
+        noise_floor: -20.0,
+        pulse_rate: 3100.0,
+    }
+}
+
+/// Strip. Altitude, resolution: pages of ESA and EARSC. Incidence, spacing, window, looks, noise, pulse rate: chosen.
+fn iceye_strip() -> SensorMode {
+    SensorMode {
+        frequency: 9.65e9,
+        polarization: Polarization::VV,
+        altitude: 570e3,
+        incidence: 22.0,
+        incidence_range: [15.0, 30.0],
+        spacing: 2.5,
+        range_resolution: 3.0,
+        azimuth_resolution: 3.0,
+        windows: [Window::Hamming(0.75); 2],
+        looks: (1, 0.0),
+        noise_floor: -18.0,
+        pulse_rate: 5000.0,
+    }
+}
+
+/// Stripmap of PALSAR-2. Frequency, altitude, incidence, resolution: distributor's table. The rest: chosen.
+fn alos_2(spacing: f64, resolution: [f64; 2], looks: u32, noise_floor: f64) -> SensorMode {
+    SensorMode {
+        frequency: 1.26e9,
+        polarization: Polarization::HH,
+        altitude: 628e3,
+        incidence: 35.0,
+        incidence_range: [8.0, 70.0],
+        spacing,
+        range_resolution: resolution[0],
+        azimuth_resolution: resolution[1],
+        windows: [Window::Hamming(0.75); 2],
+        looks: (looks, 0.0),
+        noise_floor,
+        pulse_rate: 2100.0,
+    }
+}
+
+/// Standard beams. Altitude, incidence, spacing, resolution, looks: product table. Overlap, noise, pulse rate: chosen.
+fn radarsat_2_s() -> SensorMode {
+    SensorMode {
+        frequency: 5.405e9,
+        polarization: Polarization::VV,
+        altitude: 798e3,
+        incidence: 36.0,
+        incidence_range: [20.0, 52.0],
+        spacing: 12.5,
+        // The table's 26.8 to 17.3 m from the nearest to the farthest beam.
+        range_resolution: 21.0,
+        azimuth_resolution: 24.7,
+        windows: [Window::Hamming(0.75); 2],
+        looks: (4, 0.5),
+        noise_floor: -28.0,
+        pulse_rate: 1300.0,
+    }
+}
+
+/// Stripmap of 6 m. Incidence, resolution, looks: reader's help. Altitude, spacing, window, noise, pulse rate: chosen.
+fn novasar_1() -> SensorMode {
+    SensorMode {
+        frequency: 3.2e9,
+        polarization: Polarization::HH,
+        altitude: 583e3,
+        incidence: 24.0,
+        incidence_range: [16.0, 31.0],
+        spacing: 3.0,
+        range_resolution: 6.0,
+        azimuth_resolution: 6.0,
+        windows: [Window::Hamming(0.75); 2],
+        looks: (3, 0.0),
+        noise_floor: -17.0,
+        pulse_rate: 3000.0,
+    }
+}
+
+/// Precision image. Altitude, incidence, spacing, looks: ESA SP-1199. Resolution, overlap, noise, pulse rate: chosen.
+fn ers_2_pri() -> SensorMode {
+    SensorMode {
+        frequency: 5.3e9,
+        polarization: Polarization::VV,
+        altitude: 785e3,
+        incidence: 23.0,
+        incidence_range: [19.4, 26.6],
+        spacing: 12.5,
+        range_resolution: 26.0,
+        azimuth_resolution: 22.0,
+        windows: [Window::Hamming(0.75); 2],
+        looks: (3, 0.4),
+        noise_floor: -24.0,
+        pulse_rate: 1680.0,
+    }
+}
+
+impl SensorMode {
+    /// Range over platform speed R/V \[s\] at an incidence \[deg\], see [`range_to_velocity`].
+    #[must_use]
+    pub fn range_to_velocity_at(&self, incidence: f64) -> f64 {
+        range_to_velocity(self.altitude, incidence.to_radians())
+    }
+
+    /// Resolution in ground range \[m\] at an incidence \[deg\]: the slant resolution stays.
+    #[must_use]
+    pub fn range_resolution_at(&self, incidence: f64) -> f64 {
+        let slant = self.range_resolution * self.incidence.to_radians().sin();
+        ground_range(slant, incidence)
+    }
+}
+
+/// Slant range R over the platform's speed V \[s\]: the azimuth displacement on the ground of 1 m/s along the line of sight.
+///
+/// ```text
+/// R = √((r + h)² − r² sin²θ) − r cos θ,     V = √(GM/(r + h))
+/// ```
+///
+/// a circular orbit at the height h over a sphere of radius r. A point that approaches at u shifts in time by
+/// u R/(V `V_g`), with `V_g` the speed of the beam on the ground, and by u R/V there.
+///
+/// - `altitude` h \[m\]; `incidence` θ \[rad\], at the ground, 0 to π/2
+#[must_use]
+pub fn range_to_velocity(altitude: f64, incidence: f64) -> f64 {
+    let orbit = EARTH_RADIUS + altitude;
+    let (sin, cos) = incidence.sin_cos();
+    let range = (orbit * orbit - (EARTH_RADIUS * sin).powi(2)).sqrt() - EARTH_RADIUS * cos;
+    range / (EARTH_GRAVITY / orbit).sqrt()
+}
+
+/// Azimuth distance of the first ambiguity \[m\]: what one pulse rate of Doppler displaces.
+///
+/// ```text
+/// Δy = PRF λ β/2,     β = R/V
+/// ```
+#[must_use]
+pub fn ambiguity_distance(pulse_rate: f64, frequency: f64, range_to_velocity: f64) -> f64 {
+    0.5 * pulse_rate * SPEED_OF_LIGHT / frequency * range_to_velocity
+}
+
+/// Resolution in slant range \[m\] of a bandwidth \[Hz\]: ρB c/(2B).
+#[must_use]
+pub fn slant_resolution(bandwidth: f64, window: Window) -> f64 {
+    window.width() * SPEED_OF_LIGHT / (2.0 * bandwidth)
+}
+
+/// Ground range \[m\] of a length in slant range \[m\] at an incidence \[deg\]: resolutions and pixels alike.
+#[must_use]
+pub fn ground_range(slant: f64, incidence: f64) -> f64 {
+    slant / incidence.to_radians().sin()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// β as tabulated elsewhere for each orbit and incidence, to the digits printed; ALOS-2 alike for its modes.
+    #[test]
+    fn range_to_velocity_of_the_orbits() {
+        let table = [
+            (Sensor::Sentinel1Iw, 115.0, 0.6),
+            (Sensor::Sentinel1Ew, 109.0, 0.6),
+            (Sensor::TerraSarXSm, 78.5, 0.06),
+            (Sensor::CosmoSkyMedHi, 98.0, 0.6),
+            (Sensor::IceyeStrip, 81.0, 0.6),
+            (Sensor::Alos2Sm6, 99.0, 0.6),
+            (Sensor::Radarsat2S, 129.0, 0.6),
+            (Sensor::NovaSar1, 84.0, 0.6),
+            (Sensor::Ers2Pri, 113.0, 0.6),
+        ];
+        for (sensor, expected, rounding) in table {
+            let mode = sensor.mode();
+            let beta = mode.range_to_velocity_at(mode.incidence);
+            assert!((beta - expected).abs() < rounding, "{sensor:?}: {beta}");
+        }
+        // Straight down the range is the altitude; at the horizon the tangent.
+        let speed = |h: f64| (EARTH_GRAVITY / (EARTH_RADIUS + h)).sqrt();
+        let h = 7e5;
+        assert!((range_to_velocity(h, 0.0) * speed(h) / h - 1.0).abs() < 1e-12);
+        let tangent = (h * (2.0 * EARTH_RADIUS + h)).sqrt();
+        let grazing = range_to_velocity(h, std::f64::consts::FRAC_PI_2);
+        assert!((grazing * speed(h) / tangent - 1.0).abs() < 1e-12);
+    }
+
+    /// Kilometres to the first ghost.
+    #[test]
+    fn ambiguities_lie_where_tabulated() {
+        for (sensor, expected, rounding) in [
+            (Sensor::Sentinel1Iw, 5.0, 0.5),
+            (Sensor::TerraSarXSm, 4.6, 0.06),
+            (Sensor::CosmoSkyMedHi, 4.8, 0.06),
+            (Sensor::Alos2Sm3, 25.0, 0.6),
+            (Sensor::Radarsat2S, 4.6, 0.06),
+            (Sensor::NovaSar1, 12.0, 0.6),
+            (Sensor::Ers2Pri, 5.4, 0.06),
+        ] {
+            let mode = sensor.mode();
+            let beta = mode.range_to_velocity_at(mode.incidence);
+            let distance = ambiguity_distance(mode.pulse_rate, mode.frequency, beta) / 1e3;
+            assert!(
+                (distance - expected).abs() < rounding,
+                "{sensor:?}: {distance}"
+            );
+        }
+    }
+
+    /// The resolution of the annotated bandwidth in the nearest sub-swath is 20.3 m at 33°.
+    #[test]
+    fn ground_resolution_falls_with_incidence() {
+        let mode = Sensor::Sentinel1Iw.mode();
+        assert!((mode.range_resolution_at(33.0) - 20.3).abs() < 0.06);
+        assert!(mode.range_resolution_at(45.0) < mode.range_resolution_at(31.0));
+        let same = mode.range_resolution_at(mode.incidence);
+        assert!((same - mode.range_resolution).abs() < 1e-12);
+        // c/2B without a window, 0.886 of it.
+        let slant = slant_resolution(100e6, Window::Uniform);
+        assert!((slant - 0.885_892_9 * 1.498_962_29).abs() < 1e-6);
+    }
+
+    /// Looks that the products state.
+    #[test]
+    fn equivalent_looks_of_the_products() {
+        for (sensor, low, high) in [
+            (Sensor::Sentinel1Iw, 4.4, 4.9),
+            (Sensor::Sentinel1Ew, 10.6, 11.8),
+            (Sensor::Radarsat2S, 3.0, 3.3),
+            (Sensor::Ers2Pri, 2.6, 2.8),
+        ] {
+            let mode = sensor.mode();
+            let (looks, overlap) = mode.looks;
+            let enl = mode.windows[0].overlapping_looks(looks, overlap);
+            assert!((low..=high).contains(&enl), "{sensor:?}: {enl}");
+        }
+    }
+
+    #[test]
+    fn every_mode_lies_within_the_ranges_of_a_scene() {
+        for sensor in Sensor::ALL {
+            let mode = sensor.mode();
+            assert!((1e9..=2e10).contains(&mode.frequency));
+            let [near, far] = mode.incidence_range;
+            assert!(5.0 <= near && near < mode.incidence && mode.incidence < far && far <= 75.0);
+            for incidence in [near, mode.incidence, far] {
+                assert!((0.0..=200.0).contains(&mode.range_to_velocity_at(incidence)));
+                assert!((0.5..=500.0).contains(&mode.range_resolution_at(incidence)));
+            }
+            assert!((-40.0..=0.0).contains(&mode.noise_floor), "{sensor:?}");
+        }
+    }
+
+    #[test]
+    fn names_are_those_of_scene_files() {
+        let names = Sensor::ALL.map(|s| serde_json::to_string(&s).unwrap());
+        assert_eq!(names[0], "\"sentinel-1-iw\"");
+        assert_eq!(names[5], "\"alos-2-sm3\"");
+        for (sensor, name) in Sensor::ALL.into_iter().zip(&names) {
+            assert_eq!(serde_json::from_str::<Sensor>(name).unwrap(), sensor);
+        }
+    }
+}
