@@ -9,12 +9,12 @@
 //! Sea, noise and ships pass through the same filter. A point of cross-section σ is √σ/Δ in one cell of E, Δ the spacing;
 //! its image integrates to σ.
 
-use super::window::Window;
 use crate::fft::{self, LowPass};
 use crate::random::line_generator;
 use crate::raster::{Field, Raster};
 use crate::surface::vector::{cos_sin, ln};
 use crate::vectorize::vectorized;
+use crate::window::Window;
 use num_complex::Complex32;
 use rand::Rng;
 

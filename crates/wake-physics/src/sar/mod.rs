@@ -13,8 +13,8 @@ pub mod direct;
 pub mod echo;
 pub mod geometry;
 pub mod impulse;
+pub mod scatterers;
 pub mod speckle;
-pub mod window;
 
 mod imaging;
 mod spread;
@@ -23,4 +23,3 @@ pub use coherence::AzimuthResolution;
 pub use echo::Echo;
 pub use imaging::{Imaging, Sources};
 pub use impulse::ImpulseResponse;
-pub use window::Window;

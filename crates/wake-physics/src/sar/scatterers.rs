@@ -127,7 +127,7 @@ fn uniform(random: &mut impl Rng, [low, high]: [f64; 2]) -> f64 {
 
 /// Azimuth ambiguities: fainter copies of points, the same distance before and behind them.
 ///
-/// - `distance` \[m\], see [`crate::sensor::ambiguity_distance`]
+/// - `distance` \[m\], see [`crate::scene::sensor::ambiguity_distance`]
 /// - `level`: their cross section over that of the points \[1\]
 ///
 /// Their shift in range and their smear are left out.
@@ -236,7 +236,10 @@ mod tests {
             }
         }
         let deviation = f64::sqrt(sum / n);
-        assert!((deviation / 34.5 - 1.0).abs() < 4.0 / f64::sqrt(2.0 * n), "{deviation}");
+        assert!(
+            (deviation / 34.5 - 1.0).abs() < 4.0 / f64::sqrt(2.0 * n),
+            "{deviation}"
+        );
     }
 
     #[test]

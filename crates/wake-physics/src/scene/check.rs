@@ -2,6 +2,7 @@
 
 use super::{Grid, HullForm, Radar, Scene, Sea, Ship};
 use crate::error::{Error, Result, finite, in_range};
+use crate::window::Window;
 
 impl Scene {
     /// Checks every value against its closed range.
@@ -36,7 +37,15 @@ impl Sea {
         in_range("sea.depth", self.depth, 1.0, f64::INFINITY, "m")?;
         in_range("sea.time", self.time, 0.0, 1e5, "s")?;
         in_range("sea.temperature", self.temperature, -2.0, 40.0, "°C")?;
-        in_range("sea.salinity", self.salinity, 0.0, 45.0, "psu")
+        in_range("sea.salinity", self.salinity, 0.0, 45.0, "psu")?;
+        in_range("sea.gust_strength", self.gust_strength, 0.0, 0.5, "")?;
+        in_range("sea.gust_scale", self.gust_scale, 100.0, 5e4, "m")?;
+        in_range("sea.swell_height", self.swell_height, 0.0, 15.0, "m")?;
+        in_range("sea.swell_length", self.swell_length, 30.0, 1000.0, "m")?;
+        finite("sea.swell_toward", self.swell_toward, "degrees")?;
+        in_range("sea.slick_damping", self.slick_damping, 0.0, 1.0, "")?;
+        in_range("sea.slick_width", self.slick_width, 5.0, 1000.0, "m")?;
+        in_range("sea.slick_scale", self.slick_scale, 100.0, 5e4, "m")
     }
 }
 
@@ -59,6 +68,9 @@ impl Ship {
         finite("ship.position[0]", self.position[0], "m")?;
         finite("ship.position[1]", self.position[1], "m")?;
         in_range("ship.filter_depth", self.filter_depth, 0.0, 20.0, "m")?;
+        optional("ship.edge_time", self.edge_time, [0.0, 1000.0], "s")?;
+        in_range("ship.edge_outflow", self.edge_outflow, 0.0, 0.3, "m/s")?;
+        in_range("ship.roll", self.roll, 0.0, 2.0, "m/s")?;
         match (self.hull, self.block_coefficient) {
             (HullForm::Wigley, Some(value)) => Err(Error::Conflict {
                 name: "ship.block_coefficient".to_owned(),
@@ -87,10 +99,73 @@ impl Radar {
         )?;
         in_range("radar.resolution", self.resolution, 0.5, 100.0, "m")?;
         in_range("radar.looks", f64::from(self.looks), 1.0, 1000.0, "")?;
-        match self.relaxation_rate {
-            Some(rate) => in_range("radar.relaxation_rate", rate, 0.01, 100.0, "1/s"),
-            None => Ok(()),
+        optional(
+            "radar.range_resolution",
+            self.range_resolution,
+            [0.5, 500.0],
+            "m",
+        )?;
+        optional("radar.look_overlap", self.look_overlap, [0.0, 0.9], "")?;
+        optional("radar.noise_floor", self.noise_floor, [-60.0, 20.0], "dB")?;
+        optional("radar.ambiguity", self.ambiguity, [-60.0, 0.0], "dB")?;
+        optional("radar.pulse_rate", self.pulse_rate, [100.0, 2e4], "Hz")?;
+        optional(
+            "radar.relaxation_rate",
+            self.relaxation_rate,
+            [0.01, 100.0],
+            "1/s",
+        )?;
+        window("radar.window", self.window)?;
+        window("radar.azimuth_window", self.azimuth_window)?;
+        self.response()
+    }
+
+    /// What only an impulse response has is refused without one.
+    fn response(&self) -> Result<()> {
+        let needless = [
+            ("radar.window", self.window.is_some()),
+            ("radar.azimuth_window", self.azimuth_window.is_some()),
+            ("radar.look_overlap", self.look_overlap.is_some()),
+            ("radar.ambiguity", self.ambiguity.is_some()),
+        ];
+        let refuse = |name: &str, requirement: &str| {
+            Err(Error::Conflict {
+                name: name.to_owned(),
+                value: "set".to_owned(),
+                requirement: requirement.to_owned(),
+            })
+        };
+        if let (None, Some((name, _))) =
+            (self.range_resolution, needless.iter().find(|(_, set)| *set))
+        {
+            return refuse(
+                name,
+                "but needs radar.range_resolution: set it, or name a radar.sensor",
+            );
         }
+        if self.ambiguity.is_some() && self.pulse_rate.is_none() {
+            return refuse("radar.ambiguity", "but needs radar.pulse_rate: set it too");
+        }
+        Ok(())
+    }
+}
+
+/// Checks a value that may be absent.
+fn optional(
+    name: &str,
+    value: Option<f64>,
+    [min, max]: [f64; 2],
+    unit: &'static str,
+) -> Result<()> {
+    value.map_or(Ok(()), |value| in_range(name, value, min, max, unit))
+}
+
+/// Checks the parameter of a window.
+fn window(name: &str, window: Option<Window>) -> Result<()> {
+    match window {
+        Some(Window::Hamming(alpha)) => in_range(&format!("{name}.hamming"), alpha, 0.5, 1.0, ""),
+        Some(Window::Kaiser(beta)) => in_range(&format!("{name}.kaiser"), beta, 0.0, 10.0, ""),
+        Some(Window::Uniform) | None => Ok(()),
     }
 }
 
@@ -100,7 +175,7 @@ mod tests {
     use super::*;
 
     /// Key, closed range, and values just outside it.
-    const RANGES: [(&str, f64, f64); 20] = [
+    const RANGES: [(&str, f64, f64); 34] = [
         ("grid.rows", 1.0, 16384.0),
         ("grid.columns", 1.0, 16384.0),
         ("grid.spacing", 0.1, 100.0),
@@ -121,6 +196,20 @@ mod tests {
         ("radar.resolution", 0.5, 100.0),
         ("radar.relaxation_rate", 0.01, 100.0),
         ("model.tolerance", 1e-6, 0.1),
+        ("sea.gust_strength", 0.0, 0.5),
+        ("sea.gust_scale", 100.0, 5e4),
+        ("sea.swell_height", 0.0, 15.0),
+        ("sea.swell_length", 30.0, 1000.0),
+        ("sea.slick_damping", 0.0, 1.0),
+        ("sea.slick_width", 5.0, 1000.0),
+        ("sea.slick_scale", 100.0, 5e4),
+        ("ship.edge_time", 0.0, 1000.0),
+        ("ship.edge_outflow", 0.0, 0.3),
+        ("ship.roll", 0.0, 2.0),
+        ("radar.range_resolution", 0.5, 500.0),
+        ("radar.noise_floor", -60.0, 20.0),
+        ("radar.pulse_rate", 100.0, 2e4),
+        ("radar.look_overlap", 0.0, 0.9),
     ];
 
     fn set(key: &str, value: f64) -> Result<Scene> {
@@ -131,6 +220,7 @@ mod tests {
             format!("{value:e}")
         };
         let mut scene = Scene::default();
+        scene.radar.range_resolution = Some(10.0);
         if let Some(ship) = &mut scene.ship {
             // A hull on which every single value may take its extremes.
             (ship.length, ship.beam, ship.draft) = (300.0, 0.5, 0.5);
@@ -185,6 +275,37 @@ mod tests {
                 .with_assignments(&["radar.looks=2.5"])
                 .is_err()
         );
+    }
+
+    #[test]
+    fn an_impulse_response_is_asked_for_by_its_resolution() {
+        let refused = |keys: &[&str]| {
+            Scene::default()
+                .with_assignments(keys)
+                .unwrap_err()
+                .to_string()
+        };
+        for key in [
+            "radar.window=uniform",
+            "radar.azimuth_window={ hamming = 0.7 }",
+            "radar.look_overlap=0.2",
+            "radar.ambiguity=-25",
+        ] {
+            assert!(refused(&[key]).contains("radar.range_resolution"), "{key}");
+        }
+        let ghost = ["radar.range_resolution=10", "radar.ambiguity=-25"];
+        assert!(refused(&ghost).contains("radar.pulse_rate"));
+        for (key, good) in [
+            ("radar.window={ hamming = 0.5 }", true),
+            ("radar.window={ hamming = 1.0 }", true),
+            ("radar.window={ hamming = 0.499 }", false),
+            ("radar.window={ kaiser = 10 }", true),
+            ("radar.azimuth_window={ kaiser = 10.1 }", false),
+            ("radar.window=kaiser", false),
+        ] {
+            let scene = Scene::default().with_assignments(&["radar.range_resolution=10", key]);
+            assert_eq!(scene.is_ok(), good, "{key}: {scene:?}");
+        }
     }
 
     #[test]

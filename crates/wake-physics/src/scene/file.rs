@@ -1,6 +1,7 @@
 //! Scene files: reading, writing, and assignments such as `ship.speed=10`.
 
 use super::Scene;
+use super::keys::SET_BY_SENSOR;
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -80,6 +81,9 @@ impl Scene {
         let mut root = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
         let path: Vec<&str> = key.trim().split('.').collect();
         let (last, tables) = path.split_last().unwrap_or((&"", &[]));
+        if path == ["radar", "sensor"] {
+            forget_radar(&mut root);
+        }
         let mut table = &mut root;
         for name in tables {
             let entry = table
@@ -93,6 +97,17 @@ impl Scene {
         root.try_into()
             .map_err(|e: toml::de::Error| fail(e.message().trim().to_owned()))
     }
+}
+
+/// Takes away what a sensor sets.
+fn forget_radar(root: &mut toml::Table) {
+    let mut forget = |table: &str, keys: &[&str]| {
+        if let Some(table) = root.get_mut(table).and_then(toml::Value::as_table_mut) {
+            table.retain(|key, _| !keys.iter().any(|k| *k == key));
+        }
+    };
+    forget("radar", &SET_BY_SENSOR);
+    forget("grid", &["spacing"]);
 }
 
 /// The message of an error of TOML on one line, with the number of the line it is about.

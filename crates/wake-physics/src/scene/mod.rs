@@ -3,35 +3,35 @@
 mod check;
 mod depth;
 mod file;
+mod keys;
 mod paper;
+pub mod sensor;
 
+use crate::window::Window;
 pub use paper::paper_grid;
+pub use sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// A ship, a sea and a radar over a grid of pixels.
 ///
 /// The same type reads and writes scene files (TOML). Unknown keys are errors; an absent table takes its
-/// defaults, except `[ship]`: no table, no ship. [`Scene::default`] has the default ship.
+/// defaults, except `[ship]`: no table, no ship. [`Scene::default`] has the default ship. Where `radar.sensor` names a
+/// satellite, it sets what no key beside it does, [`Grid::spacing`] too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(from = "keys::SceneKeys")]
 pub struct Scene {
     /// Seed of the random sea and of the speckle.
-    #[serde(default = "default_seed")]
     pub seed: u64,
     /// The pixels.
-    #[serde(default)]
     pub grid: Grid,
     /// Wind and waves.
-    #[serde(default)]
     pub sea: Sea,
     /// The ship, if there is one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ship: Option<Ship>,
     /// The radar and its platform.
-    #[serde(default)]
     pub radar: Radar,
     /// Which terms are computed, and how well.
-    #[serde(default)]
     pub model: Model,
 }
 
@@ -53,8 +53,7 @@ impl Default for Scene {
 }
 
 /// The pixels of the image.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Grid {
     /// Pixels along azimuth, 1 to 16384.
     pub rows: usize,
@@ -97,6 +96,24 @@ pub struct Sea {
     pub temperature: f64,
     /// Salinity \[psu\], 0 to 45.
     pub salinity: f64,
+    /// Standard deviation of the logarithm of the wind speed in gusts \[1\], 0 to 0.5; 0: none. See [`crate::gusts`].
+    pub gust_strength: f64,
+    /// Outer scale of the gusts \[m\], 100 to 50,000.
+    pub gust_scale: f64,
+    /// Significant height of a swell \[m\], 0 to 15; 0: none. See [`crate::swell`].
+    pub swell_height: f64,
+    /// Wavelength of the swell's peak \[m\], 30 to 1000.
+    pub swell_length: f64,
+    /// Where the swell goes to [deg clockwise from azimuth].
+    pub swell_toward: f64,
+    /// Whether breaking waves add to the return. See [`crate::scattering::breaking`].
+    pub breaking: bool,
+    /// Damping of the short waves in slicks \[1\], 0 to 1; 0: none. See [`crate::slicks`].
+    pub slick_damping: f64,
+    /// Full width of a slick \[m\], 5 to 1000.
+    pub slick_width: f64,
+    /// Length over which slicks wind \[m\], 100 to 50,000.
+    pub slick_scale: f64,
 }
 
 impl Default for Sea {
@@ -111,6 +128,15 @@ impl Default for Sea {
             time: 0.0,
             temperature: 20.0,
             salinity: 35.0,
+            gust_strength: 0.0,
+            gust_scale: 2000.0,
+            swell_height: 0.0,
+            swell_length: 200.0,
+            swell_toward: 0.0,
+            breaking: false,
+            slick_damping: 0.0,
+            slick_width: 50.0,
+            slick_scale: 2500.0,
         }
     }
 }
@@ -164,6 +190,15 @@ pub struct Ship {
     pub echo: bool,
     /// Weights the wake's spectrum with `exp(−k·filter_depth)` \[m\], 0 to 20.
     pub filter_depth: f64,
+    /// Whether the turbulent wake has a current and bright edges. See [`crate::turbulent::current`].
+    pub edge: bool,
+    /// Response of σ⁰ to the convergence of that current \[s\], 0 to 1000; from wind and radar where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub edge_time: Option<f64>,
+    /// Outflow from the wake's middle at the stern [m/s], 0 to 0.3.
+    pub edge_outflow: f64,
+    /// Standard deviation of the line-of-sight velocity of points on the ship by roll and pitch [m/s], 0 to 2.
+    pub roll: f64,
 }
 
 impl Default for Ship {
@@ -179,6 +214,10 @@ impl Default for Ship {
             block_coefficient: None,
             echo: false,
             filter_depth: 0.0,
+            edge: false,
+            edge_time: None,
+            edge_outflow: 0.0,
+            roll: 0.0,
         }
     }
 }
@@ -194,9 +233,11 @@ pub enum HullForm {
 }
 
 /// The radar and its platform; it looks toward +x.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Radar {
+    /// The satellite that set what follows, where no key beside it did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<Sensor>,
     /// Frequency \[Hz\], 1e9 to 2e10.
     pub frequency: f64,
     /// Polarization, sent and received.
@@ -207,8 +248,31 @@ pub struct Radar {
     pub range_to_velocity: f64,
     /// Single-look azimuth resolution \[m\], 0.5 to 100.
     pub resolution: f64,
-    /// Number of independent looks, 1 to 1000.
+    /// Resolution of one look in ground range \[m\], 0.5 to 500. Where absent it is the pixel and every pixel has its own
+    /// speckle; with it the image has the radar's impulse response in both axes, see [`crate::sar::impulse`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_resolution: Option<f64>,
+    /// Window over the bandwidth in range, and in azimuth where [`Self::azimuth_window`] is absent; uniform where absent.
+    /// Only with a range resolution, as the four that follow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<Window>,
+    /// Window over the bandwidth in azimuth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub azimuth_window: Option<Window>,
+    /// Number of looks, 1 to 1000.
     pub looks: u32,
+    /// Share of its band that a look has in common with the next, 0 to 0.9; 0 where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub look_overlap: Option<f64>,
+    /// Noise-equivalent σ⁰ \[dB\], −60 to 20, added before the speckle; no noise where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor: Option<f64>,
+    /// Level of the ship's azimuth ambiguities over its echo \[dB\], −60 to 0; none where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ambiguity: Option<f64>,
+    /// Pulse repetition frequency \[Hz\], 100 to 20,000: places the ambiguities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pulse_rate: Option<f64>,
     /// Relaxation rate of the hydrodynamic modulation [1/s], 0.01 to 100; from the Bragg wave and the
     /// wind where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -218,12 +282,20 @@ pub struct Radar {
 impl Default for Radar {
     fn default() -> Self {
         Self {
+            sensor: None,
             frequency: 9.6e9,
             polarization: Polarization::VV,
             incidence: 32.0,
             range_to_velocity: 78.0,
             resolution: 3.0,
+            range_resolution: None,
+            window: None,
+            azimuth_window: None,
             looks: 4,
+            look_overlap: None,
+            noise_floor: None,
+            ambiguity: None,
+            pulse_rate: None,
             relaxation_rate: None,
         }
     }

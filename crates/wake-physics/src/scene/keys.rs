@@ -1,0 +1,214 @@
+//! The keys of a scene file: what is absent comes from the sensor, and where there is none from the defaults.
+
+use super::sensor::SensorMode;
+use super::{Grid, Model, Polarization, Radar, Scene, Sea, Sensor, Ship, default_seed};
+use crate::window::Window;
+use serde::Deserialize;
+
+/// Azimuth ambiguities over a ship's echo where a sensor is named \[dB\]: chosen from −20 to −30.
+const AMBIGUITY: f64 = -25.0;
+
+/// A scene as it is written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename = "Scene")]
+pub(super) struct SceneKeys {
+    #[serde(default = "default_seed")]
+    seed: u64,
+    #[serde(default)]
+    grid: GridKeys,
+    #[serde(default)]
+    sea: Sea,
+    ship: Option<Ship>,
+    #[serde(default)]
+    radar: RadarKeys,
+    #[serde(default)]
+    model: Model,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default, rename = "Grid")]
+struct GridKeys {
+    rows: Option<usize>,
+    columns: Option<usize>,
+    spacing: Option<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default, rename = "Radar")]
+struct RadarKeys {
+    sensor: Option<Sensor>,
+    frequency: Option<f64>,
+    polarization: Option<Polarization>,
+    incidence: Option<f64>,
+    range_to_velocity: Option<f64>,
+    resolution: Option<f64>,
+    range_resolution: Option<f64>,
+    window: Option<Window>,
+    azimuth_window: Option<Window>,
+    looks: Option<u32>,
+    look_overlap: Option<f64>,
+    noise_floor: Option<f64>,
+    ambiguity: Option<f64>,
+    pulse_rate: Option<f64>,
+    relaxation_rate: Option<f64>,
+}
+
+/// Keys that a sensor sets where they are absent.
+pub(super) const SET_BY_SENSOR: [&str; 13] = [
+    "frequency",
+    "polarization",
+    "incidence",
+    "range_to_velocity",
+    "resolution",
+    "range_resolution",
+    "window",
+    "azimuth_window",
+    "looks",
+    "look_overlap",
+    "noise_floor",
+    "ambiguity",
+    "pulse_rate",
+];
+
+impl From<SceneKeys> for Scene {
+    fn from(keys: SceneKeys) -> Self {
+        let grid = Grid::default();
+        let spacing = keys.radar.sensor.map(|s| s.mode().spacing);
+        Self {
+            seed: keys.seed,
+            grid: Grid {
+                rows: keys.grid.rows.unwrap_or(grid.rows),
+                columns: keys.grid.columns.unwrap_or(grid.columns),
+                spacing: keys.grid.spacing.or(spacing).unwrap_or(grid.spacing),
+            },
+            sea: keys.sea,
+            ship: keys.ship,
+            radar: keys.radar.with(),
+            model: keys.model,
+        }
+    }
+}
+
+impl RadarKeys {
+    /// The radar these keys describe.
+    fn with(self) -> Radar {
+        let incidence = self
+            .incidence
+            .or_else(|| self.sensor.map(|s| s.mode().incidence));
+        let base = match self.sensor {
+            Some(sensor) => of_sensor(sensor, incidence),
+            None => Radar::default(),
+        };
+        Radar {
+            sensor: self.sensor,
+            frequency: self.frequency.unwrap_or(base.frequency),
+            polarization: self.polarization.unwrap_or(base.polarization),
+            incidence: incidence.unwrap_or(base.incidence),
+            range_to_velocity: self.range_to_velocity.unwrap_or(base.range_to_velocity),
+            resolution: self.resolution.unwrap_or(base.resolution),
+            range_resolution: self.range_resolution.or(base.range_resolution),
+            window: self.window.or(base.window),
+            azimuth_window: self.azimuth_window.or(base.azimuth_window),
+            looks: self.looks.unwrap_or(base.looks),
+            look_overlap: self.look_overlap.or(base.look_overlap),
+            noise_floor: self.noise_floor.or(base.noise_floor),
+            ambiguity: self.ambiguity.or(base.ambiguity),
+            pulse_rate: self.pulse_rate.or(base.pulse_rate),
+            relaxation_rate: self.relaxation_rate,
+        }
+    }
+}
+
+/// The radar of a sensor at an incidence \[deg\].
+fn of_sensor(sensor: Sensor, incidence: Option<f64>) -> Radar {
+    let mode: SensorMode = sensor.mode();
+    let incidence = incidence.unwrap_or(mode.incidence);
+    Radar {
+        sensor: Some(sensor),
+        frequency: mode.frequency,
+        polarization: mode.polarization,
+        incidence,
+        range_to_velocity: mode.range_to_velocity_at(incidence),
+        resolution: mode.azimuth_resolution,
+        range_resolution: Some(mode.range_resolution_at(incidence)),
+        window: Some(mode.windows[0]),
+        azimuth_window: Some(mode.windows[1]),
+        looks: mode.looks.0,
+        look_overlap: Some(mode.looks.1),
+        noise_floor: Some(mode.noise_floor),
+        ambiguity: Some(AMBIGUITY),
+        pulse_rate: Some(mode.pulse_rate),
+        relaxation_rate: None,
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "values that must be the same bits")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_sets_what_no_key_does() {
+        let scene = Scene::from_toml("[radar]\nsensor = \"sentinel-1-iw\"").unwrap();
+        assert_eq!(scene.grid.spacing, 10.0);
+        assert_eq!(scene.radar.frequency, 5.405e9);
+        assert_eq!(scene.radar.window, Some(Window::Hamming(0.7)));
+        let mode = Sensor::Sentinel1Iw.mode();
+        assert_eq!(
+            scene.radar.range_to_velocity,
+            mode.range_to_velocity_at(38.7)
+        );
+        let text =
+            "[grid]\nspacing = 5\n[radar]\nsensor = \"sentinel-1-iw\"\nincidence = 33\nlooks = 9";
+        let other = Scene::from_toml(text).unwrap();
+        assert_eq!((other.grid.spacing, other.radar.looks), (5.0, 9));
+        assert_eq!(
+            other.radar.range_to_velocity,
+            mode.range_to_velocity_at(33.0)
+        );
+        assert!((other.radar.range_resolution.unwrap() - 20.3).abs() < 0.06);
+    }
+
+    #[test]
+    fn every_sensor_is_a_valid_scene_that_reads_back() {
+        for sensor in Sensor::ALL {
+            let name = serde_json::to_string(&sensor).unwrap();
+            let scene = Scene::from_toml(&format!("[radar]\nsensor = {name}")).unwrap();
+            assert_eq!(scene.radar.sensor, Some(sensor));
+            assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        }
+    }
+
+    /// Assignments count in order: a sensor replaces the radar before it, a key after it wins.
+    #[test]
+    fn assigning_a_sensor_replaces_the_radar() {
+        let scene = Scene::default()
+            .with_assignments(&[
+                "radar.looks=9",
+                "radar.sensor=ers-2-pri",
+                "radar.frequency=6e9",
+            ])
+            .unwrap();
+        assert_eq!((scene.radar.looks, scene.radar.frequency), (3, 6e9));
+        assert_eq!(scene.grid.spacing, 12.5);
+        // What no sensor sets stays.
+        let kept = Scene::default()
+            .with_assignments(&["radar.relaxation_rate=2", "radar.sensor=ers-2-pri"])
+            .unwrap();
+        assert_eq!(kept.radar.relaxation_rate, Some(2.0));
+    }
+
+    /// Every field of the radar but two is set by a sensor; a new one must be put on the list or named here.
+    #[test]
+    fn the_list_of_keys_is_complete() {
+        let radar = of_sensor(Sensor::Sentinel1Iw, None);
+        let written = toml::Table::try_from(&radar).unwrap();
+        let set: Vec<&str> = written
+            .keys()
+            .map(String::as_str)
+            .filter(|k| *k != "sensor")
+            .collect();
+        assert_eq!(set.len(), SET_BY_SENSOR.len());
+        assert!(set.iter().all(|key| SET_BY_SENSOR.contains(key)), "{set:?}");
+    }
+}
