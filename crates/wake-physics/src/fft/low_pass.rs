@@ -12,12 +12,12 @@ const BLOCK: usize = 16;
 
 /// Weights of one axis of a filter at the frequencies −h…h of an FFT: an odd number of them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Band(pub Vec<f32>);
+pub(crate) struct Band(pub(crate) Vec<f32>);
 
 impl Band {
     /// Highest frequency h, in steps of the FFT.
     #[must_use]
-    pub fn highest(&self) -> usize {
+    pub(crate) fn highest(&self) -> usize {
         self.0.len() / 2
     }
 }
@@ -31,7 +31,7 @@ impl Band {
 ///
 /// The field is continued by zeros to the M × N pixels of the FFT and periodically beyond. Only the frequencies of the
 /// band are computed after the first pass, and only the kept pixels by the last.
-pub struct LowPass {
+pub(crate) struct LowPass {
     /// Rows and columns of the FFT: M, N.
     sizes: [usize; 2],
     step: usize,
@@ -43,20 +43,20 @@ pub struct LowPass {
 
 /// Which pixels are kept: `start` and number of rows and of columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Window {
+pub(crate) struct Window {
     /// First row and column, of the field.
-    pub start: [usize; 2],
+    pub(crate) start: [usize; 2],
     /// Number of rows and columns kept.
-    pub keep: [usize; 2],
+    pub(crate) keep: [usize; 2],
 }
 
 /// A delta function at a place between the pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// Row and column, with fractions, of the field.
-    pub place: [f64; 2],
+    pub(crate) place: [f64; 2],
     /// Amplitude.
-    pub amplitude: Complex32,
+    pub(crate) amplitude: Complex32,
 }
 
 impl std::fmt::Debug for LowPass {
@@ -71,7 +71,7 @@ impl std::fmt::Debug for LowPass {
 impl LowPass {
     /// Rows and columns of the FFT for a field of `size` pixels of which every `step`-th is kept.
     #[must_use]
-    pub fn sizes(size: [usize; 2], step: usize) -> [usize; 2] {
+    pub(crate) fn sizes(size: [usize; 2], step: usize) -> [usize; 2] {
         size.map(|n| step * fast_length(n.div_ceil(step)))
     }
 
@@ -84,7 +84,7 @@ impl LowPass {
     ///
     /// If a size is no multiple of the step, or a band is wider than the FFT.
     #[must_use]
-    pub fn new(sizes: [usize; 2], step: usize, bands: [Band; 2]) -> Self {
+    pub(crate) fn new(sizes: [usize; 2], step: usize, bands: [Band; 2]) -> Self {
         let mut planner = FftPlanner::new();
         for (size, band) in sizes.iter().zip(&bands) {
             assert!(
@@ -118,7 +118,7 @@ impl LowPass {
     /// # Panics
     ///
     /// If there are more rows than the FFT has, or `out` has another length.
-    pub fn run<T: Send>(
+    pub(crate) fn run<T: Send>(
         &self,
         rows: usize,
         fill: impl Fn(usize, &mut [Complex32]) + Sync,
