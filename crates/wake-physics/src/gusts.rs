@@ -103,6 +103,47 @@ impl Gusts {
         field
     }
 
+    /// Multiplies σ⁰ with exp(n g − ½n²s²), g drawn on every few pixels and interpolated linearly between them: 1/200 of
+    /// the outer scale, below which lies a twentieth of the variance.
+    ///
+    /// - `exponent` n, see [`wind_exponent`]
+    pub(crate) fn modulate_raster(
+        &self,
+        sigma0: &mut Field,
+        raster: &Raster,
+        exponent: f64,
+        seed: u64,
+    ) {
+        let step = ((self.scale / (200.0 * raster.spacing)) as usize).max(1);
+        let coarse = Raster {
+            rows: raster.rows.div_ceil(step) + 1,
+            columns: raster.columns.div_ceil(step) + 1,
+            spacing: step as f64 * raster.spacing,
+            origin_row: 0,
+            origin_column: 0,
+        };
+        let gusts = self.field(&coarse, seed);
+        let bias = (0.5 * (exponent * self.strength).powi(2)) as f32;
+        let exponent = exponent as f32;
+        let rows = sigma0.values.par_chunks_mut(raster.columns.max(1));
+        rows.enumerate().for_each_init(
+            || vec![0.0f32; coarse.columns],
+            |line, (i, row)| {
+                let down = (i % step) as f32 / step as f32;
+                let above = &gusts.values[i / step * coarse.columns..][..coarse.columns];
+                let below = &gusts.values[(i / step + 1) * coarse.columns..][..coarse.columns];
+                for (value, (a, b)) in line.iter_mut().zip(above.iter().zip(below)) {
+                    *value = a + down * (b - a);
+                }
+                for (j, value) in row.iter_mut().enumerate() {
+                    let right = (j % step) as f32 / step as f32;
+                    let [a, b] = [line[j / step], line[j / step + 1]];
+                    *value *= (exponent * (a + right * (b - a)) - bias).exp();
+                }
+            },
+        );
+    }
+
     /// ∬Φ over the cell around wavenumber 0.
     fn in_cell(&self, step: [f64; 2]) -> f64 {
         let rule = crate::quadrature::GaussLegendre::new(24);
@@ -110,27 +151,6 @@ impl Gusts {
         rule.integrate([-right, right], |kx| {
             rule.integrate([-down, down], |ky| self.density([kx, ky]))
         })
-    }
-
-    /// Multiplies σ⁰ with exp(n g − ½n²s²), whose mean is 1.
-    ///
-    /// # Panics
-    ///
-    /// If the fields are not of one size.
-    pub fn modulate(&self, sigma0: &mut Field, gusts: &Field, exponent: f64) {
-        assert_eq!(
-            (sigma0.rows, sigma0.columns),
-            (gusts.rows, gusts.columns),
-            "fields of different sizes"
-        );
-        let bias = (0.5 * (exponent * self.strength).powi(2)) as f32;
-        let exponent = exponent as f32;
-        sigma0
-            .values
-            .par_iter_mut()
-            .zip(&gusts.values)
-            .with_min_len(1 << 14)
-            .for_each(|(s, g)| *s *= (exponent * g - bias).exp());
     }
 }
 
@@ -216,22 +236,37 @@ mod tests {
         assert!((ratio / expected - 1.0).abs() < 0.12, "{ratio} {expected}");
     }
 
+    /// At the drawn places the factor is that of the field; between them that of the mean of its neighbours; its mean
+    /// over a normal g is 1.
     #[test]
     fn gusts_leave_the_mean_and_have_the_exponent() {
         let gusts = gusts();
-        let raster = Raster::image(64, 64, 100.0);
-        let field = gusts.field(&raster, 1);
+        // A spacing of 2.5 m draws g at every fourth pixel.
+        let raster = Raster::image(41, 30, 2.5);
         let mut sigma0 = Field::constant(&raster, 0.02);
-        gusts.modulate(&mut sigma0, &field, 1.5);
-        for (s, g) in sigma0.values.iter().zip(&field.values) {
-            let expected = 0.02 * (1.5 * f64::from(*g) - 0.5 * (1.5f64 * 0.06).powi(2)).exp();
-            assert!((f64::from(*s) / expected - 1.0).abs() < 1e-6);
+        gusts.modulate_raster(&mut sigma0, &raster, 1.5, 1);
+        let coarse = Raster {
+            rows: 12,
+            columns: 9,
+            spacing: 10.0,
+            origin_row: 0,
+            origin_column: 0,
+        };
+        let field = gusts.field(&coarse, 1);
+        let factor = |g: f64| 0.02 * (1.5 * g - 0.5 * (1.5f64 * 0.06).powi(2)).exp();
+        for i in 0..10 {
+            for j in 0..7 {
+                let g = f64::from(field.at(i, j));
+                assert!((f64::from(sigma0.at(4 * i, 4 * j)) / factor(g) - 1.0).abs() < 1e-6);
+                let half = 0.5 * (g + f64::from(field.at(i + 1, j)));
+                assert!((f64::from(sigma0.at(4 * i + 2, 4 * j)) / factor(half) - 1.0).abs() < 1e-6);
+                let half = 0.5 * (g + f64::from(field.at(i, j + 1)));
+                assert!((f64::from(sigma0.at(4 * i, 4 * j + 2)) / factor(half) - 1.0).abs() < 1e-6);
+            }
         }
-        // Mean of exp(n g − ½ n² s²) over a normal g is 1: by quadrature over the normal density.
         let rule = crate::quadrature::GaussLegendre::new(60);
         let mean = rule.integrate([-9.0, 9.0], |z| {
-            let density = (-0.5 * z * z).exp() / TAU.sqrt();
-            density * (1.5 * 0.06 * z - 0.5 * (1.5f64 * 0.06).powi(2)).exp()
+            factor(0.06 * z) / 0.02 * (-0.5 * z * z).exp() / TAU.sqrt()
         });
         assert!((mean - 1.0).abs() < 1e-12);
     }

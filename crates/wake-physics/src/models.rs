@@ -1,30 +1,45 @@
 //! The models of a scene: sea, wake, backscatter and radar, with the scene's numbers in the units of formulas.
 
 use crate::constants::SPEED_OF_LIGHT;
+use crate::gusts::{Gusts, wind_exponent};
 use crate::hull::Hull;
 use crate::kelvin::KelvinWake;
 use crate::permittivity;
 use crate::raster::Raster;
-use crate::sar::AzimuthResolution;
+use crate::sar::geometry::direction;
+use crate::sar::impulse::Axis;
+use crate::sar::{AzimuthResolution, ImpulseResponse};
+use crate::scattering::breaking;
 use crate::scattering::hydrodynamic::relaxation_rate;
 use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale};
-use crate::scene::{HullForm, Radar, Scene, Ship};
+use crate::scene::{HullForm, Polarization, Radar, Scene, Ship, Term, TermRule, Terms};
+use crate::slicks::{STRONGEST_WIND, Slicks};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
+use crate::swell::Swell;
 use crate::track::Track;
 use crate::turbulent::TurbulentWake;
+use crate::turbulent::current::{WakeCurrent, WakeEdge, response_time};
 use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
+use crate::window::Window;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// Block coefficient of the full hull where the scene names none: a laden tanker.
 const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
 
+/// Correlation of neighbouring pixels up to which each has speckle of its own: chosen.
+const INDEPENDENT: f64 = 0.05;
+
 /// The models of a valid scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Models {
-    /// Pixels of the image.
+    /// Pixels that are computed: those of the image, or where it has an impulse response the finer ones around it.
     pub(crate) image: Raster,
+    /// Pixels of the image.
+    pub(crate) delivered: Raster,
+    /// Impulse response in range and azimuth, where pixels of their own do not suffice.
+    pub(crate) response: Option<ImpulseResponse>,
     /// Incidence angle \[rad\].
     pub(crate) incidence: f64,
     /// R/V \[s\].
@@ -41,8 +56,20 @@ pub(crate) struct Models {
     pub(crate) permittivity: Complex64,
     /// Single-look azimuth resolution \[m\].
     pub(crate) azimuth_resolution: f64,
+    /// The swell, if there is one.
+    pub(crate) swell: Option<Swell>,
     /// The ship's wake, if there is a ship.
     pub(crate) wake: Option<KelvinWake>,
+    /// The current of the turbulent wake, if it is asked for.
+    pub(crate) edge: Option<WakeEdge>,
+    /// Slicks, if the wind leaves them.
+    pub(crate) slicks: Option<Slicks>,
+    /// σ⁰ of breaking waves, 0 where it is not asked for.
+    pub(crate) breaking: f64,
+    /// Gusts and the exponent of the wind, if there are any.
+    pub(crate) gusts: Option<(Gusts, f64)>,
+    /// Noise of the radar as σ⁰.
+    pub(crate) noise: f64,
     /// Standard deviation of the line-of-sight velocity of unresolved waves [m/s].
     pub(crate) unresolved_velocity: f64,
     /// Slopes of resolved waves that are averaged over nevertheless.
@@ -52,7 +79,9 @@ pub(crate) struct Models {
 impl Models {
     pub(crate) fn new(scene: &Scene) -> Self {
         let sea = wind_sea(scene);
-        let image = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
+        let delivered = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
+        let response = response(scene);
+        let image = response.map_or(delivered, |response| response.sources(&delivered));
         let incidence = scene.radar.incidence.to_radians();
         // Whatever spectrum the resolved waves have, the short ones are Elfouhaily's.
         let short_waves = Elfouhaily::new(scene.sea.wind_speed, scene.sea.fetch);
@@ -67,7 +96,26 @@ impl Models {
             ..sea
         })
         .moments(image.nyquist_wavenumber(), f64::INFINITY, incidence);
+        let wake = scene
+            .ship
+            .as_ref()
+            .map(|ship| wake(ship, scene.sea.depth, scene.sea.time));
         Self {
+            delivered,
+            response,
+            swell: swell(scene),
+            edge: wake.as_ref().and_then(|wake| edge(scene, wake)),
+            slicks: slicks(scene),
+            breaking: if scene.sea.breaking {
+                breaking::backscatter(incidence, scene.sea.wind_speed)
+            } else {
+                0.0
+            },
+            gusts: gusts(scene),
+            noise: scene
+                .radar
+                .noise_floor
+                .map_or(0.0, |db| 10f64.powf(0.1 * db)),
             incidence,
             range_to_velocity: scene.radar.range_to_velocity,
             wavelength: SPEED_OF_LIGHT / scene.radar.frequency,
@@ -87,10 +135,7 @@ impl Models {
             permittivity,
             azimuth_resolution: scene.radar.resolution,
             sea: spectrum,
-            wake: scene
-                .ship
-                .as_ref()
-                .map(|ship| wake(ship, scene.sea.depth, scene.sea.time)),
+            wake,
             unresolved_velocity: unresolved.radial_velocity.sqrt(),
             averaged_slopes: SlopeCovariance::NONE,
             image,
@@ -137,13 +182,28 @@ impl Models {
     }
 
     /// Azimuth resolution of the sea in motion. Every look has the radar's resolution; looks only average speckle.
+    ///
+    /// An impulse response has the nominal resolution: it is not applied twice.
     pub(crate) fn resolution(&self) -> AzimuthResolution {
-        AzimuthResolution::of_moving_sea(
+        let resolution = AzimuthResolution::of_moving_sea(
             self.wavelength,
             self.range_to_velocity,
             (self.azimuth_resolution, 1),
             self.unresolved_velocity,
-        )
+        );
+        AzimuthResolution {
+            nominal: self.resolution_at_rest().nominal,
+            ..resolution
+        }
+    }
+
+    /// Azimuth resolution of a sea at rest, as far as no impulse response has it.
+    pub(crate) fn resolution_at_rest(&self) -> AzimuthResolution {
+        let nominal = match self.response {
+            Some(_) => 0.0,
+            None => self.azimuth_resolution,
+        };
+        AzimuthResolution::at_rest(nominal, 1)
     }
 
     /// Wavenumber of the radar `k_e` [rad/m].
@@ -177,6 +237,91 @@ fn relaxation(scene: &Scene) -> f64 {
         .radar
         .relaxation_rate
         .unwrap_or_else(|| of_bragg_waves(&scene.radar))
+}
+
+/// The response that a scene asks for, unless pixels of their own do as well.
+fn response(scene: &Scene) -> Option<ImpulseResponse> {
+    let radar = &scene.radar;
+    let terms = &scene.model.terms;
+    let resolution = radar
+        .range_resolution
+        .filter(|_| terms.allow(Term::Response))?;
+    let window = radar.window.unwrap_or(Window::Uniform);
+    let response = ImpulseResponse {
+        range: Axis { resolution, window },
+        azimuth: Axis {
+            resolution: radar.resolution,
+            window: radar.azimuth_window.unwrap_or(window),
+        },
+    };
+    let needed = *terms != Terms::Rule(TermRule::Needed)
+        || response.pixel_correlation(scene.grid.spacing) > INDEPENDENT;
+    needed.then_some(response)
+}
+
+fn swell(scene: &Scene) -> Option<Swell> {
+    let sea = &scene.sea;
+    (sea.swell_height > 0.0 && scene.model.terms.allow(Term::Swell)).then(|| Swell {
+        height: sea.swell_height,
+        wavelength: sea.swell_length,
+        toward: sea.swell_toward.rem_euclid(360.0).to_radians(),
+    })
+}
+
+fn slicks(scene: &Scene) -> Option<Slicks> {
+    let sea = &scene.sea;
+    (sea.slick_damping > 0.0 && sea.wind_speed <= STRONGEST_WIND).then_some(Slicks {
+        damping: sea.slick_damping,
+        width: sea.slick_width,
+        scale: sea.slick_scale,
+    })
+}
+
+fn gusts(scene: &Scene) -> Option<(Gusts, f64)> {
+    let sea = &scene.sea;
+    (sea.gust_strength > 0.0).then(|| {
+        let gusts = Gusts {
+            strength: sea.gust_strength,
+            scale: sea.gust_scale,
+            wind_toward: sea.wind_toward.rem_euclid(360.0).to_radians(),
+        };
+        (gusts, wind_exponent(scene.radar.frequency))
+    })
+}
+
+/// The current of the wake in the scene's wind; none behind a ship at rest or without wind.
+fn edge(scene: &Scene, wake: &KelvinWake) -> Option<WakeEdge> {
+    let (ship, wind) = (scene.ship.as_ref()?, scene.sea.wind_speed);
+    if !ship.edge || ship.speed <= 0.0 || wind <= 0.0 {
+        return None;
+    }
+    let [wind_x, wind_y] = direction(scene.sea.wind_toward);
+    let [port_x, port_y] = wake.track.port();
+    let to_port = wind * (wind_x * port_x + wind_y * port_y);
+    Some(WakeEdge {
+        current: WakeCurrent::of_wind(ship.speed, ship.beam, ship.edge_outflow, to_port),
+        track: wake.track,
+        length: ship.length,
+        response: ship
+            .edge_time
+            .unwrap_or_else(|| edge_response(&scene.radar, wind, port_x)),
+    })
+}
+
+/// Response of σ⁰ to the convergence of a wake whose track lies across `across` = cos χ of the look direction.
+fn edge_response(radar: &Radar, wind_speed: f64, across: f64) -> f64 {
+    let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
+    let share = match radar.polarization {
+        Polarization::VV => breaking::SHARE[0],
+        Polarization::HH => breaking::SHARE[1],
+    };
+    let bragg = crate::scattering::bragg::wavenumber(k_e, radar.incidence.to_radians());
+    response_time(
+        breaking::bragg_response(bragg, wind_speed),
+        across,
+        share,
+        breaking::response_time(k_e, wind_speed),
+    )
 }
 
 fn wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {

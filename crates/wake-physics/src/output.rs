@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::raster::Field;
+use num_complex::Complex32;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -79,7 +80,15 @@ pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Res
 /// # Errors
 ///
 /// [`Error::File`].
-pub fn write_fields(path: &Path, fields: &[(&str, &Field)]) -> Result<()> {
+pub fn write_fields(
+    path: &Path,
+    fields: &[(&str, &Field)],
+    slc: Option<(&[Complex32], [usize; 2])>,
+) -> Result<()> {
+    let complex: Vec<u8> = slc.map_or_else(Vec::new, |(values, _)| {
+        let parts = values.iter().flat_map(|v| [v.re, v.im]);
+        parts.flat_map(f32::to_le_bytes).collect()
+    });
     let bytes: Vec<Vec<u8>> = fields
         .iter()
         .map(|(_, f)| f.values.iter().flat_map(|v| v.to_le_bytes()).collect())
@@ -88,7 +97,11 @@ pub fn write_fields(path: &Path, fields: &[(&str, &Field)]) -> Result<()> {
         let shape = vec![field.rows, field.columns];
         TensorView::new(Dtype::F32, shape, data).map(|view| (*name, view))
     });
+    let slc = slc.map(|(_, [rows, columns])| {
+        TensorView::new(Dtype::F32, vec![rows, columns, 2], &complex).map(|view| ("slc", view))
+    });
     let views: Vec<_> = views
+        .chain(slc)
         .collect::<std::result::Result<_, _>>()
         .map_err(|e| file_error("encode", path, &e))?;
     let file = safetensors::serialize(views, None).map_err(|e| file_error("encode", path, &e))?;
@@ -117,12 +130,18 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fields.safetensors");
         let field = Field::from_fn(&Raster::image(2, 3, 1.0), |i, j| (i * 3 + j) as f32);
-        write_fields(&path, &[("elevation", &field)]).unwrap();
+        let slc: Vec<Complex32> = (0..6u8).map(|n| Complex32::new(n.into(), -1.0)).collect();
+        write_fields(&path, &[("elevation", &field)], Some((&slc, [2, 3]))).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let file = safetensors::SafeTensors::deserialize(&bytes).unwrap();
         let tensor = file.tensor("elevation").unwrap();
         assert_eq!(tensor.shape(), [2, 3]);
         let expected: Vec<u8> = (0..6u8).flat_map(|v| f32::from(v).to_le_bytes()).collect();
+        assert_eq!(tensor.data(), expected);
+        let tensor = file.tensor("slc").unwrap();
+        assert_eq!(tensor.shape(), [2, 3, 2]);
+        let pairs = (0..6u8).flat_map(|v| [f32::from(v), -1.0]);
+        let expected: Vec<u8> = pairs.flat_map(f32::to_le_bytes).collect();
         assert_eq!(tensor.data(), expected);
     }
 

@@ -6,6 +6,11 @@
 //!
 //! with N the Gaussian density. The widths are chosen; a swell's are narrower the farther it has come.
 
+use crate::dispersion::angular_frequency;
+use crate::random::line_generator;
+use crate::waves::PlaneWaves;
+use num_complex::Complex64;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use std::f64::consts::{PI, TAU};
 
 /// Width of the peak in wavenumber over its wavenumber: chosen.
@@ -16,6 +21,12 @@ const SPREAD: f64 = 12.0 * PI / 180.0;
 
 /// Standard deviations at which the peak is cut off.
 const CUT: f64 = 5.0;
+
+/// Waves along the wavenumber and along the direction.
+const WAVES: usize = 32;
+
+/// Random line of the swell.
+const LINE: u64 = 1 << 44;
 
 /// A swell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +55,53 @@ impl Swell {
         }
         let bell = (-0.5 * (z * z + t * t)).exp() / (TAU * width * SPREAD * k);
         self.height * self.height / 16.0 * bell
+    }
+
+    /// Waves that stand for it, with their variance \[m²\]: one of each cell of wavenumber and direction, at a place that
+    /// `jitter` draws from 0…1; none beyond `band` [rad/m], the largest wavenumber of the pixels.
+    pub(crate) fn cells(&self, band: f64, mut jitter: impl FnMut() -> f64) -> Vec<([f64; 2], f64)> {
+        let [low, high] = self.band();
+        let step = [
+            (high - low) / WAVES as f64,
+            2.0 * CUT * SPREAD / WAVES as f64,
+        ];
+        let mut cells = Vec::with_capacity(WAVES * WAVES);
+        for n in 0..WAVES {
+            for m in 0..WAVES {
+                let k = low + (n as f64 + jitter()) * step[0];
+                let turn = self.toward + (m as f64 + jitter()) * step[1] - CUT * SPREAD;
+                let wave = [k * turn.sin(), k * turn.cos()];
+                let variance = self.density(wave) * k * step[0] * step[1];
+                if k <= band && variance > 0.0 {
+                    cells.push((wave, variance));
+                }
+            }
+        }
+        cells
+    }
+
+    /// One draw of it as plane waves.
+    ///
+    /// - `depth` \[m\] of the water, `time` \[s\], `band` [rad/m]: largest wavenumber of the pixels
+    /// - `seed`: the same seed gives the same waves
+    #[must_use]
+    pub fn waves(&self, (seed, time): (u64, f64), depth: f64, band: f64) -> PlaneWaves {
+        let mut random = line_generator(seed, LINE);
+        let cells = self.cells(band, || StandardUniform.sample(&mut random));
+        let mut waves = PlaneWaves::default();
+        for ([kx, ky], variance) in cells {
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let omega = angular_frequency(kx.hypot(ky), depth);
+            // ⟨|a|²⟩ = 2 ⟨ζ²⟩.
+            let amplitude = Complex64::new(normal(), normal()) * variance.sqrt();
+            waves.kx.push(kx);
+            waves.ky.push(ky);
+            waves.omega.push(omega);
+            waves
+                .amplitude
+                .push(amplitude * Complex64::from_polar(1.0, -omega * time));
+        }
+        waves
     }
 
     /// Least and largest wavenumber with any density [rad/m].
@@ -85,6 +143,32 @@ mod tests {
             assert!((mean / sum * 180.0 / TAU - 1.0).abs() < 1e-6);
             let off = (sin.atan2(cos) - toward + PI).rem_euclid(TAU) - PI;
             assert!(off.abs() < 1e-9);
+        }
+    }
+
+    /// Over many seeds the waves hold H²/16; half a band holds half of it.
+    #[test]
+    fn waves_have_the_variance() {
+        let swell = Swell {
+            height: 2.0,
+            wavelength: 150.0,
+            toward: -1.0,
+        };
+        let peak = TAU / 150.0;
+        for (band, share) in [(1.0, 1.0), (peak, 0.5)] {
+            let variance = |seed| -> f64 {
+                let waves = swell.waves((seed, 3.0), f64::INFINITY, band);
+                waves.amplitude.iter().map(|a| 0.5 * a.norm_sqr()).sum()
+            };
+            let count = 200;
+            let mean = (0..count).map(variance).sum::<f64>() / f64::from(count as u32);
+            // Some 60 of the waves carry most: 1/√60 a seed, 1 % of the mean of 200; four times it.
+            assert!((mean / (share * 0.25) - 1.0).abs() < 0.04, "{mean}");
+        }
+        let [one, other] = [0.0, 7.0].map(|time| swell.waves((1, time), 20.0, 1.0));
+        for n in 0..one.len() {
+            let turned = one.amplitude[n] * Complex64::from_polar(1.0, -7.0 * one.omega[n]);
+            assert!((turned - other.amplitude[n]).norm() < 1e-12);
         }
     }
 

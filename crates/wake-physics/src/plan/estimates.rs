@@ -33,6 +33,7 @@ impl AsRef<WaveSample> for Weighed<'_> {
 struct Estimates<'a> {
     survey: &'a Survey,
     sea: Vec<Weighed<'a>>,
+    swell: Vec<Weighed<'a>>,
     wake: Vec<Weighed<'a>>,
     /// Standard deviation over mean of the image.
     contrast: f64,
@@ -62,12 +63,14 @@ impl<'a> Estimates<'a> {
             waves.iter().map(one).collect()
         };
         let (sea, wake) = (weighed(&survey.sea), weighed(&survey.wake));
+        let swell = weighed(&survey.swell);
         let contrast = linear(&sea)
             .hypot(linear(&wake))
             .hypot(survey.backscatter[1]);
         Self {
             survey,
             sea,
+            swell,
             wake,
             contrast,
         }
@@ -76,6 +79,14 @@ impl<'a> Estimates<'a> {
     fn of(&self, term: Term) -> f64 {
         let effect = match term {
             Term::Sea => self.waves(&self.sea),
+            Term::Swell => self.waves(&self.swell),
+            Term::Edge => self.survey.edge,
+            Term::Slicks => self.survey.slicks * self.survey.modulation.bragg_share,
+            Term::Breaking => self.survey.added[0],
+            Term::Gusts => self.survey.gusts * self.contrast.hypot(1.0),
+            Term::Noise => self.survey.added[1],
+            // What it smears away is at most all contrast; the speckle of neighbours is what it adds.
+            Term::Response => return self.contrast.max(self.survey.response),
             Term::Kelvin => self.waves(&self.wake),
             Term::Turbulent => self.survey.damping * self.survey.modulation.bragg_share,
             Term::TiltAverage => self.survey.backscatter[0],

@@ -117,7 +117,7 @@ impl Plan {
         let bunching = self.uses(Term::Bunching);
         for t in &mut self.terms {
             t.used = match t.term {
-                Term::Sea => false,
+                Term::Sea | Term::Swell | Term::Gusts | Term::Slicks => false,
                 Term::TiltAverage | Term::Specular => true,
                 Term::Coherence => t.used || bunching,
                 _ => t.used,

@@ -30,9 +30,13 @@ pub(crate) struct Effect {
 
 /// Chooses terms. By rule "needed" terms are left out from the smallest estimate up, as long as the sum of the
 /// estimates left out stays within their share of the tolerance; speckle, which is no part of the image before speckle, has
-/// the tolerance for itself.
+/// the tolerance for itself. The impulse response decides on which pixels all is computed: it is used where it is there.
 pub(crate) fn choose(effects: &[Effect], terms: &Terms, tolerance: f64) -> Vec<PlannedTerm> {
-    let mut order: Vec<&Effect> = effects.iter().filter(|e| e.term != Term::Speckle).collect();
+    let alone = [Term::Speckle, Term::Response];
+    let mut order: Vec<&Effect> = effects
+        .iter()
+        .filter(|e| !alone.contains(&e.term))
+        .collect();
     order.sort_by(|a, b| a.estimate.total_cmp(&b.estimate));
     let mut left_out = Vec::new();
     let mut sum = 0.0;

@@ -21,10 +21,13 @@ use rand::Rng;
 /// Resolutions between the image and the edge of the sources: sidelobes that come around lie beyond (chosen).
 const GUARD: f64 = 8.0;
 
-/// Lines between two looks in the numbering of random lines.
+/// First random line of the looks.
+const FIRST_LINE: u64 = 1 << 45;
+
+/// Random lines between two looks.
 const LOOK_LINES: u64 = 1 << 20;
 
-/// The generator's lines of points begin here.
+/// First random line of the points.
 const POINT_LINES: u64 = 1 << 40;
 
 /// Impulse response along one axis.
@@ -101,10 +104,35 @@ impl ImpulseResponse {
         [self.azimuth, self.range].map(|axis| (GUARD * axis.resolution / spacing).ceil() as usize)
     }
 
-    /// Largest spacing of the sources \[m\], ρ/4: the intensity, of twice the bandwidth, is still carried.
+    /// Largest spacing of the sources \[m\], ρ/3.5 (chosen): they carry twice the bandwidth, and brightness that comes
+    /// of waves shorter than the response is still the same on finer ones.
     #[must_use]
     pub fn largest_spacing(&self) -> f64 {
-        0.25 * self.range.resolution.min(self.azimuth.resolution)
+        self.range.resolution.min(self.azimuth.resolution) / 3.5
+    }
+
+    /// Pixels of the sources for an image: a whole number of them a pixel, fine enough, with the guard around.
+    #[must_use]
+    pub fn sources(&self, image: &Raster) -> Raster {
+        let step = (image.spacing / self.largest_spacing()).ceil().max(1.0);
+        let spacing = image.spacing / step;
+        let [rows, columns] = self.guard(spacing);
+        let step = step as usize;
+        let fine = Raster {
+            rows: image.rows * step,
+            columns: image.columns * step,
+            spacing,
+            origin_row: image.origin_row * step as i64,
+            origin_column: image.origin_column * step as i64,
+        };
+        fine.with_margin(rows, columns)
+    }
+
+    /// Largest correlation of the speckle of two pixels of a row or a column, see [`Window::pixel_correlation`].
+    #[must_use]
+    pub fn pixel_correlation(&self, spacing: f64) -> f64 {
+        let of = |axis: &Axis| axis.window.pixel_correlation(spacing / axis.resolution);
+        of(&self.range).max(of(&self.azimuth))
     }
 
     /// Mean over all speckle of the image's intensity, I ⊛ |h|²/∫|h|², `[rows, columns]` of the image.
@@ -212,7 +240,7 @@ impl ImpulseResponse {
         let raster = sources.raster;
         let filter = LowPass::new(view.sizes, view.step, self.bands(&view, raster.spacing));
         for look in numbers {
-            let first = look * LOOK_LINES;
+            let first = FIRST_LINE + look * LOOK_LINES;
             let mut phases = line_generator(seed, POINT_LINES + look);
             let points: Vec<_> = sources
                 .points

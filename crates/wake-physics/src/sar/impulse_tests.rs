@@ -107,7 +107,7 @@ fn single_look_is_the_sum_over_its_scatterers() {
         .map(|i| {
             let mut row = vec![Complex32::ZERO; raster.columns];
             let values = &intensity.values[i * raster.columns..][..raster.columns];
-            rough_row(values, (seed, i as u64), &mut row);
+            rough_row(values, (seed, FIRST_LINE + i as u64), &mut row);
             row
         })
         .collect();
@@ -416,7 +416,16 @@ fn an_image_inside_a_larger_one_is_its_middle() {
 #[test]
 fn a_fine_enough_grid_is_fine_enough() {
     let response = sentinel();
-    assert!((response.largest_spacing() - 4.6).abs() < 1e-12);
+    // Of the narrower axis, and twice its bandwidth: 18.4 m/3.5 is below 18.4 m/(2 · 0.886).
+    assert!((response.largest_spacing() - 18.4 / 3.5).abs() < 1e-12);
+    assert!(2.0 * response.azimuth.bandwidth() * response.largest_spacing() < 1.0);
+    let image = Raster::image(20, 30, 10.0);
+    let sources = response.sources(&image);
+    assert!((sources.spacing - 5.0).abs() < 1e-12);
+    assert_eq!([sources.rows, sources.columns], [40 + 2 * 30, 60 + 2 * 33]);
+    // The origin stays where it was.
+    assert!(sources.x(33 + 30).abs() < 1e-12 && sources.y(30 + 20).abs() < 1e-12);
+    assert!((response.pixel_correlation(10.0) - 0.625).abs() < 2e-3);
     // The guard is eight resolutions.
     assert_eq!(response.guard(5.0), [30, 33]);
     // The energy beyond the guard, of the uniform axis: 1/(π² B x) on either side.

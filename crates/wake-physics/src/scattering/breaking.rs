@@ -29,6 +29,16 @@ const BREAKING_POWER: f64 = 5.0;
 /// Strength of the modulation of the waves that break, 9/2 for a spectrum k⁻⁴.
 const STRENGTH: f64 = 4.5;
 
+/// Share of σ⁰ that comes from breaking waves in VV and HH where the edges of a wake are concerned: chosen.
+pub(crate) const SHARE: [f64; 2] = [0.2, 0.4];
+
+/// Response of Bragg waves to a divergence \[s\]: 4.5 over their rate of growth.
+///
+/// - `bragg_wavenumber` [rad/m]; `wind_speed` [m/s], above 0
+pub(crate) fn bragg_response(bragg_wavenumber: f64, wind_speed: f64) -> f64 {
+    STRENGTH / growth_rate(bragg_wavenumber, friction_velocity(wind_speed))
+}
+
 /// σ⁰ of breaking waves over the share q of the sea they cover \[1\].
 ///
 /// - `incidence` θ \[rad\]
@@ -182,6 +192,11 @@ mod tests {
             }
         }
         assert!(response_time(wavenumber(5.4e9), 0.0).is_infinite());
+        // Bragg waves alone, 5 m/s, with the strength of their own spectrum there: 61, 7 and 3.4 s.
+        for (k, strength, seconds) in [(30.5, 4.93, 61.0), (129.9, 4.11, 7.0), (232.0, 3.90, 3.4)] {
+            let found = bragg_response(k, 5.0) * strength / STRENGTH;
+            assert!((found / seconds - 1.0).abs() < 0.05, "{k}: {found}");
+        }
     }
 
     #[test]

@@ -330,11 +330,22 @@ impl Default for Model {
     }
 }
 
+impl Terms {
+    /// Whether a term may be computed: a list that does not name it forbids it.
+    #[must_use]
+    pub fn allow(&self, term: Term) -> bool {
+        match self {
+            Self::Rule(_) => true,
+            Self::List(list) => list.contains(&term),
+        }
+    }
+}
+
 /// Which terms are computed: a rule, or a list.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "\"needed\", \"all\" or a list of the terms sea, kelvin, turbulent, tilt_average, specular, range_bunching, hydrodynamic, bunching, coherence, speckle"
+    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, turbulent, edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, bunching, coherence, noise, response, speckle"
 )]
 pub enum Terms {
     /// By a rule.
@@ -359,14 +370,24 @@ pub enum TermRule {
 pub enum Term {
     /// The resolved wind waves.
     Sea,
+    /// The swell.
+    Swell,
     /// The Kelvin wake.
     Kelvin,
     /// The turbulent wake.
     Turbulent,
+    /// The current of the turbulent wake and its bright edges.
+    Edge,
+    /// Slicks.
+    Slicks,
     /// The average of σ⁰ over the slopes of unresolved waves.
     TiltAverage,
     /// The quasi-specular return.
     Specular,
+    /// The return of breaking waves.
+    Breaking,
+    /// Gusts of the wind.
+    Gusts,
     /// Layover of elevated points toward the radar.
     RangeBunching,
     /// Modulation of the Bragg waves by the currents of longer ones.
@@ -375,22 +396,33 @@ pub enum Term {
     Bunching,
     /// Loss of azimuth resolution by unresolved and accelerated motion.
     Coherence,
+    /// Noise of the radar.
+    Noise,
+    /// The radar's impulse response in range and azimuth.
+    Response,
     /// Multi-look speckle.
     Speckle,
 }
 
 impl Term {
     /// Every term, in the order of the data flow.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 17] = [
         Self::Sea,
+        Self::Swell,
         Self::Kelvin,
         Self::Turbulent,
+        Self::Edge,
+        Self::Slicks,
         Self::TiltAverage,
         Self::Specular,
+        Self::Breaking,
+        Self::Gusts,
         Self::RangeBunching,
         Self::Hydrodynamic,
         Self::Bunching,
         Self::Coherence,
+        Self::Noise,
+        Self::Response,
         Self::Speckle,
     ];
 
@@ -399,14 +431,21 @@ impl Term {
     pub fn name(self) -> &'static str {
         match self {
             Self::Sea => "sea",
+            Self::Swell => "swell",
             Self::Kelvin => "kelvin",
             Self::Turbulent => "turbulent",
+            Self::Edge => "edge",
+            Self::Slicks => "slicks",
             Self::TiltAverage => "tilt_average",
             Self::Specular => "specular",
+            Self::Breaking => "breaking",
+            Self::Gusts => "gusts",
             Self::RangeBunching => "range_bunching",
             Self::Hydrodynamic => "hydrodynamic",
             Self::Bunching => "bunching",
             Self::Coherence => "coherence",
+            Self::Noise => "noise",
+            Self::Response => "response",
             Self::Speckle => "speckle",
         }
     }

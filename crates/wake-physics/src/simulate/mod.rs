@@ -12,6 +12,7 @@ mod clock;
 mod label;
 mod linear_sea;
 mod simulation;
+mod speckling;
 mod stages;
 
 pub use accuracy::{Accuracy, Reached};
@@ -24,12 +25,12 @@ use crate::error::Result;
 use crate::models::Models;
 use crate::plan::Plan;
 use crate::raster::Field;
-use crate::sar::speckle::speckle;
 use crate::scattering::BackscatterTable;
 use crate::scene::{Scene, Term};
 use crate::survey::Survey;
 use crate::workspace::Workspace;
 use clock::Clock;
+use speckling::{Exposure, Speckling};
 use stages::{Stages, Wanted};
 
 /// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
@@ -88,20 +89,28 @@ impl Simulator {
             &mut clock,
             &mut seconds,
         );
-        let mut speckled = self.workspace.field(&models.image);
+        let mut speckled = self.workspace.field(&models.delivered);
         speckled.values.copy_from_slice(&drawn.intensity.values);
-        if plan.uses(Term::Speckle) {
-            speckle(&mut speckled, scene.radar.looks, scene.seed);
-        }
+        let speckling = Speckling::of(scene, &models, drawn.exposure.take());
+        let slc = if plan.uses(Term::Speckle) {
+            speckling.apply(&mut speckled)
+        } else {
+            None
+        };
+        let sources = speckling.into_sources();
+        sources
+            .into_iter()
+            .for_each(|field| self.workspace.give(field));
         seconds.speckle = clock.lap();
         let labels = labels_of(scene);
         let crop = |field: &mut Field| {
             let [rows, columns] = plan.sizes.margin;
-            std::mem::take(field).crop(rows, columns)
+            let field = std::mem::take(field).crop(rows, columns);
+            delivered(field, &models)
         };
         let fields = &mut drawn.fields;
         let mut simulation = Simulation {
-            raster: models.image,
+            raster: models.delivered,
             elevation: crop(&mut fields.elevation),
             slope_x: crop(&mut fields.slope_x),
             slope_y: crop(&mut fields.slope_y),
@@ -112,6 +121,7 @@ impl Simulator {
             sigma0: crop(&mut drawn.sigma0),
             intensity: Field::default(),
             speckled,
+            slc,
             labels,
             accuracy: drawn.accuracy,
             plan,
@@ -134,14 +144,17 @@ impl Simulator {
         scene.validate()?;
         let models = Models::new(scene);
         let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
-        let (intensity, accuracy) = self.intensity(scene, &models, &plan);
-        let speckle = plan.uses(Term::Speckle);
+        let (intensity, exposure, accuracy) = self.intensity(scene, &models, &plan);
+        let speckling = match plan.uses(Term::Speckle) {
+            true => Speckling::of(scene, &models, exposure),
+            false => Speckling::Without,
+        };
         Ok(SarImage {
             intensity,
             labels: labels_of(scene),
             plan,
             accuracy,
-            speckle: speckle.then_some((scene.radar.looks, scene.seed)),
+            speckling,
         })
     }
 
@@ -155,7 +168,7 @@ impl Simulator {
         let mut models = Models::new(scene);
         let survey = Survey::new(scene, &models);
         let mut plan = Plan::of(scene, &models, &survey)?;
-        if plan.uses(Term::Sea) {
+        if plan.uses(Term::Sea) || plan.uses(Term::Swell) {
             let (slopes, velocity) = survey.resolved_sea();
             models.average_over(&slopes, velocity);
             plan = plan.over_all_seas();
@@ -163,17 +176,22 @@ impl Simulator {
         Ok(self.intensity(scene, &models, &plan).0)
     }
 
-    /// The intensity before speckle, and no other field.
-    fn intensity(&mut self, scene: &Scene, models: &Models, plan: &Plan) -> (Field, Accuracy) {
+    /// The intensity before speckle, and no other field but what the impulse response looks at.
+    fn intensity(
+        &mut self,
+        scene: &Scene,
+        models: &Models,
+        plan: &Plan,
+    ) -> (Field, Option<Exposure>, Accuracy) {
         let stages = Stages::new(scene, models, plan, Method::Fast, Wanted::Image);
-        let drawn = stages.draw(
+        let mut drawn = stages.draw(
             &mut self.workspace,
             &mut self.table,
             &mut Clock::start(),
             &mut Seconds::default(),
         );
-        let accuracy = drawn.accuracy;
-        (drawn.give_back(&mut self.workspace), accuracy)
+        let (accuracy, exposure) = (drawn.accuracy, drawn.exposure.take());
+        (drawn.give_back(&mut self.workspace), exposure, accuracy)
     }
 
     /// Takes the blocks of a simulation back that is no longer needed: the next one of this size asks the system for
@@ -197,6 +215,19 @@ impl Simulator {
         let fields = surface.into_iter().chain(more);
         fields.for_each(|field| self.workspace.give(field));
     }
+}
+
+/// A field of the computed pixels at the pixels of the image.
+fn delivered(field: Field, models: &Models) -> Field {
+    let (from, to) = (&models.image, &models.delivered);
+    if models.response.is_none() {
+        return field;
+    }
+    let step = (to.spacing / from.spacing).round() as usize;
+    let first = |computed: i64, image: i64| (computed - image * step as i64).max(0) as usize;
+    let row = first(from.origin_row, to.origin_row);
+    let column = first(from.origin_column, to.origin_column);
+    Field::from_fn(to, |i, j| field.at(row + step * i, column + step * j))
 }
 
 /// Simulates a scene with the fast methods; for many scenes see [`Simulator`].

@@ -2,14 +2,15 @@
 
 use super::accuracy::Accuracy;
 use super::clock::Seconds;
+use super::speckling::Speckling;
 use crate::error::Result;
 use crate::grey::GreyScale;
 use crate::labels::Labels;
 use crate::output;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
-use crate::sar::speckle::speckle;
 use crate::scene::Scene;
+use num_complex::Complex32;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -50,6 +51,9 @@ pub struct Simulation {
     pub intensity: Field,
     /// Image intensity with speckle.
     pub speckled: Field,
+    /// Single-look complex image, `[rows, columns]` of the image, where it has an impulse response and one look: its
+    /// squared modulus is [`Self::speckled`].
+    pub slc: Option<Vec<Complex32>>,
     /// Where ship and wake are.
     pub labels: Labels,
     /// What was computed, and estimates of what was not.
@@ -76,17 +80,14 @@ pub struct SarImage {
     pub plan: Plan,
     /// What the numerical methods reached.
     pub accuracy: Accuracy,
-    /// Looks and seed of the speckle, if the plan has it.
-    pub(super) speckle: Option<(u32, u64)>,
+    pub(super) speckling: Speckling,
 }
 
 impl SarImage {
     /// Intensity with speckle, if the plan has it: the same bits as [`Simulation::speckled`].
     #[must_use]
     pub fn speckled(mut self) -> Field {
-        if let Some((looks, seed)) = self.speckle {
-            speckle(&mut self.intensity, looks, seed);
-        }
+        self.speckling.apply(&mut self.intensity);
         self.intensity
     }
 }
@@ -127,7 +128,9 @@ impl Simulation {
             self.raster.rows,
             self.raster.columns,
         )?;
-        output::write_fields(&path("fields.safetensors"), &self.named_fields())?;
+        let size = [self.raster.rows, self.raster.columns];
+        let slc = self.slc.as_deref().map(|slc| (slc, size));
+        output::write_fields(&path("fields.safetensors"), &self.named_fields(), slc)?;
         output::write_json(&path("labels.json"), &self.labels)?;
         let names = [
             "image.png",

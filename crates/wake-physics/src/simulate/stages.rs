@@ -4,6 +4,7 @@ use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
 use super::label::echo_displacement;
 use super::simulation::Method;
+use super::speckling::Exposure;
 use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
 use crate::models::{Models, turbulent_wake};
@@ -12,8 +13,12 @@ use crate::plan::{Plan, SHARES};
 use crate::raster::{Field, Raster};
 use crate::sar::direct::DirectImage;
 use crate::sar::echo::ship_cross_section;
-use crate::sar::{AzimuthResolution, Echo, Imaging, Sources};
+use crate::sar::geometry::ship_radial_velocity;
+use crate::sar::impulse::PointTarget;
+use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
+use crate::sar::{Echo, Imaging, Sources};
 use crate::scattering::{BackscatterTable, FacetFields};
+use crate::scene::sensor::ambiguity_distance;
 use crate::scene::{Scene, Term};
 use crate::surface::Surface;
 use crate::waves::{Quantity, harmonic_fields};
@@ -125,6 +130,8 @@ pub(super) struct Drawn {
     pub(super) sigma0: Field,
     /// Intensity of the image.
     pub(super) intensity: Field,
+    /// What the impulse response looks at, where the image has one.
+    pub(super) exposure: Option<Exposure>,
     pub(super) accuracy: Accuracy,
 }
 
@@ -141,7 +148,8 @@ impl Drawn {
         ];
         let more = [f.velocity_z, f.radial_acceleration, f.modulation];
         let rest = [self.radial_velocity, self.sigma0];
-        let fields = surface.into_iter().chain(more).chain(rest);
+        let sources = self.exposure.map(|exposure| exposure.intensity);
+        let fields = surface.into_iter().chain(more).chain(rest).chain(sources);
         fields.for_each(|field| workspace.give(field));
         self.intensity
     }
@@ -176,23 +184,56 @@ impl<'a> Stages<'a> {
     ) -> Drawn {
         let mut accuracy = Accuracy::default();
         let mut fields = self.sea(workspace);
+        self.add_swell(workspace, &mut fields);
         seconds.sea = clock.lap();
         accuracy.wake = self.add_wake(workspace, &mut fields);
         seconds.kelvin = clock.lap();
+        let edge = self.models.edge.filter(|_| self.plan.uses(Term::Edge));
+        if let Some(edge) = edge {
+            let SurfaceFields {
+                velocity_x,
+                velocity_y,
+                ..
+            } = &mut fields;
+            edge.add_velocity([velocity_x, velocity_y], &self.raster);
+        }
         let damping = self.damping(workspace);
         seconds.turbulent = clock.lap();
         let damping_field = damping.as_ref();
-        let sigma0 = self.sigma0(workspace, last_table, &fields, damping_field, &mut accuracy);
+        let mut sigma0 = self.sigma0(workspace, last_table, &fields, damping_field, &mut accuracy);
+        self.add_breaking(&mut sigma0, damping_field);
+        if let Some(edge) = edge {
+            edge.modulate(&mut sigma0, &self.raster);
+        }
+        self.add_gusts(&mut sigma0);
         damping.into_iter().for_each(|field| workspace.give(field));
         seconds.backscatter = clock.lap();
         let radial_velocity = self.radial_velocity(workspace, &fields);
         let intensity = self.image(workspace, &sigma0, &radial_velocity, &fields);
+        let exposure = self.models.response.map(|response| Exposure {
+            response,
+            sources: self.models.image,
+            intensity: Field::default(),
+            points: self.points(),
+            image: self.models.delivered,
+        });
+        let (intensity, exposure) = match exposure {
+            None => (intensity, None),
+            Some(exposure) => {
+                let exposure = Exposure {
+                    intensity,
+                    ..exposure
+                };
+                (exposure.mean(), Some(exposure))
+            }
+        };
         seconds.imaging = clock.lap();
         Drawn {
             fields,
             radial_velocity,
             sigma0,
             intensity,
+            exposure,
             accuracy,
         }
     }
@@ -241,6 +282,37 @@ impl<'a> Stages<'a> {
         fields
     }
 
+    /// Adds the swell.
+    fn add_swell(&self, workspace: &mut Workspace, fields: &mut SurfaceFields) {
+        let swell = self.models.swell.filter(|_| self.plan.uses(Term::Swell));
+        let Some(swell) = swell else { return };
+        let (seed, transfer) = (
+            (self.scene.seed, self.scene.sea.time),
+            &self.models.transfer,
+        );
+        let raster = &self.raster;
+        let waves = swell.waves(seed, transfer.depth, raster.nyquist_wavenumber());
+        let mut add = |quantity, made: &Field| {
+            let sum = fields.of(quantity).values.par_iter_mut().zip(&made.values);
+            sum.with_min_len(1 << 14)
+                .for_each(|(sum, made)| *sum += made);
+        };
+        match self.method {
+            Method::Fast => {
+                for group in &self.quantities {
+                    let sum = (&waves, transfer, &group[..], raster);
+                    let take = |q: usize, made: &mut Field| add(group[q], made);
+                    nufft::synthesize_each(workspace, sum, self.field_tolerance(), take);
+                }
+            }
+            Method::Direct => {
+                let all = self.quantities.concat();
+                let made = harmonic_fields(&waves, transfer, &all, raster);
+                all.iter().zip(&made).for_each(|(q, made)| add(*q, made));
+            }
+        }
+    }
+
     /// Adds the Kelvin wake, faded over the hull.
     fn add_wake(&self, workspace: &mut Workspace, fields: &mut SurfaceFields) -> Option<Reached> {
         let wake = self.models.wake.as_ref();
@@ -275,10 +347,14 @@ impl<'a> Stages<'a> {
         reached
     }
 
-    /// What the turbulent wake leaves of the short waves.
+    /// What the turbulent wake and slicks leave of the short waves.
     fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
-        let wake = self.models.wake.as_ref();
-        let wake = wake.filter(|_| self.plan.uses(Term::Turbulent))?;
+        let uses = |term| self.plan.uses(term);
+        let wake = self.models.wake.as_ref().filter(|_| uses(Term::Turbulent));
+        let slicks = self.models.slicks.filter(|_| uses(Term::Slicks));
+        let slicks = slicks
+            .map(|slicks| slicks.field(&self.raster, self.scene.sea.wind_speed, self.scene.seed));
+        let Some(wake) = wake else { return slicks };
         let mut field = workspace.field(&self.raster);
         turbulent_wake(wake).fill_damping(&mut field, &self.raster);
         field
@@ -286,7 +362,35 @@ impl<'a> Stages<'a> {
             .par_iter_mut()
             .with_min_len(1 << 14)
             .for_each(|damping| *damping = 1.0 - *damping);
+        if let Some(slicks) = slicks {
+            let left = field.values.par_iter_mut().zip(&slicks.values);
+            left.with_min_len(1 << 14)
+                .for_each(|(left, slick)| *left *= slick);
+        }
         Some(field)
+    }
+
+    /// Adds the return of breaking waves, damped like the short ones.
+    fn add_breaking(&self, sigma0: &mut Field, damping: Option<&Field>) {
+        if !self.plan.uses(Term::Breaking) {
+            return;
+        }
+        let breaking = self.models.breaking as f32;
+        let pixels = sigma0.values.par_iter_mut().with_min_len(1 << 14);
+        match damping {
+            None => pixels.for_each(|s| *s += breaking),
+            Some(left) => pixels
+                .zip(&left.values)
+                .for_each(|(s, left)| *s += breaking * left),
+        }
+    }
+
+    fn add_gusts(&self, sigma0: &mut Field) {
+        if let Some((gusts, exponent)) = self.models.gusts
+            && self.plan.uses(Term::Gusts)
+        {
+            gusts.modulate_raster(sigma0, &self.raster, exponent, self.scene.seed);
+        }
     }
 
     fn sigma0(
@@ -362,7 +466,7 @@ impl<'a> Stages<'a> {
             radial_acceleration: uses(Term::Coherence).then_some(&fields.radial_acceleration),
             elevation: uses(Term::RangeBunching).then_some(&fields.elevation),
         };
-        let at_rest = AzimuthResolution::at_rest(self.models.azimuth_resolution, 1);
+        let at_rest = self.models.resolution_at_rest();
         let imaging = Imaging {
             range_to_velocity: self.models.range_to_velocity,
             incidence: self.models.incidence,
@@ -378,10 +482,50 @@ impl<'a> Stages<'a> {
             Method::Fast => imaging.image_in(workspace, &sources, image, tolerance),
             Method::Direct => DirectImage::new(&imaging, &sources, image).image(),
         };
-        if let Some(echo) = self.echo() {
+        if self.models.response.is_none()
+            && let Some(echo) = self.echo()
+        {
             echo.add_to(&mut intensity, image, at_rest.nominal);
         }
+        if uses(Term::Noise) {
+            let noise = self.models.noise as f32;
+            let pixels = intensity.values.par_iter_mut().with_min_len(1 << 14);
+            pixels.for_each(|value| *value += noise);
+        }
         intensity
+    }
+
+    /// The ship as points with its ghosts, for an image with an impulse response.
+    fn points(&self) -> Vec<PointTarget> {
+        let (scene, models) = (self.scene, self.models);
+        let ship = scene.ship.as_ref().filter(|ship| ship.echo);
+        let (Some(ship), Some(wake)) = (ship, &models.wake) else {
+            return Vec::new();
+        };
+        let echo = ShipEcho {
+            position: wake.track.position,
+            heading: ship.heading,
+            length: ship.length,
+            beam: ship.beam,
+            radial_velocity: ship_radial_velocity(ship.speed, ship.heading, models.incidence),
+            roll_velocity: ship.roll,
+        };
+        let view = Viewing {
+            incidence: models.incidence,
+            range_to_velocity: models.range_to_velocity,
+        };
+        let mut points = echo.scatterers(&view, scene.seed);
+        let radar = &scene.radar;
+        if let (Some(level), Some(rate)) = (radar.ambiguity, radar.pulse_rate) {
+            let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
+            points.extend(ambiguities(&points, distance, 10f64.powf(0.1 * level)));
+        }
+        let [rows, columns] = [models.image.rows as f64, models.image.columns as f64];
+        points.retain(|point| {
+            let [column, row] = models.image.pixel(point.position[0], point.position[1]);
+            (0.0..rows).contains(&row) && (0.0..columns).contains(&column)
+        });
+        points
     }
 
     /// The ship's own echo, if it is asked for.

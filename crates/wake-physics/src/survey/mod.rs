@@ -30,8 +30,10 @@ const WEDGE: f64 = 4.0;
 /// What is known of a scene before it is computed.
 #[derive(Debug)]
 pub(crate) struct Survey {
-    /// Resolved waves of the sea.
+    /// Resolved waves of the sea, swell included.
     pub(crate) sea: Vec<WaveSample>,
+    /// Resolved waves of the swell.
+    pub(crate) swell: Vec<WaveSample>,
     /// Resolved waves of the wake.
     pub(crate) wake: Vec<WaveSample>,
     /// How waves modulate the image.
@@ -42,6 +44,16 @@ pub(crate) struct Survey {
     pub(crate) resolution: AzimuthResolution,
     /// Root of the mean square of the damping of the turbulent wake over the image, 0 to 1.
     pub(crate) damping: f64,
+    /// Root of the mean square of what the current of the wake changes σ⁰ by, relative, over the image.
+    pub(crate) edge: f64,
+    /// Damping in slicks.
+    pub(crate) slicks: f64,
+    /// Root of the mean square of what gusts change σ⁰ by, relative.
+    pub(crate) gusts: f64,
+    /// Breaking waves and noise over the mean σ⁰.
+    pub(crate) added: [f64; 2],
+    /// Correlation of neighbouring pixels by the impulse response.
+    pub(crate) response: f64,
     /// Mean σ⁰: Bragg and specular.
     pub(crate) mean: [f64; 2],
     /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
@@ -59,7 +71,11 @@ impl Survey {
         // Half a cell of the sea's lattice more than the band: cells at its edge hold waves from beyond.
         let half_cell = 1.0 / models.image.rows.min(models.image.columns) as f64;
         let band = models.image.nyquist_wavenumber() * (1.0 + half_cell);
-        let sea = waves::sea(&models.sea, band);
+        let swell = waves::swell(models.swell.as_ref(), models.transfer.depth, band);
+        let wind_waves = waves::sea(&models.sea, band);
+        let no_wind_waves = wind_waves.is_empty();
+        let mut sea = wind_waves;
+        sea.extend_from_slice(&swell);
         let (wake, crowding) = match &models.wake {
             Some(wake) => sampled_wake(wake, &models.image),
             None => (Vec::new(), 1.0),
@@ -69,8 +85,24 @@ impl Survey {
         let sensitivity = backscatter.sensitivity(&resolved);
         let (tilt, curvature) = slope_of_ln_sigma(&backscatter);
         let total = sensitivity.mean[0] + sensitivity.mean[1];
+        // Where nothing scatters all that is added is all there is.
+        let over_mean = |value: f64| match value {
+            v if v > 0.0 && total > 0.0 => v / total,
+            v if v > 0.0 => 1.0,
+            _ => 0.0,
+        };
         let mut survey = Self {
             sea,
+            swell,
+            edge: edge(models),
+            slicks: models.slicks.map_or(0.0, |s| s.damping),
+            gusts: models
+                .gusts
+                .map_or(0.0, |(g, exponent)| exponent * g.strength),
+            added: [over_mean(models.breaking), over_mean(models.noise)],
+            response: models
+                .response
+                .map_or(0.0, |r| r.pixel_correlation(models.delivered.spacing)),
             wake,
             modulation: ModulationTransfer {
                 transfer: models.transfer,
@@ -87,16 +119,17 @@ impl Survey {
             damping: damping(models),
             mean: sensitivity.mean,
             backscatter: [sensitivity.tilt_average, sensitivity.specular],
-            spacing: scene.grid.spacing,
+            spacing: models.image.spacing,
             looks: f64::from(scene.radar.looks),
             absent: Vec::new(),
         };
-        survey.absent = survey.absent_terms(models);
+        survey.absent = survey.absent_terms(models, no_wind_waves);
+        survey.absent.extend(absent_extras(scene, &survey, models));
         survey
     }
 
     /// Terms that the scene has nothing of.
-    fn absent_terms(&self, models: &Models) -> Vec<(Term, &'static str)> {
+    fn absent_terms(&self, models: &Models, no_wind_waves: bool) -> Vec<(Term, &'static str)> {
         let no_waves = self.sea.is_empty() && self.wake.is_empty();
         let no_bragg = models.short_waves_vanish();
         let ship = models.wake.as_ref();
@@ -115,10 +148,7 @@ impl Survey {
             Some(_) if self.damping == 0.0 => Some("it does not reach the image"),
             Some(_) => None,
         };
-        let sea = self
-            .sea
-            .is_empty()
-            .then_some("no wind wave that a pixel carries");
+        let sea = no_wind_waves.then_some("no wind wave that a pixel carries");
         let flat = no_waves.then_some("there are no resolved waves");
         let still = (models.range_to_velocity == 0.0).then_some("R/V is 0");
         let bragg = no_bragg.then_some("there are no short waves to scatter");
@@ -195,6 +225,46 @@ impl Survey {
     }
 }
 
+/// Terms that a scene has only where it asks for them.
+fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, &'static str)> {
+    let ship = scene.ship.as_ref();
+    let edge = match ship {
+        None => Some("there is no ship"),
+        Some(ship) if !ship.edge => Some("not asked for"),
+        Some(_) if models.edge.is_none() => Some("the ship is at rest, or there is no wind"),
+        Some(_) if survey.edge == 0.0 => Some("it does not reach the image"),
+        Some(_) => None,
+    };
+    let asked = |asked: bool| (!asked).then_some("not asked for");
+    let swell = match &models.swell {
+        None => Some("not asked for"),
+        Some(_) if survey.swell.is_empty() => Some("no swell that a pixel carries"),
+        Some(_) => None,
+    };
+    let slicks = match &models.slicks {
+        None if scene.sea.slick_damping > 0.0 => Some("the wind tears films apart"),
+        slicks => asked(slicks.is_some()),
+    };
+    let response = match (&models.response, scene.radar.range_resolution) {
+        (Some(_), _) => None,
+        (None, None) => Some("not asked for"),
+        (None, Some(_)) if !scene.model.terms.allow(Term::Response) => Some("not in model.terms"),
+        (None, Some(_)) => Some("pixels correlate too little to tell"),
+    };
+    [
+        (Term::Swell, swell),
+        (Term::Edge, edge),
+        (Term::Slicks, slicks),
+        (Term::Breaking, asked(models.breaking > 0.0)),
+        (Term::Gusts, asked(models.gusts.is_some())),
+        (Term::Noise, asked(models.noise > 0.0)),
+        (Term::Response, response),
+    ]
+    .into_iter()
+    .filter_map(|(term, why)| why.map(|why| (term, why)))
+    .collect()
+}
+
 /// The waves of the wake in the image, and how much stronger they are within a ship's length of the stern.
 fn sampled_wake(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
     let corners = wake.track.corners(image);
@@ -254,13 +324,27 @@ fn slope_of_ln_sigma(backscatter: &Backscatter) -> ([f64; 2], [f64; 2]) {
     (first, second)
 }
 
-/// Root of the mean square of the turbulent wake's damping over the image, looked at on a coarse raster.
+/// Root of the mean square of the turbulent wake's damping over the image.
 fn damping(models: &Models) -> f64 {
     let Some(wake) = models.wake.as_ref().filter(|w| w.speed > 0.0) else {
         return 0.0;
     };
     let turbulent = turbulent_wake(wake);
-    let image = &models.image;
+    rms_over(&models.image, |place| {
+        turbulent.damping(wake.track.seen_from_ship(place))
+    })
+}
+
+/// Root of the mean square of the relative change of σ⁰ by the current of the wake over the image.
+fn edge(models: &Models) -> f64 {
+    models.edge.map_or(0.0, |edge| {
+        let change = |place| edge.factor(edge.track.seen_from_ship(place)) - 1.0;
+        rms_over(&models.image, change)
+    })
+}
+
+/// Root of the mean square of a function of the place (x, y) over the image, looked at on a coarse raster.
+fn rms_over(image: &Raster, of: impl Fn([f64; 2]) -> f64) -> f64 {
     let (rows, columns) = (
         image.rows.min(DAMPING_POINTS),
         image.columns.min(DAMPING_POINTS),
@@ -272,7 +356,7 @@ fn damping(models: &Models) -> f64 {
                 image.x(j * image.columns / columns),
                 image.y(i * image.rows / rows),
             );
-            sum += turbulent.damping(wake.track.seen_from_ship([x, y])).powi(2);
+            sum += of([x, y]).powi(2);
         }
     }
     (sum / (rows * columns) as f64).sqrt()

@@ -2,6 +2,7 @@
 
 use crate::dispersion::angular_frequency;
 use crate::modulation::WaveSample;
+use crate::swell::Swell;
 use crate::waves::PlaneWaves;
 use crate::wind_sea::DirectionalSpectrum;
 use std::f64::consts::{PI, TAU};
@@ -36,6 +37,17 @@ pub(crate) fn sea(spectrum: &DirectionalSpectrum, band: f64) -> Vec<WaveSample> 
         }
     }
     waves
+}
+
+/// The swell, one wave in the middle of each of its cells.
+pub(crate) fn swell(swell: Option<&Swell>, depth: f64, band: f64) -> Vec<WaveSample> {
+    let cells = swell.map_or_else(Vec::new, |swell| swell.cells(band, || 0.5));
+    let sample = |(k, variance): ([f64; 2], f64)| WaveSample {
+        k,
+        omega: angular_frequency(k[0].hypot(k[1]), depth),
+        variance,
+    };
+    cells.into_iter().map(sample).collect()
 }
 
 /// The wake, each node with its share of the mean square over an image.

@@ -11,7 +11,14 @@
 //! side was computed and seen by Fujimura, Soloviev and Kudryavtsev (2010), IEEE Geosci. Remote Sens. Lett. 7. The form
 //! and every constant here are chosen, some so that they resemble measured images.
 
-use super::width;
+use super::{width, within};
+use crate::kelvin::fade;
+use crate::raster::{Field, Raster};
+use crate::track::Track;
+use rayon::prelude::*;
+
+/// Widths W off the track beyond which the current is below 2e-8 of itself.
+const REACH: f64 = 6.0;
 
 /// Share of the wind speed that the surface drifts with, wholly lost in the wake: chosen.
 pub const DRIFT_OF_WIND: f64 = 0.03;
@@ -77,6 +84,81 @@ impl WakeCurrent {
     /// What is left of the current after the time since the ship passed.
     fn left(&self, distance: f64) -> f64 {
         (-distance.max(0.0) / (self.speed * CURRENT_DECAY)).exp()
+    }
+}
+
+/// The current behind a ship on its track, and what it makes of σ⁰.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WakeEdge {
+    /// The current.
+    pub current: WakeCurrent,
+    /// Place and direction of the ship.
+    pub track: Track,
+    /// Length of the hull L \[m\].
+    pub length: f64,
+    /// Response `T_e` of σ⁰ to a divergence \[s\], see [`response_time`].
+    pub response: f64,
+}
+
+impl WakeEdge {
+    /// Factor on σ⁰ at ξ forward of midship and η to port \[m\]; 1 ahead of the bow, beginning along the hull as the
+    /// Kelvin wake does ([`fade`]).
+    #[must_use]
+    pub fn factor(&self, [forward, port]: [f64; 2]) -> f64 {
+        let divergence = self.current.divergence(self.astern(forward), port);
+        edge_factor(divergence, self.response).powf(fade(forward, self.length))
+    }
+
+    /// Distance astern of the stern \[m\].
+    fn astern(&self, forward: f64) -> f64 {
+        (-forward - 0.5 * self.length).max(0.0)
+    }
+
+    /// Multiplies σ⁰ with the factor.
+    pub(crate) fn modulate(&self, sigma0: &mut Field, raster: &Raster) {
+        self.change(sigma0, raster, |value, seen| {
+            *value *= self.factor(seen) as f32
+        });
+    }
+
+    /// Adds the current to the velocities of the water along x and y [m/s]; a field without pixels stays so.
+    pub(crate) fn add_velocity(&self, along: [&mut Field; 2], raster: &Raster) {
+        let port = self.track.port();
+        for (field, port) in along.into_iter().zip(port) {
+            if field.values.is_empty() {
+                continue;
+            }
+            self.change(field, raster, |value, seen| {
+                let velocity = self.current.velocity(self.astern(seen[0]), seen[1]);
+                *value += (port * velocity * fade(seen[0], self.length)) as f32;
+            });
+        }
+    }
+
+    /// Changes the pixels near the track, each seen from the ship.
+    fn change(
+        &self,
+        field: &mut Field,
+        raster: &Raster,
+        change: impl Fn(&mut f32, [f64; 2]) + Sync,
+    ) {
+        let farthest = self
+            .track
+            .corners(raster)
+            .iter()
+            .map(|c| -c[0])
+            .fold(0.0, f64::max);
+        let reach = REACH * width(self.current.beam, farthest);
+        let corner = self.track.seen_from_ship([raster.x(0), raster.y(0)]);
+        let step = self.track.seen_from_ship([raster.x(1), raster.y(0)])[1] - corner[1];
+        let rows = field.values.par_chunks_mut(raster.columns.max(1));
+        rows.enumerate().for_each(|(i, row)| {
+            let seen = |j: usize| self.track.seen_from_ship([raster.x(j), raster.y(i)]);
+            let columns = within(seen(0)[1], step, reach, row.len());
+            for (j, value) in columns.clone().zip(&mut row[columns]) {
+                change(value, seen(j));
+            }
+        });
     }
 }
 
@@ -229,6 +311,46 @@ mod tests {
         let rule = crate::quadrature::GaussLegendre::new(60);
         let sum = rule.integrate([-9.0 * across, 9.0 * across], |y| wake.divergence(400.0, y));
         assert!(sum.abs() < 1e-9, "{sum}");
+    }
+
+    fn edge() -> WakeEdge {
+        WakeEdge {
+            current: wake(),
+            track: Track::new([200.0, -100.0], 70.0, 0.0),
+            length: 150.0,
+            response: 300.0,
+        }
+    }
+
+    #[test]
+    fn fields_are_the_functions() {
+        let edge = edge();
+        let raster = Raster::image(70, 90, 20.0);
+        let mut sigma0 = Field::constant(&raster, 0.5);
+        edge.modulate(&mut sigma0, &raster);
+        let [mut vx, mut vy] = [(); 2].map(|()| Field::constant(&raster, 0.0));
+        edge.add_velocity([&mut vx, &mut vy], &raster);
+        let mut changed = 0;
+        for i in 0..raster.rows {
+            for j in 0..raster.columns {
+                let seen = edge.track.seen_from_ship([raster.x(j), raster.y(i)]);
+                let expected = 0.5 * edge.factor(seen);
+                assert!((f64::from(sigma0.at(i, j)) / expected - 1.0).abs() < 2e-7);
+                changed += usize::from((expected - 0.5).abs() > 0.05);
+                let distance = (-seen[0] - 75.0).max(0.0);
+                let speed = edge.current.velocity(distance, seen[1]) * fade(seen[0], 150.0);
+                let [px, py] = edge.track.port();
+                assert!((f64::from(vx.at(i, j)) - px * speed).abs() < 1e-8);
+                assert!((f64::from(vy.at(i, j)) - py * speed).abs() < 1e-8);
+            }
+        }
+        assert!(changed > 100, "{changed}");
+        // Nothing ahead of the bow.
+        assert!((edge.factor([80.0, 20.0]) - 1.0).abs() < 1e-12);
+        let mut none = Field::default();
+        let mut other = Field::default();
+        edge.add_velocity([&mut none, &mut other], &raster);
+        assert!(none.values.is_empty() && other.values.is_empty());
     }
 
     #[test]

@@ -11,9 +11,11 @@ mod expected;
 mod hard_cases;
 mod methods;
 mod plan;
+mod satellite;
 mod simulator;
 mod trends;
 
+use wake_physics::scene::Term;
 use wake_physics::{Scene, Simulation, simulate};
 
 /// The default scene on a small grid, with assignments.
@@ -56,7 +58,7 @@ fn assert_sound(simulation: &Simulation, what: &str) {
         );
     }
     let plan = &simulation.plan;
-    assert_eq!(plan.terms.len(), 10, "{what}");
+    assert_eq!(plan.terms.len(), Term::ALL.len(), "{what}");
     assert!(
         plan.terms
             .iter()

@@ -1,0 +1,225 @@
+//! Scenes as satellites deliver them: impulse response, looks, noise, and what is off unless asked for.
+
+use crate::{assert_sound, open_sea, run, small};
+use num_complex::Complex32;
+use wake_physics::scene::Term;
+use wake_physics::{Field, Scene, Simulator, simulate};
+
+/// A sea and a ship under Sentinel-1, 160 × 150 pixels of 10 m.
+fn sentinel(more: &[&str]) -> Scene {
+    let mut keys = vec![
+        "radar.sensor=sentinel-1-iw",
+        "ship.echo=true",
+        "ship.edge=true",
+        "sea.gust_strength=0.05",
+        "sea.breaking=true",
+    ];
+    keys.extend_from_slice(more);
+    small(160, 150, &keys)
+}
+
+/// Correlation of the amplitude of pixels `[down, right]` apart.
+fn correlation(image: &Field, [down, right]: [usize; 2]) -> f64 {
+    let mean = image.mean();
+    let (mut sum, mut square) = (0.0, 0.0);
+    for i in 0..image.rows - down {
+        for j in 0..image.columns - right {
+            let v = f64::from(image.at(i, j)) - mean;
+            sum += v * (f64::from(image.at(i + down, j + right)) - mean);
+            square += v * v;
+        }
+    }
+    sum / square
+}
+
+#[test]
+fn a_satellite_scene_is_sound_and_has_its_pixels() {
+    let scene = sentinel(&[]);
+    let simulation = run(&scene);
+    assert_sound(&simulation, "sentinel-1-iw");
+    assert_eq!(
+        (simulation.raster.rows, simulation.raster.columns),
+        (160, 150)
+    );
+    assert_eq!(simulation.raster.spacing, 10.0);
+    for term in [
+        Term::Response,
+        Term::Noise,
+        Term::Gusts,
+        Term::Edge,
+        Term::Breaking,
+    ] {
+        assert!(simulation.plan.uses(term), "{}", simulation.plan);
+    }
+    // Two computed pixels a pixel of the image, the guard, and the margin.
+    assert!(simulation.plan.sizes.computed[0] >= 2 * 160 + 2 * 30);
+    assert!(simulation.slc.is_none());
+    // The image alone is the same bits.
+    let image = Simulator::default().image(&scene).unwrap();
+    assert_eq!(image.intensity, simulation.intensity);
+    assert_eq!(image.speckled(), simulation.speckled);
+}
+
+/// Lags of a Sentinel-1 product and its looks, on open sea without waves that a pixel carries.
+#[test]
+fn the_speckle_is_that_of_the_product() {
+    let scene = open_sea(sentinel(&[
+        "model.terms=[\"noise\", \"response\", \"speckle\"]",
+    ]));
+    let simulation = run(&scene);
+    let image = &simulation.speckled;
+    // 24,000 pixels of 2.56 × 2.08 a sample: four standard errors are 0.06.
+    let error = 4.0 / (24_000.0f64 / (2.56 * 2.08)).sqrt();
+    for (place, expected) in [
+        ([0, 1], 0.600),
+        ([0, 3], 0.01),
+        ([1, 0], 0.437),
+        ([2, 0], 0.002),
+    ] {
+        let found = correlation(image, place);
+        assert!((found - expected).abs() < error, "{place:?}: {found}");
+    }
+    let looks = wake_physics::sar::speckle::equivalent_looks(image);
+    assert!((looks / 4.9 - 1.0).abs() < 2.0 * error, "{looks}");
+    let expected = simulation.sigma0.mean() + 10f64.powf(-2.5);
+    // The tails of the response that reach beyond the guard.
+    assert!((simulation.intensity.mean() / expected - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn one_look_is_a_complex_image() {
+    let keys = ["radar.looks=1", "radar.look_overlap=0"];
+    let simulation = run(&sentinel(&keys));
+    let slc = simulation.slc.as_ref().unwrap();
+    let power: Vec<f32> = slc.iter().map(Complex32::norm_sqr).collect();
+    assert_eq!(power, simulation.speckled.values);
+    let folder = tempfile::tempdir().unwrap();
+    simulation.write(folder.path()).unwrap();
+    let bytes = std::fs::read(folder.path().join("fields.safetensors")).unwrap();
+    let file = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+    assert_eq!(file.tensor("slc").unwrap().shape(), [160, 150, 2]);
+}
+
+/// Fine pixels under a coarse response: the same mean with and without it, and less contrast.
+#[test]
+fn the_response_smears_and_keeps_the_mean() {
+    let keys = [
+        "radar.range_resolution=12",
+        "radar.resolution=12",
+        "model.terms=all",
+    ];
+    let simulation = run(&open_sea(small(128, 128, &keys)));
+    let contrast = |field: &Field| {
+        let mean = field.mean();
+        (field.rms().powi(2) / mean.powi(2) - 1.0).sqrt()
+    };
+    let (image, sigma0) = (&simulation.intensity, &simulation.sigma0);
+    assert!(contrast(image) < 0.6 * contrast(sigma0));
+    // Waves at the edges move in and out: a few per cent.
+    assert!((image.mean() / sigma0.mean() - 1.0).abs() < 0.05);
+}
+
+/// What nobody asks for is not there: the plan says so.
+#[test]
+fn nothing_of_it_is_on_by_default() {
+    let plan = simulate(&small(64, 64, &[])).unwrap().plan;
+    let extras = [
+        Term::Swell,
+        Term::Edge,
+        Term::Slicks,
+        Term::Breaking,
+        Term::Gusts,
+        Term::Noise,
+        Term::Response,
+    ];
+    for planned in plan.terms.iter().filter(|t| extras.contains(&t.term)) {
+        assert!(!planned.used && planned.why == "not asked for", "{plan}");
+        assert_eq!(planned.estimate, 0.0);
+    }
+}
+
+/// Pixels wider than the response have speckle of their own.
+#[test]
+fn independent_pixels_suffice_on_coarse_grids() {
+    let keys = |spacing: f64| {
+        let scene = small(
+            40,
+            40,
+            &["radar.range_resolution=10", "radar.resolution=10"],
+        );
+        scene
+            .with_assignments(&[format!("grid.spacing={spacing}")])
+            .unwrap()
+    };
+    for (spacing, used) in [(5.0, true), (9.0, true), (11.3, false), (20.0, false)] {
+        let simulation = run(&keys(spacing));
+        assert_eq!(simulation.plan.uses(Term::Response), used, "{spacing}");
+        assert_eq!(simulation.raster.spacing, spacing);
+    }
+}
+
+#[test]
+fn a_satellite_scene_does_not_know_the_threads() {
+    let scene = sentinel(&[
+        "sea.swell_height=1",
+        "sea.slick_damping=0.5",
+        "sea.wind_speed=4",
+    ]);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| run(&scene))
+    };
+    let (one, three) = (with(1), with(3));
+    assert_eq!(one.speckled, three.speckled);
+    assert_eq!(one.velocity_x, three.velocity_x);
+}
+
+/// Swell: its height on the surface, its length and direction in the elevation.
+#[test]
+fn swell_lies_on_the_sea() {
+    let keys = [
+        "sea.wind_speed=0",
+        "sea.swell_height=2",
+        "sea.swell_length=120",
+        "grid.spacing=10",
+    ];
+    let simulation = run(&open_sea(small(256, 256, &keys)));
+    // Significant height four times the deviation; some 20 × 20 groups of waves.
+    let height = 4.0 * simulation.elevation.rms();
+    assert!((height / 2.0 - 1.0).abs() < 0.2, "{height}");
+    // Along azimuth: half a wavelength away it is the opposite, across it is the same.
+    let elevation = &simulation.elevation;
+    assert!(correlation(elevation, [6, 0]) < -0.5);
+    assert!(correlation(elevation, [0, 6]) > 0.5);
+}
+
+/// The windward edge of a turbulent wake is bright, the other is darker, the middle is dark.
+#[test]
+fn a_wake_has_a_bright_windward_edge() {
+    // The ship goes along azimuth, the wind to starboard (+x): port, −x, is windward.
+    let keys = [
+        "ship.heading=0",
+        "ship.position=[0, 900]",
+        "ship.edge=true",
+        "ship.edge_time=400",
+        "sea.wind_toward=90",
+        "model.terms=[\"turbulent\", \"edge\", \"tilt_average\"]",
+        "grid.spacing=5",
+    ];
+    let simulation = run(&small(300, 300, &keys));
+    let row = 170;
+    let at = |x: f64| {
+        let column = (150.0 + x / 5.0).round() as usize;
+        f64::from(simulation.sigma0.at(row, column)) / f64::from(simulation.sigma0.at(row, 0))
+    };
+    let width = wake_physics::turbulent::width(26.0, 900.0);
+    assert!(
+        at(-width) > 1.2 && at(width) < 0.85,
+        "{} {}",
+        at(-width),
+        at(width)
+    );
+    assert!(at(0.0) < 0.7);
+    // The current is there too: the water goes against the wind that it does not drift with.
+    assert!(simulation.velocity_x.at(row, 150) < -0.05);
+}
