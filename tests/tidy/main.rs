@@ -206,10 +206,15 @@ fn scene_files_are_valid() {
     let default = wake_physics::Scene::read(&folder.join("default.toml")).expect("the default");
     assert_eq!(default, wake_physics::Scene::default());
     let mut count = 0;
-    for entry in fs::read_dir(folder).expect("the folder") {
-        let path = entry.expect("an entry").path();
-        wake_physics::Scene::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-        count += 1;
+    for folder in [folder.join("satellite"), folder] {
+        for entry in fs::read_dir(folder).expect("the folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_file() {
+                wake_physics::Scene::read(&path)
+                    .unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+                count += 1;
+            }
+        }
     }
-    assert!(count >= 5, "only {count} scene files");
+    assert!(count >= 11, "only {count} scene files");
 }
