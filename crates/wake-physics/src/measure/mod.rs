@@ -20,6 +20,7 @@ mod radial;
 mod smooth;
 mod spectrum;
 mod stationary;
+mod texture;
 mod wake;
 
 #[cfg(test)]
@@ -28,6 +29,7 @@ mod tests;
 pub use inversion::{incidence, mean_sigma0, wind_axis, wind_speed};
 pub use open_sea::{OpenSea, open_sea};
 pub use radial::{Binning, RadialSpectrum, radial_spectrum};
+pub use texture::{Texture, texture};
 pub use wake::{ShipPlace, WakeMeasurement, kelvin_wedge, measure_wake};
 
 use serde::Serialize;

@@ -55,7 +55,8 @@ impl Speckling {
         match (exposure, models.response) {
             (Some(exposure), Some(response)) => {
                 let overlap = scene.radar.look_overlap.unwrap_or(0.0);
-                let equivalent = response.azimuth.window.overlapping_looks(count, overlap);
+                // The looks of the products modelled lie in range; elsewhere the windows are alike.
+                let equivalent = response.range.window.overlapping_looks(count, overlap);
                 Self::Looks(Box::new(exposure), Looks { equivalent, seed })
             }
             _ => Self::Pixels(count, seed),
