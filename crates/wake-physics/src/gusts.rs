@@ -115,33 +115,14 @@ impl Gusts {
         seed: u64,
     ) {
         let step = ((self.scale / (200.0 * raster.spacing)) as usize).max(1);
-        let coarse = Raster {
-            rows: raster.rows.div_ceil(step) + 1,
-            columns: raster.columns.div_ceil(step) + 1,
-            spacing: step as f64 * raster.spacing,
-            origin_row: 0,
-            origin_column: 0,
-        };
+        let [rows, columns] = raster.every(step);
+        let coarse = Raster::image(rows, columns, step as f64 * raster.spacing);
         let gusts = self.field(&coarse, seed);
         let bias = (0.5 * (exponent * self.strength).powi(2)) as f32;
         let exponent = exponent as f32;
-        let rows = sigma0.values.par_chunks_mut(raster.columns.max(1));
-        rows.enumerate().for_each_init(
-            || vec![0.0f32; coarse.columns],
-            |line, (i, row)| {
-                let down = (i % step) as f32 / step as f32;
-                let above = &gusts.values[i / step * coarse.columns..][..coarse.columns];
-                let below = &gusts.values[(i / step + 1) * coarse.columns..][..coarse.columns];
-                for (value, (a, b)) in line.iter_mut().zip(above.iter().zip(below)) {
-                    *value = a + down * (b - a);
-                }
-                for (j, value) in row.iter_mut().enumerate() {
-                    let right = (j % step) as f32 / step as f32;
-                    let [a, b] = [line[j / step], line[j / step + 1]];
-                    *value *= (exponent * (a + right * (b - a)) - bias).exp();
-                }
-            },
-        );
+        sigma0.change_with(&gusts, step, |value, g| {
+            *value *= (exponent * g - bias).exp();
+        });
     }
 
     /// ∬Φ over the cell around wavenumber 0.
@@ -245,13 +226,7 @@ mod tests {
         let raster = Raster::image(41, 30, 2.5);
         let mut sigma0 = Field::constant(&raster, 0.02);
         gusts.modulate_raster(&mut sigma0, &raster, 1.5, 1);
-        let coarse = Raster {
-            rows: 12,
-            columns: 9,
-            spacing: 10.0,
-            origin_row: 0,
-            origin_column: 0,
-        };
+        let coarse = Raster::image(12, 9, 10.0);
         let field = gusts.field(&coarse, 1);
         let factor = |g: f64| 0.02 * (1.5 * g - 0.5 * (1.5f64 * 0.06).powi(2)).exp();
         for i in 0..10 {

@@ -56,6 +56,11 @@ impl Raster {
         }
     }
 
+    /// Rows and columns of every `step`-th pixel from the first on, and one more to interpolate to.
+    pub(crate) fn every(&self, step: usize) -> [usize; 2] {
+        [self.rows, self.columns].map(|n| n.div_ceil(step) + 1)
+    }
+
     /// Number of pixels.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -146,6 +151,36 @@ impl Field {
     #[must_use]
     pub fn at(&self, row: usize, column: usize) -> f32 {
         self.values[row * self.columns + column]
+    }
+
+    /// Changes every pixel with a smooth field known at every `step`-th pixel, interpolated linearly between them.
+    ///
+    /// # Panics
+    ///
+    /// If the field has fewer values than [`Raster::every`] pixels.
+    pub(crate) fn change_with(
+        &mut self,
+        coarse: &Self,
+        step: usize,
+        change: impl Fn(&mut f32, f32) + Sync,
+    ) {
+        let rows = self.values.par_chunks_mut(self.columns.max(1));
+        rows.enumerate().for_each_init(
+            || vec![0.0f32; coarse.columns],
+            |line, (i, row)| {
+                let down = (i % step) as f32 / step as f32;
+                let [above, below] = [0, 1]
+                    .map(|n| &coarse.values[(i / step + n) * coarse.columns..][..coarse.columns]);
+                for (value, (a, b)) in line.iter_mut().zip(above.iter().zip(below)) {
+                    *value = a + down * (b - a);
+                }
+                for (j, value) in row.iter_mut().enumerate() {
+                    let right = (j % step) as f32 / step as f32;
+                    let [a, b] = [line[j / step], line[j / step + 1]];
+                    change(value, a + right * (b - a));
+                }
+            },
+        );
     }
 
     /// Adds a·b, value by value.
@@ -253,6 +288,26 @@ impl Field {
 #[allow(clippy::float_cmp, reason = "values that must be the same bits")]
 mod tests {
     use super::*;
+
+    /// A plane is interpolated to rounding.
+    #[test]
+    fn interpolation_is_exact_for_a_plane() {
+        let r = Raster::image(13, 10, 1.0);
+        for step in [1, 3, 4] {
+            let [rows, columns] = r.every(step);
+            let coarse = Field::from_fn(&Raster::image(rows, columns, 1.0), |i, j| {
+                (step * (3 * i + 2 * j)) as f32
+            });
+            let mut field = Field::constant(&r, 1.0);
+            field.change_with(&coarse, step, |value, plane| *value += plane);
+            for i in 0..13 {
+                for j in 0..10 {
+                    let expected = (3 * i + 2 * j) as f32 + 1.0;
+                    assert!((field.at(i, j) - expected).abs() < 1e-4, "{step} {i} {j}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn origin_is_the_middle_pixel() {
