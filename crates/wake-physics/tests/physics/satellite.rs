@@ -2,8 +2,19 @@
 
 use crate::{assert_sound, open_sea, run, small};
 use num_complex::Complex32;
-use wake_physics::scene::Term;
+use wake_physics::scene::{Term, Terms};
 use wake_physics::{Field, Scene, Simulator, simulate};
+
+/// Terms that a scene has only where it asks for them.
+pub(crate) const EXTRAS: [Term; 7] = [
+    Term::Swell,
+    Term::Edge,
+    Term::Slicks,
+    Term::Breaking,
+    Term::Gusts,
+    Term::Noise,
+    Term::Response,
+];
 
 /// A sea and a ship under Sentinel-1, 160 × 150 pixels of 10 m.
 fn sentinel(more: &[&str]) -> Scene {
@@ -123,18 +134,63 @@ fn the_response_smears_and_keeps_the_mean() {
 #[test]
 fn nothing_of_it_is_on_by_default() {
     let plan = simulate(&small(64, 64, &[])).unwrap().plan;
-    let extras = [
-        Term::Swell,
-        Term::Edge,
-        Term::Slicks,
-        Term::Breaking,
-        Term::Gusts,
-        Term::Noise,
-        Term::Response,
-    ];
-    for planned in plan.terms.iter().filter(|t| extras.contains(&t.term)) {
+    for planned in plan.terms.iter().filter(|t| EXTRAS.contains(&t.term)) {
         assert!(!planned.used && planned.why == "not asked for", "{plan}");
         assert_eq!(planned.estimate, 0.0);
+    }
+}
+
+/// Needed against all, same seed: weak gusts, swell, slicks, breakers, edges and noise are left out where the tolerance
+/// allows it, and change the image by less than estimated; strong ones stay.
+#[test]
+fn weak_extras_are_left_out_and_change_less_than_estimated() {
+    let strengths = [
+        (Term::Gusts, "sea.gust_strength", [3e-5, 0.05]),
+        (Term::Swell, "sea.swell_height", [1e-5, 1.0]),
+        (Term::Slicks, "sea.slick_damping", [1e-4, 0.5]),
+        (Term::Noise, "radar.noise_floor", [-60.0, -25.0]),
+        (Term::Edge, "ship.edge_time", [1e-3, 200.0]),
+    ];
+    for (n, (term, key, values)) in strengths.into_iter().enumerate() {
+        for (value, used) in values.into_iter().zip([false, true]) {
+            let mut keys = vec![
+                "model.tolerance=1e-2".to_owned(),
+                "ship.edge=true".to_owned(),
+                "grid.spacing=5".to_owned(),
+                format!("seed={n}"),
+                format!("{key}={value}"),
+            ];
+            // The edge alone is asked for by two keys.
+            keys.retain(|k| term == Term::Edge || k != "ship.edge=true");
+            let scene = small(96, 96, &[]).with_assignments(&keys).unwrap();
+            let needed = run(&scene);
+            assert_eq!(
+                needed.plan.uses(term),
+                used,
+                "{key}={value}\n{}",
+                needed.plan
+            );
+            let all = run(&scene.with_assignments(&["model.terms=all"]).unwrap());
+            let difference = needed.intensity.difference(&all.intensity).1 / all.intensity.mean();
+            let allowance = 0.01 * scene.model.tolerance;
+            assert!(
+                difference <= needed.plan.left_out() + allowance,
+                "{key}={value}: {difference}"
+            );
+            let planned = all.plan.terms.iter().find(|t| t.term == term).unwrap();
+            let mut list: Vec<Term> = Term::ALL.to_vec();
+            list.retain(|t| *t != term);
+            let mut without = scene.clone();
+            without.model.terms = Terms::List(list);
+            let without = run(&without);
+            let change = without.intensity.difference(&all.intensity).1 / all.intensity.mean();
+            assert!(
+                change <= planned.estimate,
+                "{key}={value}: {change} {}",
+                planned.estimate
+            );
+            assert!(change > 0.0, "{key}={value} changes nothing");
+        }
     }
 }
 
