@@ -3,10 +3,14 @@
 //! ```text
 //! cargo run --release --example simulate
 //! cargo run --release --example simulate -- --set sea.wind_speed=3 --set ship.heading=90 --out out/light_wind
+//! cargo run --release --example simulate -- --scene assets/scenes/satellite/sentinel_1.toml --compare REAL_IMAGES
 //! ```
 //!
-//! Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`.
+//! Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`; with `--compare` the texture of the open sea of the
+//! image beside that of real ones, `texture.json`.
 
+#[path = "simulate/compare.rs"]
+mod compare;
 #[path = "common/exit.rs"]
 mod exit;
 
@@ -34,6 +38,9 @@ struct Arguments {
     /// Folder of the results, made if absent
     #[arg(long, value_name = "DIR", default_value = "out/simulate")]
     out: PathBuf,
+    /// Compare the open sea's texture with that of the PNG images of a folder (grey linear in amplitude)
+    #[arg(long, value_name = "DIR")]
+    compare: Option<PathBuf>,
     /// Print the report as JSON on standard output, and nothing else
     #[arg(long)]
     json: bool,
@@ -67,6 +74,13 @@ fn run(arguments: &Arguments) -> wake_physics::Result<()> {
     };
     let simulation = simulate_with(&scene, method)?;
     let report = simulation.write(&arguments.out)?;
+    if let Some(folder) = &arguments.compare {
+        let rows = compare::textures(&simulation.speckled, folder)?;
+        output::write_json(&arguments.out.join("texture.json"), &rows)?;
+        if !arguments.json {
+            compare::print(&rows);
+        }
+    }
     if arguments.json {
         println!("{report:#}");
     } else {
