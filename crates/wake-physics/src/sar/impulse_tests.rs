@@ -89,15 +89,16 @@ fn single_look_is_the_sum_over_its_scatterers() {
         let band = axis.band(size, raster.spacing);
         let period = size as f64 * raster.spacing;
         let gain = f64::from(band.0[band.highest()]);
+        let bandwidth = axis.bandwidth();
         let sum: f64 = (-4000i32..=4000)
             .map(|n| {
                 axis.window
-                    .response((x + f64::from(n) * period) * axis.bandwidth())
+                    .response((x + f64::from(n) * period) * bandwidth)
             })
             .sum();
         let rule = crate::quadrature::GaussLegendre::new(96);
         let mean = rule.integrate([-0.5, 0.5], |f| axis.window.weight(f));
-        gain * mean * axis.bandwidth() * raster.spacing * sum
+        gain * mean * bandwidth * raster.spacing * sum
     };
     let sizes = LowPass::sizes([raster.rows, raster.columns], 2);
     let down = |y: f64, from: f64| kernel(&response.azimuth, sizes[0], y - from);

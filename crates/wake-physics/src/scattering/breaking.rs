@@ -161,7 +161,7 @@ mod tests {
         assert!((with(-21.0) + 18.7).abs() < 0.1, "{}", with(-21.0));
     }
 
-    /// μ of the Bragg waves at 35° and T_b, as computed elsewhere from the same formulas; the density of air and the
+    /// μ of the Bragg waves at 35° and `T_b`, as computed elsewhere from the same formulas; the density of air and the
     /// roughness of theirs are not stated: 4 %, and half a unit of the last digit.
     #[test]
     fn rates_and_responses_as_tabulated() {

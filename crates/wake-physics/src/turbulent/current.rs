@@ -117,7 +117,7 @@ impl WakeEdge {
     /// Multiplies σ⁰ with the factor.
     pub(crate) fn modulate(&self, sigma0: &mut Field, raster: &Raster) {
         self.change(sigma0, raster, |value, seen| {
-            *value *= self.factor(seen) as f32
+            *value *= self.factor(seen) as f32;
         });
     }
 
@@ -221,7 +221,7 @@ mod tests {
         }
     }
 
-    /// V_o/W = 1: 1.6487 at z = 0, −0.7358 at √3. V_d/W = 1: ±e^{−½} = 0.6065 at z = ±1.
+    /// `V_o/W` = 1: 1.6487 at z = 0, −0.7358 at √3. `V_d/W` = 1: ±e^{−½} = 0.6065 at z = ±1.
     #[test]
     fn extremes_in_closed_form() {
         let beam = 20.0;
