@@ -80,7 +80,11 @@ impl<'a> Estimates<'a> {
         let effect = match term {
             Term::Sea => self.waves(&self.sea),
             Term::Swell => self.waves(&self.swell),
-            Term::Edge => self.survey.edge,
+            Term::Edge => {
+                let [change, velocity] = self.survey.edge;
+                let shift = self.survey.modulation.range_to_velocity * velocity;
+                change + shift / self.width(self.survey.resolution.at(0.0)) * self.contrast
+            }
             Term::Slicks => self.survey.slicks * self.survey.modulation.bragg_share,
             Term::Breaking => self.survey.added[0],
             Term::Gusts => self.survey.gusts * self.contrast.hypot(1.0),

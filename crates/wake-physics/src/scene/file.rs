@@ -103,7 +103,7 @@ impl Scene {
 fn forget_radar(root: &mut toml::Table) {
     let mut forget = |table: &str, keys: &[&str]| {
         if let Some(table) = root.get_mut(table).and_then(toml::Value::as_table_mut) {
-            table.retain(|key, _| !keys.iter().any(|k| *k == key));
+            table.retain(|key, _| !keys.contains(&key));
         }
     };
     forget("radar", &SET_BY_SENSOR);

@@ -166,7 +166,7 @@ mod tests {
             other.radar.range_to_velocity,
             mode.range_to_velocity_at(33.0)
         );
-        assert!((other.radar.range_resolution.unwrap() - 20.3).abs() < 0.06);
+        assert_eq!(other.radar.range_resolution, Some(20.3));
     }
 
     #[test]

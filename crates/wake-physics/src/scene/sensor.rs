@@ -43,6 +43,15 @@ pub enum Sensor {
     Ers2Pri,
 }
 
+/// Resolution in range \[m\], by what stays over the swath.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RangeResolution {
+    /// In slant range: one bandwidth for the whole swath.
+    Slant(f64),
+    /// In ground range: bandwidths follow the incidence.
+    Ground(f64),
+}
+
 /// What a sensor sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorMode {
@@ -58,8 +67,8 @@ pub struct SensorMode {
     pub incidence_range: [f64; 2],
     /// Pixel spacing in ground range and azimuth \[m\].
     pub spacing: f64,
-    /// Resolution in ground range at [`Self::incidence`] \[m\], of one look; see [`Self::range_resolution_at`].
-    pub range_resolution: f64,
+    /// Resolution in range of one look; see [`Self::range_resolution_at`].
+    pub range_resolution: RangeResolution,
     /// Resolution in azimuth \[m\], of one look.
     pub azimuth_resolution: f64,
     /// Windows in range and azimuth.
@@ -122,8 +131,8 @@ fn sentinel_1_iw() -> SensorMode {
         incidence: 38.7,
         incidence_range: [30.1, 46.0],
         spacing: 10.0,
-        // 14.1 MHz of slant range, Hamming 0.70.
-        range_resolution: ground_range(slant_resolution(14.1e6, Window::Hamming(0.70)), 38.7),
+        // 14.1 MHz and Hamming 0.70 in the first sub-swath; the bandwidths of the others leave 19.6 and 19.5 m.
+        range_resolution: RangeResolution::Ground(20.3),
         azimuth_resolution: 18.4,
         windows: [Window::Hamming(0.70), Window::Uniform],
         looks: (5, 0.25),
@@ -139,7 +148,7 @@ fn sentinel_1_ew() -> SensorMode {
         incidence: 33.0,
         incidence_range: [19.0, 47.0],
         spacing: 40.0,
-        range_resolution: 93.0,
+        range_resolution: RangeResolution::Ground(93.0),
         azimuth_resolution: 87.0,
         looks: (12, 0.25),
         noise_floor: CHOSEN_NOISE,
@@ -157,7 +166,7 @@ fn terrasar_x_sm() -> SensorMode {
         incidence: 32.0,
         incidence_range: [19.7, 45.5],
         spacing: 1.25,
-        range_resolution: 3.0,
+        range_resolution: slant(3.0, 32.0),
         azimuth_resolution: 3.3,
         windows: [Window::Hamming(0.6); 2],
         looks: (1, 0.0),
@@ -175,7 +184,7 @@ fn cosmo_skymed_hi() -> SensorMode {
         incidence: 35.0,
         incidence_range: [20.0, 59.0],
         spacing: 2.5,
-        range_resolution: 3.0,
+        range_resolution: slant(3.0, 35.0),
         azimuth_resolution: 3.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (1, 0.0),
@@ -193,7 +202,7 @@ fn iceye_strip() -> SensorMode {
         incidence: 22.0,
         incidence_range: [15.0, 30.0],
         spacing: 2.5,
-        range_resolution: 3.0,
+        range_resolution: slant(3.0, 22.0),
         azimuth_resolution: 3.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (1, 0.0),
@@ -211,7 +220,7 @@ fn alos_2(spacing: f64, resolution: [f64; 2], looks: u32, noise_floor: f64) -> S
         incidence: 35.0,
         incidence_range: [8.0, 70.0],
         spacing,
-        range_resolution: resolution[0],
+        range_resolution: slant(resolution[0], 35.0),
         azimuth_resolution: resolution[1],
         windows: [Window::Hamming(0.75); 2],
         looks: (looks, 0.0),
@@ -230,7 +239,7 @@ fn radarsat_2_s() -> SensorMode {
         incidence_range: [20.0, 52.0],
         spacing: 12.5,
         // The table's 26.8 to 17.3 m from the nearest to the farthest beam.
-        range_resolution: 21.0,
+        range_resolution: slant(21.0, 36.0),
         azimuth_resolution: 24.7,
         windows: [Window::Hamming(0.75); 2],
         looks: (4, 0.5),
@@ -248,7 +257,7 @@ fn novasar_1() -> SensorMode {
         incidence: 24.0,
         incidence_range: [16.0, 31.0],
         spacing: 3.0,
-        range_resolution: 6.0,
+        range_resolution: slant(6.0, 24.0),
         azimuth_resolution: 6.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (3, 0.0),
@@ -266,13 +275,18 @@ fn ers_2_pri() -> SensorMode {
         incidence: 23.0,
         incidence_range: [19.4, 26.6],
         spacing: 12.5,
-        range_resolution: 26.0,
+        range_resolution: slant(26.0, 23.0),
         azimuth_resolution: 22.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (3, 0.4),
         noise_floor: -24.0,
         pulse_rate: 1680.0,
     }
+}
+
+/// One slant resolution for the swath, given as that in ground range \[m\] at an incidence \[deg\].
+fn slant(ground: f64, incidence: f64) -> RangeResolution {
+    RangeResolution::Slant(ground * incidence.to_radians().sin())
 }
 
 impl SensorMode {
@@ -282,11 +296,13 @@ impl SensorMode {
         range_to_velocity(self.altitude, incidence.to_radians())
     }
 
-    /// Resolution in ground range \[m\] at an incidence \[deg\]: the slant resolution stays.
+    /// Resolution in ground range \[m\] at an incidence \[deg\].
     #[must_use]
     pub fn range_resolution_at(&self, incidence: f64) -> f64 {
-        let slant = self.range_resolution * self.incidence.to_radians().sin();
-        ground_range(slant, incidence)
+        match self.range_resolution {
+            RangeResolution::Slant(slant) => ground_range(slant, incidence),
+            RangeResolution::Ground(ground) => ground,
+        }
     }
 }
 
@@ -387,11 +403,20 @@ mod tests {
     /// The resolution of the annotated bandwidth in the nearest sub-swath is 20.3 m at 33°.
     #[test]
     fn ground_resolution_falls_with_incidence() {
+        let first = slant_resolution(14.1e6, Window::Hamming(0.70));
+        assert!((ground_range(first, 33.0) - 20.3).abs() < 0.06);
         let mode = Sensor::Sentinel1Iw.mode();
-        assert!((mode.range_resolution_at(33.0) - 20.3).abs() < 0.06);
-        assert!(mode.range_resolution_at(45.0) < mode.range_resolution_at(31.0));
-        let same = mode.range_resolution_at(mode.incidence);
-        assert!((same - mode.range_resolution).abs() < 1e-12);
+        assert!((mode.range_resolution_at(45.0) - 20.3).abs() < 1e-12);
+        // RADARSAT-2's table: 26.8 to 17.3 m from the nearest to the farthest standard beam, here within a third.
+        let mode = Sensor::Radarsat2S.mode();
+        for (incidence, expected) in [(20.0, 26.8), (49.0, 17.3)] {
+            let found = mode.range_resolution_at(incidence);
+            assert!(
+                (found / expected - 1.0).abs() < 0.34,
+                "{incidence}: {found}"
+            );
+        }
+        assert!((mode.range_resolution_at(36.0) - 21.0).abs() < 1e-12);
         // c/2B without a window, 0.886 of it.
         let slant = slant_resolution(100e6, Window::Uniform);
         assert!((slant - 0.885_892_9 * 1.498_962_29).abs() < 1e-6);

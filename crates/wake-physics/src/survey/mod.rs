@@ -44,8 +44,9 @@ pub(crate) struct Survey {
     pub(crate) resolution: AzimuthResolution,
     /// Root of the mean square of the damping of the turbulent wake over the image, 0 to 1.
     pub(crate) damping: f64,
-    /// Root of the mean square of what the current of the wake changes σ⁰ by, relative, over the image.
-    pub(crate) edge: f64,
+    /// Roots of mean squares over the image: what the current of the wake changes σ⁰ and its density in the image by,
+    /// relative, and its velocity along the line of sight [m/s].
+    pub(crate) edge: [f64; 2],
     /// Damping in slicks.
     pub(crate) slicks: f64,
     /// Root of the mean square of what gusts change σ⁰ by, relative.
@@ -232,7 +233,7 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
         None => Some("there is no ship"),
         Some(ship) if !ship.edge => Some("not asked for"),
         Some(_) if models.edge.is_none() => Some("the ship is at rest, or there is no wind"),
-        Some(_) if survey.edge == 0.0 => Some("it does not reach the image"),
+        Some(_) if survey.edge == [0.0; 2] => Some("it does not reach the image"),
         Some(_) => None,
     };
     let asked = |asked: bool| (!asked).then_some("not asked for");
@@ -335,11 +336,22 @@ fn damping(models: &Models) -> f64 {
     })
 }
 
-/// Root of the mean square of the relative change of σ⁰ by the current of the wake over the image.
-fn edge(models: &Models) -> f64 {
-    models.edge.map_or(0.0, |edge| {
-        let change = |place| edge.factor(edge.track.seen_from_ship(place)) - 1.0;
-        rms_over(&models.image, change)
+/// What the current of the wake changes over the image, see [`Survey::edge`].
+fn edge(models: &Models) -> [f64; 2] {
+    models.edge.map_or([0.0; 2], |edge| {
+        let [port_x, port_y] = edge.track.port().map(f64::abs);
+        let along_sight = port_x * models.incidence.sin();
+        // Velocity bunching gathers by R/V times the slope of the velocity along azimuth.
+        let gathered = models.range_to_velocity * along_sight * port_y;
+        let change = |place| {
+            let seen = edge.track.seen_from_ship(place);
+            (edge.factor(seen) - 1.0).abs() + gathered * edge.divergence(seen).abs()
+        };
+        let velocity = |place| along_sight * edge.velocity(edge.track.seen_from_ship(place));
+        [
+            rms_over(&models.image, change),
+            rms_over(&models.image, velocity),
+        ]
     })
 }
 

@@ -104,9 +104,20 @@ impl WakeEdge {
     /// Factor on σ⁰ at ξ forward of midship and η to port \[m\]; 1 ahead of the bow, beginning along the hull as the
     /// Kelvin wake does ([`fade`]).
     #[must_use]
-    pub fn factor(&self, [forward, port]: [f64; 2]) -> f64 {
+    pub fn factor(&self, seen: [f64; 2]) -> f64 {
+        let [forward, port] = seen;
         let divergence = self.current.divergence(self.astern(forward), port);
         edge_factor(divergence, self.response).powf(fade(forward, self.length))
+    }
+
+    /// Velocity to port there [m/s].
+    pub(crate) fn velocity(&self, [forward, port]: [f64; 2]) -> f64 {
+        self.current.velocity(self.astern(forward), port) * fade(forward, self.length)
+    }
+
+    /// Divergence of the current there [1/s].
+    pub(crate) fn divergence(&self, [forward, port]: [f64; 2]) -> f64 {
+        self.current.divergence(self.astern(forward), port) * fade(forward, self.length)
     }
 
     /// Distance astern of the stern \[m\].
@@ -129,8 +140,7 @@ impl WakeEdge {
                 continue;
             }
             self.change(field, raster, |value, seen| {
-                let velocity = self.current.velocity(self.astern(seen[0]), seen[1]);
-                *value += (port * velocity * fade(seen[0], self.length)) as f32;
+                *value += (port * self.velocity(seen)) as f32;
             });
         }
     }
