@@ -1,9 +1,8 @@
 //! Imaging satellites: what each sets of a radar, with where every number is from.
 
-use super::Polarization;
+use super::{Polarization, Sensor};
 use crate::constants::SPEED_OF_LIGHT;
 use crate::window::Window;
-use serde::{Deserialize, Serialize};
 
 /// Mean radius of the Earth \[m\] (IUGG, rounded).
 const EARTH_RADIUS: f64 = 6.371e6;
@@ -13,35 +12,6 @@ const EARTH_GRAVITY: f64 = 3.986_004e14;
 
 /// Noise-equivalent cross-section where nothing is published that was read \[dB\]: chosen.
 const CHOSEN_NOISE: f64 = -22.0;
-
-/// A satellite and one of its modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[expect(missing_docs, reason = "the names of the satellites and their modes")]
-pub enum Sensor {
-    #[serde(rename = "sentinel-1-iw")]
-    Sentinel1Iw,
-    #[serde(rename = "sentinel-1-ew")]
-    Sentinel1Ew,
-    #[serde(rename = "terrasar-x-sm")]
-    TerraSarXSm,
-    #[serde(rename = "cosmo-skymed-hi")]
-    CosmoSkyMedHi,
-    #[serde(rename = "iceye-strip")]
-    IceyeStrip,
-    #[serde(rename = "alos-2-sm3")]
-    Alos2Sm3,
-    #[serde(rename = "alos-2-sm6")]
-    Alos2Sm6,
-    #[serde(rename = "alos-2-sm10")]
-    Alos2Sm10,
-    #[serde(rename = "radarsat-2-s")]
-    Radarsat2S,
-    #[serde(rename = "novasar-1")]
-    NovaSar1,
-    #[serde(rename = "ers-2-pri")]
-    Ers2Pri,
-}
 
 /// Resolution in range \[m\], by what stays over the swath.
 #[derive(Debug, Clone, Copy, PartialEq)]

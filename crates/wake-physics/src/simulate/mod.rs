@@ -14,6 +14,7 @@ mod linear_sea;
 mod simulation;
 mod speckling;
 mod stages;
+mod surface_fields;
 
 pub use accuracy::{Accuracy, Reached};
 pub use clock::Seconds;
@@ -31,7 +32,8 @@ use crate::survey::Survey;
 use crate::workspace::Workspace;
 use clock::Clock;
 use speckling::{Exposure, Speckling};
-use stages::{Stages, Wanted};
+use stages::Stages;
+use surface_fields::Wanted;
 
 /// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
 ///

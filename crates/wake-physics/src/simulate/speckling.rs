@@ -3,26 +3,45 @@
 use crate::models::Models;
 use crate::raster::{Field, Raster};
 use crate::sar::ImpulseResponse;
+use crate::sar::geometry::ship_radial_velocity;
 use crate::sar::impulse::{Looks, PointTarget, Reflectivity};
+use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::speckle::speckle;
 use crate::scene::Scene;
+use crate::scene::sensor::ambiguity_distance;
 use num_complex::Complex32;
 
 /// What the radar looks at before its impulse response.
 #[derive(Debug, Clone)]
 pub(super) struct Exposure {
-    pub(super) response: ImpulseResponse,
+    response: ImpulseResponse,
     /// Places of the sources.
-    pub(super) sources: Raster,
+    sources: Raster,
     /// Their intensity, noise included.
     pub(super) intensity: Field,
     /// Ships and their ghosts.
-    pub(super) points: Vec<PointTarget>,
+    points: Vec<PointTarget>,
     /// Pixels of the image.
-    pub(super) image: Raster,
+    image: Raster,
 }
 
 impl Exposure {
+    /// The intensity of a scene, on the computed pixels, with its ship as points.
+    pub(super) fn of(
+        scene: &Scene,
+        models: &Models,
+        response: ImpulseResponse,
+        intensity: Field,
+    ) -> Self {
+        Self {
+            response,
+            sources: models.image,
+            intensity,
+            points: points(scene, models),
+            image: models.delivered,
+        }
+    }
+
     fn reflectivity(&self) -> Reflectivity<'_> {
         Reflectivity {
             raster: &self.sources,
@@ -35,6 +54,38 @@ impl Exposure {
     pub(super) fn mean(&self) -> Field {
         self.response.mean(&self.reflectivity(), &self.image)
     }
+}
+
+/// The ship as points with its ghosts, for an image with an impulse response.
+fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
+    let ship = scene.ship.as_ref().filter(|ship| ship.echo);
+    let (Some(ship), Some(wake)) = (ship, &models.wake) else {
+        return Vec::new();
+    };
+    let echo = ShipEcho {
+        position: wake.track.position,
+        heading: ship.heading,
+        length: ship.length,
+        beam: ship.beam,
+        radial_velocity: ship_radial_velocity(ship.speed, ship.heading, models.incidence),
+        roll_velocity: ship.roll,
+    };
+    let view = Viewing {
+        incidence: models.incidence,
+        range_to_velocity: models.range_to_velocity,
+    };
+    let mut points = echo.scatterers(&view, scene.seed);
+    let radar = &scene.radar;
+    if let (Some(level), Some(rate)) = (radar.ambiguity, radar.pulse_rate) {
+        let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
+        points.extend(ambiguities(&points, distance, 10f64.powf(0.1 * level)));
+    }
+    let [rows, columns] = [models.image.rows as f64, models.image.columns as f64];
+    points.retain(|point| {
+        let [column, row] = models.image.pixel(point.position[0], point.position[1]);
+        (0.0..rows).contains(&row) && (0.0..columns).contains(&column)
+    });
+    points
 }
 
 /// How the image gets its speckle.

@@ -5,6 +5,7 @@ use super::clock::{Clock, Seconds};
 use super::label::echo_displacement;
 use super::simulation::Method;
 use super::speckling::Exposure;
+use super::surface_fields::{SurfaceFields, Wanted, quantities};
 use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
 use crate::models::{Models, turbulent_wake};
@@ -13,27 +14,13 @@ use crate::plan::{Plan, SHARES};
 use crate::raster::{Field, Raster};
 use crate::sar::direct::DirectImage;
 use crate::sar::echo::ship_cross_section;
-use crate::sar::geometry::ship_radial_velocity;
-use crate::sar::impulse::PointTarget;
-use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::{Echo, Imaging, Sources};
 use crate::scattering::{BackscatterTable, FacetFields};
-use crate::scene::sensor::ambiguity_distance;
 use crate::scene::{Scene, Term};
 use crate::surface::Surface;
 use crate::waves::{Quantity, harmonic_fields};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
-
-/// The fields that are results.
-const OUTPUTS: [Quantity; 6] = [
-    Quantity::Elevation,
-    Quantity::SlopeX,
-    Quantity::SlopeY,
-    Quantity::VelocityX,
-    Quantity::VelocityY,
-    Quantity::VelocityZ,
-];
 
 /// A scene being drawn: what its stages have in common.
 pub(super) struct Stages<'a> {
@@ -46,80 +33,6 @@ pub(super) struct Stages<'a> {
     /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
     /// same bits with and without the second.
     quantities: [Vec<Quantity>; 2],
-}
-
-/// Which fields a caller asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wanted {
-    /// The image, and what it is made of.
-    Image,
-    /// All results.
-    Fields,
-}
-
-/// The linear fields to be computed: those that the image needs, and those that are wanted besides.
-fn quantities(plan: &Plan, wanted: Wanted) -> [Vec<Quantity>; 2] {
-    let mut image = vec![Quantity::SlopeX, Quantity::SlopeY];
-    if plan.uses(Term::Bunching) {
-        image.extend([Quantity::VelocityX, Quantity::VelocityZ]);
-    }
-    let single = [
-        (Term::RangeBunching, Quantity::Elevation),
-        (Term::Coherence, Quantity::RadialAcceleration),
-        (Term::Hydrodynamic, Quantity::Hydrodynamic),
-    ];
-    image.extend(
-        single
-            .iter()
-            .filter(|(term, _)| plan.uses(*term))
-            .map(|(_, q)| *q),
-    );
-    let mut rest = OUTPUTS.to_vec();
-    rest.retain(|quantity| !image.contains(quantity));
-    // Two fields share a transform: where one would stand alone, one more costs nothing.
-    if image.len() % 2 == 1 && !rest.is_empty() {
-        image.push(rest.remove(0));
-    }
-    if wanted == Wanted::Image {
-        rest.clear();
-    }
-    [image, rest]
-}
-
-/// Linear fields of the surface on the raster with its margin; those that nobody asks for have no pixel.
-#[derive(Debug, Default)]
-pub(super) struct SurfaceFields {
-    /// ζ \[m\].
-    pub(super) elevation: Field,
-    /// ∂ζ/∂x \[1\].
-    pub(super) slope_x: Field,
-    /// ∂ζ/∂y \[1\].
-    pub(super) slope_y: Field,
-    /// Of the water along x [m/s].
-    pub(super) velocity_x: Field,
-    /// Of the water along y [m/s].
-    pub(super) velocity_y: Field,
-    /// Of the water upward [m/s].
-    pub(super) velocity_z: Field,
-    /// Acceleration toward the radar [m/s²].
-    pub(super) radial_acceleration: Field,
-    /// Hydrodynamic modulation of the Bragg waves \[1\].
-    pub(super) modulation: Field,
-}
-
-impl SurfaceFields {
-    fn of(&mut self, quantity: Quantity) -> &mut Field {
-        match quantity {
-            Quantity::Elevation => &mut self.elevation,
-            Quantity::SlopeX => &mut self.slope_x,
-            Quantity::SlopeY => &mut self.slope_y,
-            Quantity::VelocityX => &mut self.velocity_x,
-            Quantity::VelocityY => &mut self.velocity_y,
-            Quantity::VelocityZ => &mut self.velocity_z,
-            Quantity::RadialAcceleration => &mut self.radial_acceleration,
-            Quantity::Hydrodynamic => &mut self.modulation,
-        }
-    }
 }
 
 /// What a scene looks like before speckle; all but the image on the raster with its margin.
@@ -210,20 +123,10 @@ impl<'a> Stages<'a> {
         seconds.backscatter = clock.lap();
         let radial_velocity = self.radial_velocity(workspace, &fields);
         let intensity = self.image(workspace, &sigma0, &radial_velocity, &fields);
-        let exposure = self.models.response.map(|response| Exposure {
-            response,
-            sources: self.models.image,
-            intensity: Field::default(),
-            points: self.points(),
-            image: self.models.delivered,
-        });
-        let (intensity, exposure) = match exposure {
+        let (intensity, exposure) = match self.models.response {
             None => (intensity, None),
-            Some(exposure) => {
-                let exposure = Exposure {
-                    intensity,
-                    ..exposure
-                };
+            Some(response) => {
+                let exposure = Exposure::of(self.scene, self.models, response, intensity);
                 (exposure.mean(), Some(exposure))
             }
         };
@@ -493,39 +396,6 @@ impl<'a> Stages<'a> {
             pixels.for_each(|value| *value += noise);
         }
         intensity
-    }
-
-    /// The ship as points with its ghosts, for an image with an impulse response.
-    fn points(&self) -> Vec<PointTarget> {
-        let (scene, models) = (self.scene, self.models);
-        let ship = scene.ship.as_ref().filter(|ship| ship.echo);
-        let (Some(ship), Some(wake)) = (ship, &models.wake) else {
-            return Vec::new();
-        };
-        let echo = ShipEcho {
-            position: wake.track.position,
-            heading: ship.heading,
-            length: ship.length,
-            beam: ship.beam,
-            radial_velocity: ship_radial_velocity(ship.speed, ship.heading, models.incidence),
-            roll_velocity: ship.roll,
-        };
-        let view = Viewing {
-            incidence: models.incidence,
-            range_to_velocity: models.range_to_velocity,
-        };
-        let mut points = echo.scatterers(&view, scene.seed);
-        let radar = &scene.radar;
-        if let (Some(level), Some(rate)) = (radar.ambiguity, radar.pulse_rate) {
-            let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
-            points.extend(ambiguities(&points, distance, 10f64.powf(0.1 * level)));
-        }
-        let [rows, columns] = [models.image.rows as f64, models.image.columns as f64];
-        points.retain(|point| {
-            let [column, row] = models.image.pixel(point.position[0], point.position[1]);
-            (0.0..rows).contains(&row) && (0.0..columns).contains(&column)
-        });
-        points
     }
 
     /// The ship's own echo, if it is asked for.

@@ -1,0 +1,90 @@
+//! The linear fields of the surface: which a scene needs, and their values.
+
+use crate::plan::Plan;
+use crate::raster::Field;
+use crate::scene::Term;
+use crate::waves::Quantity;
+
+/// The fields that are results.
+const OUTPUTS: [Quantity; 6] = [
+    Quantity::Elevation,
+    Quantity::SlopeX,
+    Quantity::SlopeY,
+    Quantity::VelocityX,
+    Quantity::VelocityY,
+    Quantity::VelocityZ,
+];
+
+/// Which fields a caller asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// The image, and what it is made of.
+    Image,
+    /// All results.
+    Fields,
+}
+
+/// The linear fields to be computed: those that the image needs, and those that are wanted besides.
+pub(super) fn quantities(plan: &Plan, wanted: Wanted) -> [Vec<Quantity>; 2] {
+    let mut image = vec![Quantity::SlopeX, Quantity::SlopeY];
+    if plan.uses(Term::Bunching) {
+        image.extend([Quantity::VelocityX, Quantity::VelocityZ]);
+    }
+    let single = [
+        (Term::RangeBunching, Quantity::Elevation),
+        (Term::Coherence, Quantity::RadialAcceleration),
+        (Term::Hydrodynamic, Quantity::Hydrodynamic),
+    ];
+    image.extend(
+        single
+            .iter()
+            .filter(|(term, _)| plan.uses(*term))
+            .map(|(_, q)| *q),
+    );
+    let mut rest = OUTPUTS.to_vec();
+    rest.retain(|quantity| !image.contains(quantity));
+    // Two fields share a transform: where one would stand alone, one more costs nothing.
+    if image.len() % 2 == 1 && !rest.is_empty() {
+        image.push(rest.remove(0));
+    }
+    if wanted == Wanted::Image {
+        rest.clear();
+    }
+    [image, rest]
+}
+
+/// Linear fields of the surface on the raster with its margin; those that nobody asks for have no pixel.
+#[derive(Debug, Default)]
+pub(super) struct SurfaceFields {
+    /// ζ \[m\].
+    pub(super) elevation: Field,
+    /// ∂ζ/∂x \[1\].
+    pub(super) slope_x: Field,
+    /// ∂ζ/∂y \[1\].
+    pub(super) slope_y: Field,
+    /// Of the water along x [m/s].
+    pub(super) velocity_x: Field,
+    /// Of the water along y [m/s].
+    pub(super) velocity_y: Field,
+    /// Of the water upward [m/s].
+    pub(super) velocity_z: Field,
+    /// Acceleration toward the radar [m/s²].
+    pub(super) radial_acceleration: Field,
+    /// Hydrodynamic modulation of the Bragg waves \[1\].
+    pub(super) modulation: Field,
+}
+
+impl SurfaceFields {
+    pub(super) fn of(&mut self, quantity: Quantity) -> &mut Field {
+        match quantity {
+            Quantity::Elevation => &mut self.elevation,
+            Quantity::SlopeX => &mut self.slope_x,
+            Quantity::SlopeY => &mut self.slope_y,
+            Quantity::VelocityX => &mut self.velocity_x,
+            Quantity::VelocityY => &mut self.velocity_y,
+            Quantity::VelocityZ => &mut self.velocity_z,
+            Quantity::RadialAcceleration => &mut self.radial_acceleration,
+            Quantity::Hydrodynamic => &mut self.modulation,
+        }
+    }
+}
