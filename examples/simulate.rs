@@ -17,6 +17,7 @@ mod exit;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use wake_physics::grey::GreyScale;
 use wake_physics::{Method, Plan, Scene, Simulation, output, simulate_with};
 
 /// Simulate the SAR image of a ship wake from the numbers of a scene.
@@ -35,6 +36,9 @@ struct Arguments {
     /// How fields are computed: the fast methods, or the slow oracles they are checked against
     #[arg(long, value_enum, default_value = "fast")]
     method: MethodName,
+    /// What the grey of the picture is linear in: decibels on one scale for all scenes, or amplitude as in quick-looks
+    #[arg(long, value_enum, default_value = "decibel")]
+    grey: GreyName,
     /// Folder of the results, made if absent
     #[arg(long, value_name = "DIR", default_value = "out/simulate")]
     out: PathBuf,
@@ -50,6 +54,12 @@ struct Arguments {
 enum MethodName {
     Fast,
     Direct,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum GreyName {
+    Decibel,
+    Amplitude,
 }
 
 fn main() -> ExitCode {
@@ -73,7 +83,11 @@ fn run(arguments: &Arguments) -> wake_physics::Result<()> {
         }
     };
     let simulation = simulate_with(&scene, method)?;
-    let report = simulation.write(&arguments.out)?;
+    let grey = match arguments.grey {
+        GreyName::Decibel => GreyScale::default(),
+        GreyName::Amplitude => simulation.quick_look(),
+    };
+    let report = simulation.write_in(&arguments.out, &grey)?;
     if let Some(folder) = &arguments.compare {
         let rows = compare::textures(&simulation.speckled, folder)?;
         output::write_json(&arguments.out.join("texture.json"), &rows)?;

@@ -117,9 +117,26 @@ impl Simulation {
     ///
     /// [`Error::File`](crate::Error::File) if the folder cannot be made or a file not be written.
     pub fn write(&self, folder: &Path) -> Result<Value> {
+        self.write_in(folder, &GreyScale::default())
+    }
+
+    /// The amplitude scale of a quick-look: fixed by the σ⁰ that the scene has on average, not by its pixels.
+    #[must_use]
+    pub fn quick_look(&self) -> GreyScale {
+        let noise = self.scene.radar.noise_floor;
+        let noise = noise.map_or(0.0, |db| 10f64.powf(0.1 * db));
+        // A sea that returns nothing is black on any scale.
+        GreyScale::amplitude_around((self.plan.mean_sigma0 + noise).max(1e-5))
+    }
+
+    /// [`Self::write`] with the picture in another grey.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::write`].
+    pub fn write_in(&self, folder: &Path, grey: &GreyScale) -> Result<Value> {
         output::make_folder(folder)?;
         let path = |name: &str| folder.join(name);
-        let grey = GreyScale::default();
         let level = |&power: &f32| grey.level(f64::from(power));
         let pixels: Vec<u8> = self.speckled.values.iter().map(level).collect();
         output::write_png(
