@@ -233,7 +233,7 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
         None => Some("there is no ship"),
         Some(ship) if !ship.edge => Some("not asked for"),
         Some(_) if models.edge.is_none() => Some("the ship is at rest, or there is no wind"),
-        Some(_) if survey.edge == [0.0; 2] => Some("it does not reach the image"),
+        Some(_) if survey.edge.iter().all(|v| *v == 0.0) => Some("it does not reach the image"),
         Some(_) => None,
     };
     let asked = |asked: bool| (!asked).then_some("not asked for");
