@@ -57,15 +57,15 @@ impl Default for GreyScale {
 }
 
 impl GreyScale {
-    /// Grey in amplitude for a sea of a mean σ⁰: −60 dB is black and the mean lies at a quarter of the range, so that the
-    /// speckle of one look is not cut (chosen).
+    /// Grey in amplitude for a sea of a mean σ⁰: −60 dB is black and the mean lies at four tenths of the range, where one
+    /// pixel in two hundred of one look is cut (chosen).
     ///
     /// - `mean_sigma0` \[1\], above 0; one value for all images that are compared
     #[must_use]
     pub fn amplitude_around(mean_sigma0: f64) -> Self {
         Self {
             darkest_db: -60.0,
-            brightest_db: 10.0 * mean_sigma0.log10() + 12.0,
+            brightest_db: 10.0 * mean_sigma0.log10() + 8.0,
             mapping: Mapping::Amplitude,
         }
     }
@@ -152,15 +152,15 @@ mod tests {
     #[test]
     fn amplitude_is_linear_and_has_its_inverse() {
         let scale = GreyScale::amplitude_around(0.01);
-        // −60 dB is amplitude 0.001, −8 dB is 0.398107: amplitude 0.1 lies a quarter up.
-        assert!((scale.grey(0.01) - 0.099 / 0.397_107).abs() < 1e-6);
-        // Three equal steps of amplitude are three equal steps of grey.
+        // −60 dB is amplitude 0.001, −12 dB is 0.251189: amplitude 0.1 lies four tenths up.
+        assert!((scale.grey(0.01) - 0.099 / 0.250_189).abs() < 1e-6);
+        // Equal steps of amplitude are equal steps of grey.
         let grey = |amplitude: f64| scale.grey(amplitude * amplitude);
-        assert!((grey(0.2) - grey(0.1) - (grey(0.3) - grey(0.2))).abs() < 1e-12);
+        assert!((grey(0.16) - grey(0.1) - (grey(0.22) - grey(0.16))).abs() < 1e-12);
         for level in 0..=255 {
             assert_eq!(scale.level(scale.sigma0_of_level(level)), level);
         }
-        for sigma0 in [1.1e-6, 1e-4, 0.02, 0.15] {
+        for sigma0 in [1.1e-6, 1e-4, 0.02, 0.06] {
             assert!((scale.sigma0(scale.grey(sigma0)) / sigma0 - 1.0).abs() < 1e-10);
         }
         let text = serde_json::to_string(&scale).unwrap();

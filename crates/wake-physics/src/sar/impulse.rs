@@ -104,11 +104,13 @@ impl ImpulseResponse {
         [self.azimuth, self.range].map(|axis| (GUARD * axis.resolution / spacing).ceil() as usize)
     }
 
-    /// Largest spacing of the sources \[m\], ρ/3.5 (chosen): they carry twice the bandwidth, and brightness that comes
-    /// of waves shorter than the response is still the same on finer ones.
+    /// Largest spacing of the sources \[m\]: ρ/3.5 of the coarser axis (chosen), so that brightness that comes of waves
+    /// shorter than the response is the same on finer ones, and 1/(2B) of each, so that the intensity is carried.
     #[must_use]
     pub fn largest_spacing(&self) -> f64 {
-        self.range.resolution.min(self.azimuth.resolution) / 3.5
+        let carried = [self.range, self.azimuth].map(|axis| 0.5 / axis.bandwidth());
+        let coarser = self.range.resolution.max(self.azimuth.resolution);
+        (coarser / 3.5).min(carried[0]).min(carried[1])
     }
 
     /// Pixels of the sources for an image: a whole number of them a pixel, fine enough, with the guard around.

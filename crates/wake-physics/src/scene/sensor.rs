@@ -208,8 +208,8 @@ fn radarsat_2_s() -> SensorMode {
         incidence: 36.0,
         incidence_range: [20.0, 52.0],
         spacing: 12.5,
-        // The table's 26.8 to 17.3 m from the nearest to the farthest beam.
-        range_resolution: slant(21.0, 36.0),
+        // Within the table's 26.8 to 17.3 m from the nearest to the farthest beam: beams have bandwidths of their own.
+        range_resolution: RangeResolution::Ground(21.0),
         azimuth_resolution: 24.7,
         windows: [Window::Hamming(0.75); 2],
         looks: (4, 0.5),
@@ -377,16 +377,10 @@ mod tests {
         assert!((ground_range(first, 33.0) - 20.3).abs() < 0.06);
         let mode = Sensor::Sentinel1Iw.mode();
         assert!((mode.range_resolution_at(45.0) - 20.3).abs() < 1e-12);
-        // RADARSAT-2's table: 26.8 to 17.3 m from the nearest to the farthest standard beam, here within a third.
-        let mode = Sensor::Radarsat2S.mode();
-        for (incidence, expected) in [(20.0, 26.8), (49.0, 17.3)] {
-            let found = mode.range_resolution_at(incidence);
-            assert!(
-                (found / expected - 1.0).abs() < 0.34,
-                "{incidence}: {found}"
-            );
-        }
-        assert!((mode.range_resolution_at(36.0) - 21.0).abs() < 1e-12);
+        // One slant resolution: 3 m at 32° is 4.71 m at 19.7°.
+        let mode = Sensor::TerraSarXSm.mode();
+        assert!((mode.range_resolution_at(32.0) - 3.0).abs() < 1e-12);
+        assert!((mode.range_resolution_at(19.7) - 4.716).abs() < 1e-3);
         // c/2B without a window, 0.886 of it.
         let slant = slant_resolution(100e6, Window::Uniform);
         assert!((slant - 0.885_892_9 * 1.498_962_29).abs() < 1e-6);
