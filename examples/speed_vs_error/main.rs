@@ -5,10 +5,13 @@
 //! cargo run --release --example speed_vs_error -- --part model
 //! ```
 //!
-//! Writes `report.json`, `table.md`, `frontier.svg` and `model.svg` (log-log). The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the
-//! default scene, the paper's own method and scale; the oracle of both is the harmonic sum, the strong baseline the
-//! same sum as a matrix product. Above 256 × 256 the oracles run on 4,096 random pixels and their times are scaled up. The
-//! second part is the model, where it is built in: steps, batch size and weights against many steps from the same noise.
+//! Writes `report.json`, `table.md`, `frontier.svg` and `model.svg` (log-log).
+//!
+//! The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the default scene, the paper's own method
+//! and scale; the oracle of both is the harmonic sum, the strong baseline the same sum as a matrix product. Where an
+//! oracle is too slow for all pixels it runs on random ones of the same size, as many as the table says, and its time is
+//! scaled up; that of the whole scene stage by stage. The second part is the model, where it is built in: steps, batch
+//! size and weights against many steps from the same noise.
 
 #[path = "../common/exit.rs"]
 mod exit;
@@ -137,27 +140,46 @@ fn simulator(largest: usize) -> wake_physics::Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The rows as a table in Markdown.
+/// The rows as a table in Markdown, under the instruction set that they were measured with.
 fn table(rows: &[Row]) -> String {
-    let mut text = "| stage | size | tolerance | fast ms | oracle s | product ms | ratio | max error | rms error |\n\
-                    | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
-        .to_owned();
+    let threads = rayon::current_num_threads();
+    let mut text = format!(
+        "{} threads, {}.\n\n\
+         | stage | size | tolerance | fast ms | oracle s | product ms | ratio | pixels | max error | rms error |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        threads,
+        row::instruction_set()
+    );
     for r in rows {
         let product = r
             .matrix_product_seconds
-            .map_or(String::new(), |s| format!("{:.0}", 1e3 * s));
+            .map_or(String::new(), |s| figures(1e3 * s));
         text += &format!(
-            "| {} | {} | {:.0e} | {:.2} | {:.3}{} | {product} | {:.0} | {:.1e} | {:.1e} |\n",
+            "| {} | {} | {:.0e} | {} | {}{} | {product} | {} | {} | {:.1e} | {:.1e} |\n",
             r.stage,
             r.size,
             r.tolerance.unwrap_or_default(),
-            1e3 * r.fast_seconds,
-            r.oracle_seconds,
-            if r.extrapolated { "*" } else { "" },
-            r.ratio,
+            figures(1e3 * r.fast_seconds),
+            figures(r.oracle_seconds),
+            if r.extrapolated() { "*" } else { "" },
+            figures(r.ratio),
+            r.pixels,
             r.max_error,
             r.rms_error
         );
     }
-    text + "\n\\* run on 4,096 random pixels, time scaled up.\n"
+    text + "\n\\* extrapolated: the oracle ran at that many random pixels of this size, where the errors are measured.\n"
+}
+
+/// A number in at most three figures, so that none seems surer than it is.
+fn figures(value: f64) -> String {
+    let decimals = match value {
+        _ if value >= 1e3 => return format!("{value:.2e}"),
+        _ if value >= 100.0 => 0,
+        _ if value >= 10.0 => 1,
+        _ if value >= 1.0 => 2,
+        _ if value >= 0.1 => 3,
+        _ => return format!("{value:.1e}"),
+    };
+    format!("{value:.decimals$}")
 }

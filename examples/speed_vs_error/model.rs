@@ -138,7 +138,7 @@ impl Reference {
                 tolerance: None,
                 fast_seconds: seconds,
                 oracle_seconds: self.seconds,
-                extrapolated: false,
+                pixels: self.images[0].values.len(),
                 matrix_product_seconds: None,
                 ratio: self.seconds / seconds,
                 max_error: errors.max,

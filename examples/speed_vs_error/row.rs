@@ -16,8 +16,8 @@ pub(crate) struct Row {
     pub(crate) fast_seconds: f64,
     /// Seconds of the oracle.
     pub(crate) oracle_seconds: f64,
-    /// Whether the oracle ran on some pixels only and its time was scaled up.
-    pub(crate) extrapolated: bool,
+    /// Pixels at which the oracle ran and errors are measured; where they are not all, its time was scaled up.
+    pub(crate) pixels: usize,
     /// Seconds of the same sum as a matrix product, where there is one; scaled up from some rows above 256².
     pub(crate) matrix_product_seconds: Option<f64>,
     /// Oracle over fast seconds.
@@ -26,6 +26,27 @@ pub(crate) struct Row {
     pub(crate) max_error: f64,
     /// Root mean square error, likewise.
     pub(crate) rms_error: f64,
+}
+
+impl Row {
+    /// Whether the oracle ran on some pixels only.
+    pub(crate) fn extrapolated(&self) -> bool {
+        self.pixels < self.size * self.size
+    }
+}
+
+/// The widest vector instructions of this machine, of those that fast methods use.
+pub(crate) fn instruction_set() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") {
+            return "AVX-512";
+        }
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            return "AVX2";
+        }
+    }
+    std::env::consts::ARCH
 }
 
 /// Median seconds of `runs` calls after one that is not counted, and the last result.

@@ -16,7 +16,7 @@ use wake_physics::surface::Surface;
 use wake_physics::waves::{PlaneWaves, Quantity, Transfer, harmonic_sum, matrix_product};
 use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
 use wake_physics::{
-    Field, Method, Raster, Scene, Simulation, Track, nufft, permittivity, simulate, simulate_with,
+    DirectPixels, Field, Raster, Scene, Track, direct_intensity, nufft, permittivity, simulate,
 };
 
 /// Stages in the order of the data flow.
@@ -134,7 +134,7 @@ fn sum(
             raster,
             tolerance,
             fast_seconds,
-            (oracle * scale, scale > 1.0),
+            (oracle * scale, pixels.len()),
             errors,
         )
     }
@@ -156,14 +156,14 @@ fn pixels(raster: &Raster) -> (Vec<[usize; 2]>, f64) {
         let all = (0..raster.len()).map(|n| [n / raster.columns, n % raster.columns]);
         return (all.collect(), 1.0);
     }
-    (sample(raster), raster.len() as f64 / SAMPLE as f64)
+    (sample(raster, SAMPLE), raster.len() as f64 / SAMPLE as f64)
 }
 
 /// Random pixels of a raster.
-fn sample(raster: &Raster) -> Vec<[usize; 2]> {
+fn sample(raster: &Raster, count: usize) -> Vec<[usize; 2]> {
     let mut random = StdRng::seed_from_u64(1);
     let mut one = || [raster.rows, raster.columns].map(|n| random.random_range(0..n));
-    (0..SAMPLE).map(|_| one()).collect()
+    (0..count).map(|_| one()).collect()
 }
 
 /// Surface and wake together: slopes, and what the imaging needs.
@@ -220,7 +220,7 @@ fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
         table.sigma0_field(&facets)
     });
     // Quadrature takes a millisecond a pixel: a sample on every raster, and the same for every tolerance.
-    let pixels = sample(raster);
+    let pixels = sample(raster, SAMPLE);
     let scale = raster.len() as f64 / pixels.len() as f64;
     let oracle = memo.at_size(raster.rows, || {
         let (seconds, exact) = seconds(|| model.sigma0_pixels(&facets, &pixels));
@@ -233,7 +233,7 @@ fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
         raster,
         tolerance,
         fast_seconds,
-        (oracle.0 * scale, true),
+        (oracle.0 * scale, pixels.len()),
         errors,
     )
 }
@@ -286,54 +286,45 @@ fn bunching(raster: &Raster, tolerance: f64) -> Row {
         raster,
         tolerance,
         fast_seconds,
-        (oracle * scale, scale > 1.0),
+        (oracle * scale, pixels.len()),
         errors,
     )
 }
 
-/// The whole simulation: seconds of the fast methods at the size; the error on a small grid, against the oracles of
-/// all stages at the strictest tolerance, whose seconds are scaled by waves and pixels.
+/// The whole simulation against the oracles of all stages at random pixels of the same image, with all terms and at the
+/// strictest tolerance. Sums of waves and σ⁰ are scaled from the source pixels that reach them to all source pixels,
+/// imaging from the pixels to all pixels.
 fn scene(size: usize, tolerance: f64, memo: &mut Memo) -> wake_physics::Result<Row> {
-    let mut big = Scene::default();
-    (big.grid.rows, big.grid.columns) = (size, size);
-    big.model.tolerance = tolerance;
-    big.validate()?;
-    let (fast_seconds, image) = median_seconds(RUNS, || simulate(&big));
-    let computed = image?.plan.sizes;
-    let direct = match &memo.scene {
-        Some(direct) => direct,
-        None => memo
-            .scene
-            .insert(simulate_with(&small(STRICTEST), Method::Direct)?),
-    };
-    let fast = simulate(&small(tolerance))?;
-    let (max, rms) = fast.intensity.difference(&direct.intensity);
-    let mean = direct.intensity.mean();
-    let oracle = direct.seconds.total * work(&computed) / work(&direct.plan.sizes);
-    let errors = Errors {
-        max: max / mean,
-        rms: rms / mean,
-    };
-    let raster = Raster::image(size, size, 2.5);
+    let mut scene = Scene::default();
+    (scene.grid.rows, scene.grid.columns) = (size, size);
+    scene.model.tolerance = tolerance;
+    let (fast_seconds, fast) = median_seconds(RUNS, || simulate(&scene));
+    let fast = fast?;
+    scene.model.tolerance = STRICTEST;
+    let raster = fast.raster;
+    let pixels = sample(&raster, scene_pixels(size));
+    let direct = memo.scene_at(size, || direct_intensity(&scene, &pixels))?;
+
+    let values = pixels.iter().map(|&[i, j]| fast.intensity.at(i, j).into());
+    let errors = Errors::of(values, &direct.intensity, fast.intensity.mean());
+    let [rows, columns] = fast.plan.sizes.computed;
+    let per_source = direct.seconds.sea + direct.seconds.kelvin + direct.seconds.backscatter;
+    let oracle = per_source * (rows * columns) as f64 / direct.sources as f64
+        + direct.seconds.imaging * raster.len() as f64 / pixels.len() as f64;
+    let oracle = (oracle, pixels.len());
     Ok(row(
         "scene",
         &raster,
         tolerance,
         fast_seconds,
-        (oracle, true),
+        oracle,
         errors,
     ))
 }
 
-/// A scene that the oracles can do: a few pixels in the wake, 180 m astern.
-fn small(tolerance: f64) -> Scene {
-    let mut scene = Scene::default();
-    (scene.grid.rows, scene.grid.columns) = (SMALL, SMALL);
-    scene.model.tolerance = tolerance;
-    if let Some(ship) = &mut scene.ship {
-        ship.position = [200.0, 200.0];
-    }
-    scene
+/// Pixels of the oracle of the scene: fewer of a large image, whose sea has more waves.
+fn scene_pixels(size: usize) -> usize {
+    ((1 << 24) / (size * size).max(1 << 18)).max(8)
 }
 
 /// What several rows share, because it is slow.
@@ -341,8 +332,8 @@ fn small(tolerance: f64) -> Scene {
 pub(crate) struct Memo {
     /// Seconds and exact σ⁰ of the sample, by size.
     backscatter: Vec<(usize, (f64, Vec<f64>))>,
-    /// The small scene by the oracles.
-    scene: Option<Simulation>,
+    /// Pixels of the scene by the oracles, by size.
+    scene: Vec<(usize, DirectPixels)>,
 }
 
 impl Memo {
@@ -358,18 +349,25 @@ impl Memo {
         });
         &self.backscatter[index].1
     }
+
+    fn scene_at(
+        &mut self,
+        size: usize,
+        compute: impl FnOnce() -> wake_physics::Result<DirectPixels>,
+    ) -> wake_physics::Result<&DirectPixels> {
+        let known = self.scene.iter().position(|(s, _)| *s == size);
+        let index = match known {
+            Some(index) => index,
+            None => {
+                self.scene.push((size, compute()?));
+                self.scene.len() - 1
+            }
+        };
+        Ok(&self.scene[index].1)
+    }
 }
 
-/// Direct cost grows with waves × pixels.
-fn work(sizes: &wake_physics::Sizes) -> f64 {
-    let pixels = (sizes.computed[0] * sizes.computed[1]) as f64;
-    let waves = 0.78 * (sizes.sea_lattice[0] * sizes.sea_lattice[1]) as f64;
-    pixels * (waves + (sizes.wake_nodes[0] + sizes.wake_nodes[1]) as f64)
-}
-
-/// Pixels along a side of the scene that is also simulated directly.
-const SMALL: usize = 10;
-/// Tolerance of the direct simulation: its nodes of the wake stand for all others.
+/// Tolerance of the direct simulation: its nodes of the wake stand for all others, and it leaves out no term.
 const STRICTEST: f64 = 1e-6;
 
 fn row(
@@ -377,7 +375,7 @@ fn row(
     raster: &Raster,
     tolerance: f64,
     fast_seconds: f64,
-    (oracle_seconds, extrapolated): (f64, bool),
+    (oracle_seconds, pixels): (f64, usize),
     errors: Errors,
 ) -> Row {
     Row {
@@ -386,7 +384,7 @@ fn row(
         tolerance: Some(tolerance),
         fast_seconds,
         oracle_seconds,
-        extrapolated,
+        pixels,
         matrix_product_seconds: None,
         ratio: oracle_seconds / fast_seconds,
         max_error: errors.max,

@@ -14,11 +14,24 @@
 //! # Ok::<(), wake_physics::Error>(())
 //! ```
 //!
-//! Data flows one way, and the modules below are listed in that order:
+//! Every wave is a plane wave of linear theory: a random sea drawn from a wind spectrum, and the free waves of a thin
+//! ship. Facets of the surface scatter by Bragg, two-scale and specular theory; the radar displaces and smears what moves.
+//! Many scenes are drawn by a [`Simulator`]; [`measure`] reads an image back. Data flows one way:
 //!
 //! ```text
 //! Scene ─► sea surface + Kelvin wake (+ turbulent wake) ─► slopes, velocities ─► σ⁰ ─► SAR image ─► labels
 //! ```
+//!
+//! # Modules, in the order of the data flow
+//!
+//! | of | modules |
+//! | --- | --- |
+//! | all | [`constants`], [`output`], [`dispersion`] |
+//! | what is asked | [`scene`] |
+//! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`surface`] |
+//! | the ship | [`hull`], [`nufft`], [`kelvin`], [`turbulent`] |
+//! | the radar | [`permittivity`], [`scattering`], [`sar`] |
+//! | the image | [`labels`], [`grey`], [`measure`] |
 //!
 //! # Axes and units
 //!
@@ -28,9 +41,9 @@
 //!
 //! # Speed and error
 //!
-//! Every fast method has a slow oracle in this crate ([`Method::Direct`]). [`scene::Model::tolerance`] bounds, for every
-//! field, the largest difference to it relative to the field's root mean square, and for the image before speckle the
-//! root mean square of the difference relative to the mean.
+//! Every fast method has a slow oracle in this crate ([`Method::Direct`], at some pixels [`direct_intensity`]).
+//! [`scene::Model::tolerance`] bounds, for every field, the largest difference to it relative to the field's root mean
+//! square, and for the image before speckle the root mean square of the difference relative to the mean.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 // In the order of the data flow; docs/architecture.md is the same list.
@@ -77,7 +90,7 @@ pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
 pub use simulate::{
-    Accuracy, LinearSea, Method, Reached, SarImage, Seconds, Simulation, Simulator,
-    expected_intensity, labels_of, simulate, simulate_with,
+    Accuracy, DirectPixels, LinearSea, Method, Reached, SarImage, Seconds, Simulation, Simulator,
+    direct_intensity, expected_intensity, labels_of, simulate, simulate_with,
 };
 pub use track::Track;

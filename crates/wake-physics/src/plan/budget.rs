@@ -3,9 +3,9 @@
 /// Shares of the tolerance \[1\].
 ///
 /// The sources know nothing of each other and their errors rarely have one sign at one pixel; even where they have, the
-/// shares together make up the tolerance. What a halved share costs (default scene, 512 × 512) decided the split: most
-/// for the terms left out, which save whole stages, and for the table, whose nodes grow with error^(−1/4) along each
-/// axis; little for nodes, sums and kernels, whose cost grows with the logarithm.
+/// shares together make up the tolerance. The split follows how cost grows, and was not tuned by measurement: most goes to
+/// the terms left out, which save whole stages, and to the table, whose nodes grow with error^(−1/4) along each axis;
+/// little to nodes, sums and kernels, whose cost grows with the logarithm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Budget {
     /// Terms left out, by estimate.

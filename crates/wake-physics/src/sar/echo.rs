@@ -23,7 +23,7 @@ use std::f64::consts::PI;
 ///
 /// Skolnik, *Introduction to Radar Systems* (1980), Section 2.8.
 #[must_use]
-pub fn ship_cross_section(frequency: f64, displacement: f64) -> f64 {
+pub(crate) fn ship_cross_section(frequency: f64, displacement: f64) -> f64 {
     52.0 * (frequency / 1e6).sqrt() * (displacement / 1e6).powf(1.5)
 }
 

@@ -7,10 +7,10 @@
 //! The radar looks toward +x (ground range) and flies toward +y (azimuth, row 0 at the largest y).
 //! Intensity has the unit of σ⁰: every source pixel gives all its power, somewhere.
 
-pub mod bunching;
+pub(crate) mod bunching;
 pub mod coherence;
 pub mod direct;
-pub mod echo;
+pub(crate) mod echo;
 pub mod geometry;
 pub mod impulse;
 pub mod scatterers;

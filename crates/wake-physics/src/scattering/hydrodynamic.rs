@@ -7,7 +7,7 @@
 use crate::dispersion::angular_frequency;
 
 /// Slowest and fastest relaxation admitted [1/s], the range of a scene's `radar.relaxation_rate`.
-pub const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
+pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 
 /// Rate at which the Bragg waves return to equilibrium with the wind, taken as their rate of growth.
 ///
@@ -27,7 +27,7 @@ pub const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 ///
 /// Plant (1982), J. Geophys. Res. 87(C3), 1961, Eq. 3.
 #[must_use]
-pub fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
+pub(crate) fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
     let omega = angular_frequency(bragg_wavenumber, f64::INFINITY);
     let speed = omega / bragg_wavenumber;
     let growth = 0.04 * (friction_velocity / speed).powi(2) * omega;
@@ -39,7 +39,7 @@ pub fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
 /// The theory is linear in m, so 1 + m may fall below 0 where the current changes fast. There are no fewer
 /// short waves than none: the factor is 0 then.
 #[must_use]
-pub fn bragg_factor(modulation: f32) -> f32 {
+pub(crate) fn bragg_factor(modulation: f32) -> f32 {
     (1.0 + modulation).max(0.0)
 }
 

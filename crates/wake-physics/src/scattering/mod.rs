@@ -11,9 +11,9 @@
 //! Linear units, per unit area of the horizontal plane. The radar looks toward +x, so a slope ∂ζ/∂x > 0, which
 //! rises away from the radar, faces it and is bright.
 
-pub mod bragg;
+pub(crate) mod bragg;
 pub mod breaking;
-pub mod hydrodynamic;
+pub(crate) mod hydrodynamic;
 mod slope_lattice;
 mod slopes;
 mod specular;

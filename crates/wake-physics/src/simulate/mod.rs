@@ -9,6 +9,7 @@
 
 mod accuracy;
 mod clock;
+mod direct;
 mod label;
 mod linear_sea;
 mod simulation;
@@ -18,6 +19,7 @@ mod surface_fields;
 
 pub use accuracy::{Accuracy, Reached};
 pub use clock::Seconds;
+pub use direct::{DirectPixels, direct_intensity};
 pub use label::labels_of;
 pub use linear_sea::LinearSea;
 pub use simulation::{Method, SarImage, Simulation};

@@ -15,7 +15,7 @@ use crate::raster::{Field, Raster};
 use crate::sar::direct::DirectImage;
 use crate::sar::echo::ship_cross_section;
 use crate::sar::{Echo, Imaging, Sources};
-use crate::scattering::{BackscatterTable, FacetFields};
+use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
 use crate::scene::{Scene, Term};
 use crate::surface::Surface;
 use crate::waves::{Quantity, harmonic_fields};
@@ -24,15 +24,15 @@ use rayon::prelude::*;
 
 /// A scene being drawn: what its stages have in common.
 pub(super) struct Stages<'a> {
-    scene: &'a Scene,
-    models: &'a Models,
-    plan: &'a Plan,
+    pub(super) scene: &'a Scene,
+    pub(super) models: &'a Models,
+    pub(super) plan: &'a Plan,
     method: Method,
     /// The image and its margin.
-    raster: Raster,
+    pub(super) raster: Raster,
     /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
     /// same bits with and without the second.
-    quantities: [Vec<Quantity>; 2],
+    pub(super) quantities: [Vec<Quantity>; 2],
 }
 
 /// What a scene looks like before speckle; all but the image on the raster with its margin.
@@ -101,24 +101,12 @@ impl<'a> Stages<'a> {
         seconds.sea = clock.lap();
         accuracy.wake = self.add_wake(workspace, &mut fields);
         seconds.kelvin = clock.lap();
-        let edge = self.models.edge.filter(|_| self.plan.uses(Term::Edge));
-        if let Some(edge) = edge {
-            let SurfaceFields {
-                velocity_x,
-                velocity_y,
-                ..
-            } = &mut fields;
-            edge.add_velocity([velocity_x, velocity_y], &self.raster);
-        }
+        self.add_edge(&mut fields);
         let damping = self.damping(workspace);
         seconds.turbulent = clock.lap();
         let damping_field = damping.as_ref();
         let mut sigma0 = self.sigma0(workspace, last_table, &fields, damping_field, &mut accuracy);
-        self.add_breaking(&mut sigma0, damping_field);
-        if let Some(edge) = edge {
-            edge.modulate(&mut sigma0, &self.raster);
-        }
-        self.add_gusts(&mut sigma0);
+        self.modulate(&mut sigma0, damping_field);
         damping.into_iter().for_each(|field| workspace.give(field));
         seconds.backscatter = clock.lap();
         let radial_velocity = self.radial_velocity(workspace, &fields);
@@ -146,7 +134,7 @@ impl<'a> Stages<'a> {
         (SHARES.fields * self.scene.model.tolerance).max(1e-6)
     }
 
-    fn sea(&self, workspace: &mut Workspace) -> SurfaceFields {
+    pub(super) fn sea(&self, workspace: &mut Workspace) -> SurfaceFields {
         let mut fields = SurfaceFields::default();
         if !self.plan.uses(Term::Sea) {
             for &quantity in self.quantities.iter().flatten() {
@@ -186,7 +174,7 @@ impl<'a> Stages<'a> {
     }
 
     /// Adds the swell.
-    fn add_swell(&self, workspace: &mut Workspace, fields: &mut SurfaceFields) {
+    pub(super) fn add_swell(&self, workspace: &mut Workspace, fields: &mut SurfaceFields) {
         let swell = self.models.swell.filter(|_| self.plan.uses(Term::Swell));
         let Some(swell) = swell else { return };
         let (seed, transfer) = (
@@ -217,7 +205,11 @@ impl<'a> Stages<'a> {
     }
 
     /// Adds the Kelvin wake, faded over the hull.
-    fn add_wake(&self, workspace: &mut Workspace, fields: &mut SurfaceFields) -> Option<Reached> {
+    pub(super) fn add_wake(
+        &self,
+        workspace: &mut Workspace,
+        fields: &mut SurfaceFields,
+    ) -> Option<Reached> {
         let wake = self.models.wake.as_ref();
         let wake = wake.filter(|_| self.plan.uses(Term::Kelvin))?;
         let waves = wake.waves(&self.plan.wake);
@@ -251,7 +243,7 @@ impl<'a> Stages<'a> {
     }
 
     /// What the turbulent wake and slicks leave of the short waves.
-    fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
+    pub(super) fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
         let uses = |term| self.plan.uses(term);
         let wake = self.models.wake.as_ref().filter(|_| uses(Term::Turbulent));
         let slicks = self.models.slicks.filter(|_| uses(Term::Slicks));
@@ -271,6 +263,27 @@ impl<'a> Stages<'a> {
                 .for_each(|(left, slick)| *left *= slick);
         }
         Some(field)
+    }
+
+    /// Adds the current at the turbulent wake's edges.
+    pub(super) fn add_edge(&self, fields: &mut SurfaceFields) {
+        if let Some(edge) = self.models.edge.filter(|_| self.plan.uses(Term::Edge)) {
+            let SurfaceFields {
+                velocity_x,
+                velocity_y,
+                ..
+            } = fields;
+            edge.add_velocity([velocity_x, velocity_y], &self.raster);
+        }
+    }
+
+    /// What breaking waves, the wake's edges and gusts do to σ⁰.
+    pub(super) fn modulate(&self, sigma0: &mut Field, damping: Option<&Field>) {
+        self.add_breaking(sigma0, damping);
+        if let Some(edge) = self.models.edge.filter(|_| self.plan.uses(Term::Edge)) {
+            edge.modulate(sigma0, &self.raster);
+        }
+        self.add_gusts(sigma0);
     }
 
     /// Adds the return of breaking waves, damped like the short ones.
@@ -296,14 +309,12 @@ impl<'a> Stages<'a> {
         }
     }
 
-    fn sigma0(
+    /// σ⁰ as a function of the slope, and the facets it is taken at.
+    pub(super) fn facets<'f>(
         &self,
-        workspace: &mut Workspace,
-        last_table: &mut Option<BackscatterTable>,
-        fields: &SurfaceFields,
-        damping: Option<&Field>,
-        accuracy: &mut Accuracy,
-    ) -> Field {
+        fields: &'f SurfaceFields,
+        damping: Option<&'f Field>,
+    ) -> (Backscatter, FacetFields<'f>) {
         let uses = |term| self.plan.uses(term);
         let backscatter = self
             .models
@@ -314,6 +325,18 @@ impl<'a> Stages<'a> {
             modulation: uses(Term::Hydrodynamic).then_some(&fields.modulation),
             damping,
         };
+        (backscatter, facets)
+    }
+
+    fn sigma0(
+        &self,
+        workspace: &mut Workspace,
+        last_table: &mut Option<BackscatterTable>,
+        fields: &SurfaceFields,
+        damping: Option<&Field>,
+        accuracy: &mut Accuracy,
+    ) -> Field {
+        let (backscatter, facets) = self.facets(fields, damping);
         if self.method == Method::Direct {
             return backscatter.sigma0_field(&facets);
         }
@@ -337,7 +360,11 @@ impl<'a> Stages<'a> {
     }
 
     /// Velocity toward the radar; without pixels where nobody asked for the velocities.
-    fn radial_velocity(&self, workspace: &mut Workspace, fields: &SurfaceFields) -> Field {
+    pub(super) fn radial_velocity(
+        &self,
+        workspace: &mut Workspace,
+        fields: &SurfaceFields,
+    ) -> Field {
         let [vx, vz] = [&fields.velocity_x, &fields.velocity_z];
         if vx.values.is_empty() {
             return Field::default();
@@ -353,14 +380,13 @@ impl<'a> Stages<'a> {
         field
     }
 
-    /// Intensity of the image before speckle.
-    fn image(
+    /// What the radar does, and what it looks at.
+    pub(super) fn imaging<'f>(
         &self,
-        workspace: &mut Workspace,
-        sigma0: &Field,
-        radial_velocity: &Field,
-        fields: &SurfaceFields,
-    ) -> Field {
+        sigma0: &'f Field,
+        radial_velocity: &'f Field,
+        fields: &'f SurfaceFields,
+    ) -> (Imaging, Sources<'f>) {
         let uses = |term| self.plan.uses(term);
         let sources = Sources {
             raster: self.raster,
@@ -369,33 +395,50 @@ impl<'a> Stages<'a> {
             radial_acceleration: uses(Term::Coherence).then_some(&fields.radial_acceleration),
             elevation: uses(Term::RangeBunching).then_some(&fields.elevation),
         };
-        let at_rest = self.models.resolution_at_rest();
         let imaging = Imaging {
             range_to_velocity: self.models.range_to_velocity,
             incidence: self.models.incidence,
             resolution: if uses(Term::Coherence) {
                 self.models.resolution()
             } else {
-                at_rest
+                self.models.resolution_at_rest()
             },
         };
+        (imaging, sources)
+    }
+
+    /// Intensity of the image before speckle.
+    fn image(
+        &self,
+        workspace: &mut Workspace,
+        sigma0: &Field,
+        radial_velocity: &Field,
+        fields: &SurfaceFields,
+    ) -> Field {
+        let (imaging, sources) = self.imaging(sigma0, radial_velocity, fields);
         let image = &self.models.image;
         let tolerance = SHARES.kernels * self.scene.model.tolerance;
         let mut intensity = match self.method {
             Method::Fast => imaging.image_in(workspace, &sources, image, tolerance),
             Method::Direct => DirectImage::new(&imaging, &sources, image).image(),
         };
+        self.add_echo_and_noise(&mut intensity);
+        intensity
+    }
+
+    /// Adds the ship's own echo, unless an impulse response is to image it, and the radar's noise.
+    pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
         if self.models.response.is_none()
             && let Some(echo) = self.echo()
         {
-            echo.add_to(&mut intensity, image, at_rest.nominal);
+            let resolution = self.models.resolution_at_rest().nominal;
+            echo.add_to(intensity, &self.models.image, resolution);
         }
-        if uses(Term::Noise) {
+        if self.plan.uses(Term::Noise) {
             let noise = self.models.noise as f32;
             let pixels = intensity.values.par_iter_mut().with_min_len(1 << 14);
             pixels.for_each(|value| *value += noise);
         }
-        intensity
     }
 
     /// The ship's own echo, if it is asked for.

@@ -128,7 +128,8 @@ mod tests {
         }
     }
 
-    /// Table 7.5: height and peak period of growing seas, one unit of the last digit.
+    /// Height, peak period and level of growing seas against `tests/reference/sea_and_scattering.py`, our own second
+    /// implementation: one unit of the last digit.
     #[test]
     fn growing_seas_meet_the_reference() {
         for (wind, fetch, height, period, level) in [
@@ -142,7 +143,7 @@ mod tests {
             assert!((TAU / model.peak_frequency - period).abs() < 1e-2);
             assert!((model.level - level).abs() < 1e-5);
         }
-        // Uncapped laws, for seas beyond their domain: same table, heights 0.652 and 1.200.
+        // The laws without their end, for older seas (5 m/s over 40 km, 7 m/s over 70 km): same script.
         for (level, period, height) in [(0.00907, 3.53, 0.652), (0.00930, 4.76, 1.200)] {
             let hs = 4.0 * variance(&Jonswap::with(level, TAU / period, 3.3)).sqrt();
             // The period has three digits and enters squared.

@@ -1,4 +1,4 @@
-"""Reference values of the tests of `permittivity`, `scattering::bragg` and `spectrum::elfouhaily`.
+"""Reference values of the tests of `permittivity`, `scattering::bragg`, `spectrum::elfouhaily` and `spectrum::jonswap`.
 
 A second implementation of the same published formulas, in plain Python and 64 bits, written from the formulas in the
 documentation of those functions. It finds slips of programming; it is no second source for the formulas.
@@ -94,6 +94,22 @@ class Elfouhaily:
         return up + cross, up, cross
 
 
+def jonswap(wind, fetch, gravity=9.81):
+    """Height [m], peak period [s] and level of Hasselmann et al. (1976), without an end; trapezoids in ln f."""
+    xi = gravity * fetch / wind**2
+    level, peak = 0.076 * xi**-0.22, 3.5 * gravity / wind * xi**-0.33
+
+    def density(f):
+        sigma = 0.07 if f <= peak else 0.09
+        gamma = 3.3 ** math.exp(-((f - peak) ** 2) / (2 * sigma**2 * peak**2))
+        return level * gravity**2 * (2 * math.pi) ** -4 * f**-5 * math.exp(-1.25 * (peak / f) ** 4) * gamma
+
+    step = 1e-3
+    frequencies = (peak * math.exp(step * n) for n in range(-1600, 7000))
+    variance = sum(f * density(f) for f in frequencies) * step
+    return 4 * math.sqrt(variance), 1 / peak, level
+
+
 def main():
     print("permittivity::permittivity_meets_the_reference: frequency, real, imaginary")
     for hertz in (1.27e9, 5.405e9, 9.6e9):
@@ -127,6 +143,11 @@ def main():
         sea = Elfouhaily(wind, age)
         length = 2 * math.pi / sea.peak
         print(f"    {wind}, {fetch:g}, {age:.3f}, {sea.significant_height():.3f}, {length:.2f}, {sea.slopes()[0]:.4f}")
+
+    print("spectrum::jonswap::growing_seas_meet_the_reference: wind, fetch, height, peak period, level")
+    for wind, fetch in ((3.0, 1e4), (5.0, 1e4), (7.0, 1e4), (7.0, 4e4), (5.0, 4e4), (7.0, 7e4)):
+        height, period, level = jonswap(wind, fetch)
+        print(f"    {wind}, {fetch:g}, {height:.3f}, {period:.2f}, {level:.5f}")
 
     print("spectrum::elfouhaily::fixed_drag_meets_its_reference: wind, slopes")
     for wind in (3.0, 5.0, 7.0, 10.0):

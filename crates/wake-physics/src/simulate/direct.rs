@@ -1,0 +1,226 @@
+//! The oracles of all stages at some pixels of an image that is too large for them as a whole.
+
+use super::clock::{Clock, Seconds};
+use super::simulation::Method;
+use super::stages::Stages;
+use super::surface_fields::{SurfaceFields, Wanted};
+use crate::error::{Error, Result};
+use crate::kelvin::fade;
+use crate::models::Models;
+use crate::plan::Plan;
+use crate::raster::Field;
+use crate::sar::direct::{DirectImage, reaching};
+use crate::scene::{Scene, Term};
+use crate::surface::Surface;
+use crate::survey::Survey;
+use crate::waves::{PlaneWaves, harmonic_sum};
+use crate::workspace::Workspace;
+use rayon::prelude::*;
+
+/// Some pixels of an image before speckle, by the oracles.
+#[derive(Debug, Clone)]
+pub struct DirectPixels {
+    /// Intensity, linear, in the unit of σ⁰, one value a pixel.
+    pub intensity: Vec<f64>,
+    /// Source pixels that reach them: the waves were summed and σ⁰ integrated at these.
+    pub sources: usize,
+    /// Seconds of the oracles alone: sea, wake and σ⁰ at the source pixels; imaging, over all sources, of the pixels.
+    pub seconds: Seconds,
+}
+
+/// The image before speckle at some pixels (row, column), by the methods of [`Method::Direct`].
+///
+/// Which sources reach a pixel is read off the fast fields, with room to spare; their values are not used. So the cost
+/// grows with waves × pixels asked for, not with waves × pixels of the image.
+///
+/// # Errors
+///
+/// A value of the scene out of its range, a grid that does not fit in memory, a pixel outside the image, or an impulse
+/// response, of which no pixel can be had alone.
+pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPixels> {
+    scene.validate()?;
+    for pixel in pixels {
+        for (name, at, count) in [
+            ("pixel row", pixel[0], scene.grid.rows),
+            ("pixel column", pixel[1], scene.grid.columns),
+        ] {
+            if at >= count {
+                return Err(Error::OutOfRange {
+                    name: name.to_owned(),
+                    value: at as f64,
+                    min: 0.0,
+                    max: (count - 1) as f64,
+                    unit: "pixels",
+                });
+            }
+        }
+    }
+    let models = Models::new(scene);
+    let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
+    if models.response.is_some() {
+        return Err(Error::Conflict {
+            name: "radar".to_owned(),
+            value: "with an impulse response".to_owned(),
+            requirement: "so that no pixel can be had alone; simulate the whole scene with Method::Direct, or take the response away".to_owned(),
+        });
+    }
+    let stages = Stages::new(scene, &models, &plan, Method::Fast, Wanted::Image);
+    Ok(stages.direct_intensity(pixels))
+}
+
+impl Stages<'_> {
+    fn direct_intensity(&self, pixels: &[[usize; 2]]) -> DirectPixels {
+        let workspace = &mut Workspace::default();
+        let image = &self.models.image;
+        let sources = self.reaching(workspace, pixels);
+        let at = |&[i, j]: &[usize; 2]| i * self.raster.columns + j;
+        let mut seconds = Seconds::default();
+
+        let mut fields = self.harmonic_fields(workspace, &sources, &mut seconds);
+        self.add_edge(&mut fields);
+        let damping = self.damping(workspace);
+        let (backscatter, facets) = self.facets(&fields, damping.as_ref());
+        let mut clock = Clock::start();
+        let exact = backscatter.sigma0_pixels(&facets, &sources);
+        seconds.backscatter = clock.lap();
+        let mut all = workspace.flat_field(&self.raster);
+        for (source, value) in sources.iter().zip(exact) {
+            all.values[at(source)] = value;
+        }
+        self.modulate(&mut all, damping.as_ref());
+        // Where no wave was summed there is no source.
+        let mut sigma0 = workspace.flat_field(&self.raster);
+        for source in &sources {
+            sigma0.values[at(source)] = all.values[at(source)];
+        }
+
+        let velocity = self.radial_velocity(workspace, &fields);
+        let (imaging, lit) = self.imaging(&sigma0, &velocity, &fields);
+        let direct = DirectImage::new(&imaging, &lit, image);
+        clock.lap();
+        let mut intensity: Vec<f64> = pixels.par_iter().map(|&[i, j]| direct.at(i, j)).collect();
+        seconds.imaging = clock.lap();
+        let mut rest = workspace.flat_field(image);
+        self.add_echo_and_noise(&mut rest);
+        for (value, &[i, j]) in intensity.iter_mut().zip(pixels) {
+            *value += f64::from(rest.at(i, j));
+        }
+        seconds.total = seconds.sea + seconds.kelvin + seconds.backscatter + seconds.imaging;
+        DirectPixels {
+            intensity,
+            sources: sources.len(),
+            seconds,
+        }
+    }
+
+    /// The source pixels that reach the pixels, by the fast fields.
+    fn reaching(&self, workspace: &mut Workspace, pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
+        let mut fields = self.sea(workspace);
+        self.add_swell(workspace, &mut fields);
+        self.add_wake(workspace, &mut fields);
+        self.add_edge(&mut fields);
+        let velocity = self.radial_velocity(workspace, &fields);
+        let power = Field::constant(&self.raster, 1.0);
+        let (imaging, sources) = self.imaging(&power, &velocity, &fields);
+        reaching(&imaging, &sources, &self.models.image, pixels)
+    }
+
+    /// Sea, swell and wake by harmonic sums at some pixels; 0 at all others.
+    fn harmonic_fields(
+        &self,
+        workspace: &mut Workspace,
+        pixels: &[[usize; 2]],
+        seconds: &mut Seconds,
+    ) -> SurfaceFields {
+        let (models, raster) = (self.models, &self.raster);
+        let (seed, time) = (self.scene.seed, self.scene.sea.time);
+        let quantities = self.quantities.concat();
+        let mut sums = vec![vec![0.0; pixels.len()]; quantities.len()];
+        let mut add = |waves: &PlaneWaves, weights: &[f64]| {
+            let mut clock = Clock::start();
+            let more = harmonic_sum(waves, &models.transfer, &quantities, raster, pixels);
+            for (sums, more) in sums.iter_mut().zip(&more) {
+                for ((sum, wave), weight) in sums.iter_mut().zip(more).zip(weights) {
+                    *sum += weight * wave;
+                }
+            }
+            clock.lap()
+        };
+        let everywhere = vec![1.0; pixels.len()];
+        if self.plan.uses(Term::Sea) {
+            let waves = Surface::new(&models.sea, seed, time, raster).modes();
+            seconds.sea = add(&waves, &everywhere);
+        }
+        if let Some(swell) = models.swell.filter(|_| self.plan.uses(Term::Swell)) {
+            let band = raster.nyquist_wavenumber();
+            let waves = swell.waves((seed, time), models.transfer.depth, band);
+            seconds.sea += add(&waves, &everywhere);
+        }
+        let wake = models.wake.as_ref();
+        if let Some(wake) = wake.filter(|_| self.plan.uses(Term::Kelvin)) {
+            let faded = |&[i, j]: &[usize; 2]| {
+                let place = [raster.x(j), raster.y(i)];
+                fade(wake.track.seen_from_ship(place)[0], wake.hull.length())
+            };
+            let fades: Vec<f64> = pixels.iter().map(faded).collect();
+            seconds.kelvin = add(&wake.waves(&self.plan.wake), &fades);
+        }
+        let mut fields = SurfaceFields::default();
+        for (&quantity, sums) in quantities.iter().zip(&sums) {
+            let mut field = workspace.flat_field(raster);
+            for (&[i, j], &sum) in pixels.iter().zip(sums) {
+                field.values[i * raster.columns + j] = sum as f32;
+            }
+            *fields.of(quantity) = field;
+        }
+        fields
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::simulate_with;
+
+    fn scene(assignments: &[&str]) -> Scene {
+        let size = ["grid.rows=12", "grid.columns=10", "model.tolerance=1e-6"];
+        Scene::default()
+            .with_assignments(&[&size, assignments].concat())
+            .unwrap()
+    }
+
+    /// A few pixels alone are those of the whole image by the oracles, of a plain scene and of one with all extras.
+    #[test]
+    fn pixels_are_those_of_the_direct_image() {
+        let plain = ["ship.position=[60, 60]", "ship.echo=true"];
+        let extras = [
+            "ship.edge=true",
+            "sea.gust_strength=0.05",
+            "sea.breaking=true",
+            "radar.noise_floor=-20",
+            "sea.swell_height=1",
+        ];
+        let pixels = [[0, 0], [11, 9], [5, 4], [6, 4], [3, 8]];
+        for scene in [scene(&plain), scene(&[&plain[..], &extras].concat())] {
+            let alone = direct_intensity(&scene, &pixels).unwrap();
+            let whole = simulate_with(&scene, Method::Direct).unwrap();
+            let [rows, columns] = whole.plan.sizes.computed;
+            assert!(alone.sources > 0 && alone.sources < rows * columns / 2);
+            for (&[i, j], value) in pixels.iter().zip(&alone.intensity) {
+                // The whole rounds sea, wake and intensity to f32 (6e-8 each): a source at most some 20 rows off is
+                // displaced by 4e-6 rows, which changes a weight near the middle by at most twice that.
+                let error = value / f64::from(whole.intensity.at(i, j)) - 1.0;
+                assert!(error.abs() < 1e-5, "[{i}, {j}] {error:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_had_alone_is_refused() {
+        let error = direct_intensity(&scene(&[]), &[[0, 10]]).unwrap_err();
+        assert!(error.to_string().contains("pixel column is 10"), "{error}");
+        let satellite = scene(&["radar.sensor=sentinel-1-iw"]);
+        let error = direct_intensity(&satellite, &[[0, 0]]).unwrap_err();
+        assert!(error.to_string().contains("impulse response"), "{error}");
+    }
+}
