@@ -45,7 +45,7 @@ pub(super) fn echo_of(scene: &Scene, models: &Models) -> Option<Echo> {
 }
 
 /// Azimuth displacement of the ship's echo \[m\].
-pub(super) fn echo_displacement(scene: &Scene) -> f64 {
+fn echo_displacement(scene: &Scene) -> f64 {
     let incidence = scene.radar.incidence.to_radians();
     let velocity = scene.ship.as_ref().map_or(0.0, |ship| {
         ship_radial_velocity(ship.speed, ship.heading, incidence)
