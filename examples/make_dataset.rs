@@ -59,7 +59,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit::code(run(&Arguments::parse()))
+    exit::code(|| run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -83,11 +83,14 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             "folder": folder, "images": there, "made": made, "seconds": seconds,
             "images_per_second": made as f64 / seconds, "shard": manifest.shard, "dataset": manifest,
         });
-        println!("{report:#}");
+        exit::say(&format!("{report:#}"))?;
     } else if arguments.merge {
-        println!("{there} images in {place}, joined from its shards");
+        exit::say(&format!(
+            "{there} images in {place}, joined from its shards"
+        ))?;
     } else {
-        println!("{there} images in {place}, {made} of them made in {seconds:.1} s");
+        let text = format!("{there} images in {place}, {made} of them made in {seconds:.1} s");
+        exit::say(&text)?;
     }
     Ok(())
 }

@@ -11,7 +11,6 @@ mod exit;
 use clap::Parser;
 use serde_json::{Value, json};
 use std::error::Error;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_physics::Scene;
@@ -36,14 +35,12 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit::code(run(&Arguments::parse()))
+    exit::code(|| run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let text = answer(arguments)?;
-    // A reader such as `head` may have left.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    Ok(())
+    Ok(exit::say(&text)?)
 }
 
 fn answer(arguments: &Arguments) -> Result<String, Box<dyn Error>> {

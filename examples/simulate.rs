@@ -15,6 +15,7 @@ mod compare;
 mod exit;
 
 use clap::{Parser, ValueEnum};
+use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_physics::grey::GreyScale;
@@ -63,10 +64,10 @@ enum GreyName {
 }
 
 fn main() -> ExitCode {
-    exit::code(run(&Arguments::parse()))
+    exit::code(|| run(&Arguments::parse()))
 }
 
-fn run(arguments: &Arguments) -> wake_physics::Result<()> {
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let scene = match &arguments.scene {
         Some(path) => Scene::read(path)?,
         None => Scene::default(),
@@ -78,7 +79,7 @@ fn run(arguments: &Arguments) -> wake_physics::Result<()> {
     let method = match arguments.method {
         MethodName::Fast => Method::Fast,
         MethodName::Direct => {
-            eprintln!("summing wave by wave and pixel by pixel: minutes for a large grid");
+            exit::note("summing wave by wave and pixel by pixel: minutes for a large grid");
             Method::Direct
         }
     };
@@ -96,18 +97,16 @@ fn run(arguments: &Arguments) -> wake_physics::Result<()> {
         }
     }
     if arguments.json {
-        println!("{report:#}");
+        exit::say(&format!("{report:#}"))?;
     } else {
-        print_summary(&simulation, &arguments.out);
+        exit::say(&summary(&simulation, &arguments.out))?;
     }
     Ok(())
 }
 
-fn print_summary(simulation: &Simulation, out: &std::path::Path) {
-    println!("{}", simulation.plan);
-    for note in &simulation.plan.notes {
-        println!("note: {note}");
-    }
-    println!("{}", simulation.seconds);
-    println!("written to {}", out.display());
+fn summary(simulation: &Simulation, out: &std::path::Path) -> String {
+    let notes = simulation.plan.notes.iter();
+    let notes: String = notes.map(|note| format!("note: {note}\n")).collect();
+    let (plan, seconds) = (&simulation.plan, &simulation.seconds);
+    format!("{plan}\n{notes}{seconds}\nwritten to {}", out.display())
 }

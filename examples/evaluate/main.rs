@@ -69,7 +69,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit::code(run(&Arguments::parse()))
+    exit::code(|| run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
@@ -109,9 +109,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     plot::spectrum(&arguments.out.join("spectrum.svg"), &report)?;
     plot::wake(&arguments.out.join("wake_correlation.svg"), &report)?;
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
+        exit::say(&serde_json::to_string_pretty(&report)?)?;
     } else {
-        println!("{text}\nwritten to {}", arguments.out.display());
+        exit::say(&format!("{text}\nwritten to {}", arguments.out.display()))?;
     }
     Ok(())
 }

@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Result<(), Box<dyn E
         "count": arguments.count, "scheduler": scheduler.to_json(), "device": arguments.device, "weights": weights,
         "files": write_images(images, &arguments.out)?, "seconds": seconds,
     });
-    Ok(finish(arguments, &report)?)
+    finish(arguments, &report)
 }
 
 /// Refuses a scene whose image has another size than the model's.

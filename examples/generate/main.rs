@@ -68,7 +68,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit::code(run(&Arguments::parse()))
+    exit::code(|| run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -101,12 +101,11 @@ fn image_name(k: usize, count: usize) -> String {
 }
 
 /// Writes the report and says what was made.
-fn finish(arguments: &Arguments, report: &Value) -> wake_physics::Result<()> {
+fn finish(arguments: &Arguments, report: &Value) -> Result<(), Box<dyn Error>> {
     let out: &Path = &arguments.out;
     output::write_json(&out.join("report.json"), report)?;
     if arguments.json {
-        println!("{report:#}");
-        return Ok(());
+        return Ok(exit::say(&format!("{report:#}"))?);
     }
     let files: Vec<&str> = report["files"]
         .as_array()
@@ -115,6 +114,6 @@ fn finish(arguments: &Arguments, report: &Value) -> wake_physics::Result<()> {
         .filter_map(Value::as_str)
         .collect();
     let seconds = report["seconds"]["total"].as_f64().unwrap_or_default();
-    println!("{} in {}, {seconds:.2} s", files.join(", "), out.display());
-    Ok(())
+    let (files, out) = (files.join(", "), out.display());
+    Ok(exit::say(&format!("{files} in {out}, {seconds:.2} s"))?)
 }

@@ -10,7 +10,7 @@ use wake_ldm::{WakeSampler, device_named};
 use wake_physics::{Scene, output};
 use wake_text::Reading;
 
-use super::{Arguments, finish, image_name, prompt};
+use super::{Arguments, exit, finish, image_name, prompt};
 
 /// Images in a row of the contact sheet.
 const ACROSS: usize = 4;
@@ -52,11 +52,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     });
     if !arguments.json {
         for part in &reading.unread {
-            println!("not read: {}", part.text);
+            exit::say(&format!("not read: {}", part.text))?;
         }
-        println!("drawn: {}", wake_text::prompt(&images[0].scene)?);
+        exit::say(&format!("drawn: {}", wake_text::prompt(&images[0].scene)?))?;
     }
-    Ok(finish(arguments, &report)?)
+    finish(arguments, &report)
 }
 
 /// A scene with seeds that count up.

@@ -69,7 +69,7 @@ enum Part {
 }
 
 fn main() -> ExitCode {
-    exit::code(run(&Arguments::parse()))
+    exit::code(|| run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
@@ -106,9 +106,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     output::write_json(&out.join("report.json"), &report)?;
     output::write_atomically(&out.join("table.md"), text.as_bytes())?;
     if arguments.json {
-        println!("{report}");
+        exit::say(&report.to_string())?;
     } else {
-        println!("{text}\nwritten to {}", out.display());
+        exit::say(&format!("{text}\nwritten to {}", out.display()))?;
     }
     Ok(())
 }

@@ -1,21 +1,25 @@
 //! A Stable Diffusion-layout model learns to draw wakes.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 use wake_ldm::dataset::{Folder, Pair};
 use wake_ldm::device_named;
 use wake_ldm::noise::NoiseSource;
 use wake_ldm::pipeline::{Pipeline, PipelineParts};
 use wake_ldm::scheduler::Prediction;
-use wake_ldm::train::{FineTune, FineTuneOptions, Frozen, Metrics, Rate, TrainerOptions};
+use wake_ldm::train::{
+    Checkpoint, FineTune, FineTuneOptions, Frozen, Metrics, Rate, TrainerOptions, fingerprint,
+};
 use wake_ldm::weights::Precision;
+use wake_physics::output;
 use wake_text::Tokenizer;
 
-use super::options::{learning, newest};
+use super::exit;
+use super::options::learning;
 use super::progress;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -73,22 +77,49 @@ pub(crate) struct Options {
     out: PathBuf,
 }
 
+/// Where the checkpoints lie, below --out.
+const CHECKPOINTS: &str = "checkpoints";
+/// What the run was begun with, and after how many steps the model in --out was written.
+const RECORD: &str = "fine_tune.json";
+
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let device = device_named(&options.device)?;
     let data = Folder::open(&options.data)?;
     let parts = Pipeline::load(&options.weights, &device)?.into_parts();
-    let mut run = begin(options, &parts, &device)?;
-    let checkpoints = options.out.join("checkpoints");
-    if options.resume {
-        run.resume(newest(&checkpoints)?)?;
+    check_size(options, &data, parts.autoencoder.downsampling())?;
+    let mut run = begin(options, &data, &parts, &device)?;
+    let checkpoints = options.out.join(CHECKPOINTS);
+    let newest = Checkpoint::newest(&checkpoints)?;
+    let (out, place) = (&options.out, checkpoints.display());
+    match (newest, options.resume) {
+        (Some(checkpoint), true) => run.resume(checkpoint)?,
+        (None, false) => {}
+        (None, true) => {
+            return Err(
+                format!("--resume: there is no checkpoint in {place}; begin without it").into(),
+            );
+        }
+        (Some(there), false) => {
+            let made = there.step;
+            let message = "--resume goes on with it, another --out begins anew";
+            return Err(format!(
+                "{}: a run that has made {made} steps; {message}",
+                out.display()
+            )
+            .into());
+        }
     }
-    std::fs::create_dir_all(&options.out)?;
-    let mut metrics = Metrics::open(&options.out.join("fine_tune.jsonl"), run.steps())?;
+    let _lock = output::lock_folder(out)?;
+    // A kill after the checkpoint leaves the model of the one before.
+    if run.steps() > 0 && written_after(out) != Some(run.steps() as u64) {
+        save(options, &run, &parts, &device)?;
+    }
+    let mut metrics = Metrics::open(&out.join("fine_tune.jsonl"), run.steps())?;
     let steps = options.steps as usize;
     let bar = progress::bar(u64::from(options.steps), "fine-tuning");
     while run.steps() < steps {
         let (images, ids) = batch(options, &data, &parts, run.steps(), &device)?;
-        let report = run.step(images, ids);
+        let report = run.step(images, ids)?;
         metrics.write(run.steps(), steps, report, &json!({}))?;
         bar.set_message(format!("fine-tuning, loss {:.4}", report.loss));
         bar.set_position(run.steps() as u64);
@@ -98,22 +129,74 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         }
     }
     bar.finish_and_clear();
-    println!("{steps} steps, model in {}", options.out.display());
-    Ok(())
+    let made = run.steps();
+    Ok(exit::say(&format!(
+        "{made} steps, model in {}",
+        out.display()
+    ))?)
 }
 
-fn begin(options: &Options, parts: &PipelineParts, device: &Device) -> Outcome<FineTune> {
+/// Refuses images that the autoencoder cannot halve as often as it does.
+fn check_size(options: &Options, data: &Folder, down: usize) -> Outcome<()> {
+    let grid = &data.manifest().recipe.scene.grid;
+    if grid.rows.is_multiple_of(down) && grid.columns.is_multiple_of(down) && !data.is_empty() {
+        return Ok(());
+    }
+    let (data, rows, columns) = (options.data.display(), grid.rows, grid.columns);
+    Err(
+        format!("--data {data}: images of {rows} x {columns} pixels, expected multiples of {down}")
+            .into(),
+    )
+}
+
+/// After how many steps the model in a folder was written.
+fn written_after(folder: &Path) -> Option<u64> {
+    let text = std::fs::read_to_string(folder.join(RECORD)).ok()?;
+    let record: Value = serde_json::from_str(&text).ok()?;
+    record["results_after"].as_u64()
+}
+
+/// What a run learns from: the files of the model it begins with, and the set.
+fn identity(options: &Options, data: &Folder) -> Outcome<Value> {
+    let mut files = std::collections::BTreeMap::new();
+    for part in ["unet", "vae", "text_encoder", "scheduler"] {
+        let Ok(entries) = std::fs::read_dir(options.weights.join(part)) else {
+            continue;
+        };
+        for entry in entries {
+            let path = entry?.path();
+            let name = path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            if path.is_file() && !name.starts_with('.') {
+                files.insert(format!("{part}/{name}"), fingerprint(&path)?);
+            }
+        }
+    }
+    Ok(json!({"weights": files, "data": data.manifest(), "shard": data.manifest().shard}))
+}
+
+fn begin(
+    options: &Options,
+    data: &Folder,
+    parts: &PipelineParts,
+    device: &Device,
+) -> Outcome<FineTune> {
     let schedule = parts.scheduler.noise_schedule().cloned();
     let schedule = schedule.ok_or("the model's scheduler has no noise schedule to train with")?;
     let prediction = match parts.scheduler.to_json()["prediction_type"].as_str() {
         Some("v_prediction") => Prediction::Velocity,
         Some("sample") => Prediction::Sample,
-        _ => Prediction::Epsilon,
+        Some("epsilon") | None => Prediction::Epsilon,
+        _ => Prediction::Flow,
     };
     let constants = FineTuneOptions {
         prediction,
         snr_gamma: options.snr_gamma,
         seed: options.seed,
+        identity: identity(options, data)?,
         trainer: TrainerOptions {
             rate: Rate {
                 peak: options.rate,
@@ -132,7 +215,7 @@ fn begin(options: &Options, parts: &PipelineParts, device: &Device) -> Outcome<F
     let learning = learning(device.clone(), options.checkpointing, options.bf16)?;
     let unet = parts.unet.clone();
     Ok(match options.rank {
-        None => FineTune::whole(unet, frozen, constants, &learning),
+        None => FineTune::whole(unet, frozen, constants, &learning)?,
         Some(rank) => FineTune::low_rank(unet, usize::from(rank), frozen, constants, &learning)?,
     })
 }
@@ -186,5 +269,6 @@ fn save(options: &Options, run: &FineTune, parts: &PipelineParts, device: &Devic
             &options.out.join("pytorch_lora_weights.safetensors"),
         )?;
     }
-    Ok(())
+    let record = json!({"results_after": run.steps()});
+    Ok(output::write_json(&options.out.join(RECORD), &record)?)
 }

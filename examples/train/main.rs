@@ -54,7 +54,7 @@ enum Stage {
 }
 
 fn main() -> ExitCode {
-    exit::code(match Arguments::parse().stage {
+    exit::code(|| match Arguments::parse().stage {
         Stage::Autoencoder(options) => stages::autoencoder(&options),
         Stage::Words(options) => stages::words(&options),
         Stage::Mean(options) => stages::mean(&options),

@@ -1,12 +1,13 @@
 //! What a stage is told on the command line.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use burn::tensor::{DType, Device};
 use clap::Args;
+use serde_json::Value;
 use wake_ldm::device_named;
-use wake_ldm::train::{Checkpoint, Rate, RunOptions, TrainerOptions};
+use wake_ldm::train::{Rate, RunOptions, TrainerOptions};
 
 #[derive(Args, Clone)]
 pub(crate) struct Options {
@@ -14,7 +15,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
     /// Pairs to simulate where there is no --data
-    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(8..))]
+    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     pub(crate) count: u64,
     /// JSON file with the widths of the model [default: those of the model that ships]
     #[arg(long, value_name = "FILE")]
@@ -55,19 +56,21 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The same for a stage that runs because a later one needs it, and that may have been killed half-way.
-    pub(crate) fn before(&self, stage: &str) -> Self {
+    /// The same for a stage that runs because a later one needs it, and that may have been stopped half-way.
+    ///
+    /// - `left`: the steps that it was begun for, 0 if it never was
+    /// - `state`: of its last checkpoint, if there is one
+    pub(crate) fn before(&self, left: usize, state: &Value) -> Self {
+        let batch = state["batch"].as_u64().and_then(|n| u16::try_from(n).ok());
         Self {
-            steps: None,
-            batch: None,
-            resume: self.checkpoints(stage).is_dir(),
+            steps: u32::try_from(left).ok().filter(|&steps| steps > 0),
+            batch,
+            rate: state["trainer"]["rate"].as_f64().unwrap_or(self.rate),
+            bf16: state["trainer"]["bf16"].as_bool().unwrap_or(self.bf16),
+            seed: state["seed"].as_u64().unwrap_or(self.seed),
+            resume: left > 0,
             ..self.clone()
         }
-    }
-
-    /// Where the checkpoints of a stage lie.
-    pub(crate) fn checkpoints(&self, stage: &str) -> PathBuf {
-        self.out.join("checkpoints").join(stage)
     }
 
     /// Steps of a stage.
@@ -76,10 +79,13 @@ impl Options {
     }
 
     /// Constants of a run.
-    pub(crate) fn run(&self, steps: usize, batch: u16) -> RunOptions {
+    ///
+    /// - `identity`: what it learns from
+    pub(crate) fn run(&self, steps: usize, batch: u16, identity: Value) -> RunOptions {
         RunOptions {
             batch: usize::from(self.batch.unwrap_or(batch)),
             seed: self.seed,
+            identity,
             trainer: TrainerOptions {
                 rate: Rate {
                     peak: self.rate,
@@ -122,16 +128,5 @@ pub(crate) fn learning(
     Ok(match checkpointing {
         true => device.gradient_checkpointing(),
         false => device,
-    })
-}
-
-/// The checkpoint that --resume goes on from.
-pub(crate) fn newest(folder: &Path) -> Result<Checkpoint, Box<dyn Error>> {
-    Checkpoint::newest(folder)?.ok_or_else(|| {
-        format!(
-            "--resume: there is no checkpoint in {}; begin without it",
-            folder.display()
-        )
-        .into()
     })
 }

@@ -9,19 +9,21 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use wake_ldm::WakeSampler;
 use wake_ldm::conditioning::{Conditions, Vocabulary, tokens};
-use wake_ldm::dataset::{Pair, Prompts, Recipe, Simulated};
+use wake_ldm::dataset::{Folder, Pair, Prompts, Recipe, Simulated};
 use wake_ldm::network::{
     Flow, Known, PatchTransform, Prior, PromptParser, Shares, WakeModel, WakeModelConfig,
     expected_grey, expected_latents,
 };
 use wake_ldm::train::{
-    Checkpoint, Example, FlowTask, LatentSet, Metrics, PriorTask, Run, Task, WordsTask,
+    Checkpoint, FlowTask, LatentSet, Metrics, PriorTask, Run, RunFolder, Task, WordsTask,
+    fingerprint,
 };
 use wake_ldm::weights::{Layout, Precision, load, save_as};
-use wake_physics::Scene;
+use wake_physics::{Scene, available_memory, output};
 use wake_text::Wording;
 
-use super::options::{Options, newest};
+use super::exit;
+use super::options::Options;
 use super::progress;
 use super::source::Source;
 
@@ -32,7 +34,15 @@ const FITTED: u64 = 400;
 /// Images read or simulated at the same time.
 const AT_ONCE: usize = 64;
 /// Images in a row of a sheet.
-const SHEET: u64 = 8;
+const ACROSS: u64 = 8;
+/// Examples of a batch by default.
+const BATCHES: [(&str, u16); 3] = [("words", 128), ("mean", 32), ("diffusion", 8)];
+/// Names of what the stages write.
+const PATCHES: &str = "patches.safetensors";
+const PARSER: &str = "reader.safetensors";
+const PRIOR: &str = "prior.safetensors";
+const FLOW: &str = "flow.safetensors";
+const SHEET: &str = "sheet.png";
 /// Ranges that prompts to read are drawn from, beyond those of images.
 const PROMPT_RANGES: [&str; 4] = [
     "draw.ranges.ship_speed = [1.0, 15.0]",
@@ -42,110 +52,259 @@ const PROMPT_RANGES: [&str; 4] = [
 ];
 
 pub(crate) fn autoencoder(options: &Options) -> Outcome<()> {
-    let source = Source::new(options)?;
-    options.devices()?;
-    let config = config(options)?;
-    let shares = fit(options, &source, &config)?;
-    for channels in [4, 8, 16] {
-        println!(
-            "{channels:2} channels: {:.2} % of the variance, {:.2} dB",
-            100.0 * shares.kept(channels),
-            shares.psnr(channels)
-        );
-    }
-    Ok(())
+    let work = Work::new(options, "autoencoder", true)?;
+    let shares = work.fit(work.source()?)?;
+    let line = |channels| {
+        let (kept, psnr) = (100.0 * shares.kept(channels), shares.psnr(channels));
+        format!("{channels:2} channels: {kept:.2} % of the variance, {psnr:.2} dB")
+    };
+    Ok(exit::say(&[4, 8, 16].map(line).join("\n"))?)
 }
 
 pub(crate) fn words(options: &Options) -> Outcome<()> {
-    let stage = Stage::new("words", options)?;
-    let config = config(options)?;
-    let recipe = Recipe::default().with_assignments(&PROMPT_RANGES)?;
-    let prompts = Prompts::new(Simulated::new(recipe, options.seed)?);
-    let vocabulary = Vocabulary::new(config.vocabulary.iter().copied());
-    let steps = options.steps(4000);
-    let devices = options.learning_devices()?;
-    let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
-    let mut run = Run::new("words", &config, init, options.run(steps, 128), devices)?;
-    let task = WordsTask {
-        prompts: &prompts,
-        vocabulary: &vocabulary,
-    };
-    let file = options.out.join("reader.safetensors");
-    stage.train(&mut run, steps, &task, |_: &Run<PromptParser>| Ok(()))?;
-    Ok(keep(&run.averaged(), &file)?)
+    Work::new(options, "words", false)?.words(options)
 }
 
 pub(crate) fn mean(options: &Options) -> Outcome<()> {
-    let (stage, source) = (Stage::new("mean", options)?, Source::new(options)?);
-    let config = config(options)?;
-    let patches = patches(options, &source, &config)?;
-    let set = latents(&source, &patches, &config)?;
-    let steps = options.steps(6000);
-    let devices = options.learning_devices()?;
-    let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
-    let mut run = Run::new("mean", &config, init, options.run(steps, 32), devices)?;
-    let task = PriorTask {
-        set: &set,
-        grid: config.grid(),
-        seed: options.seed,
-    };
-    let examples = sheet_examples(&source)?;
-    stage.train(&mut run, steps, &task, |run: &Run<Prior>| {
-        let means = expected_images(&run.averaged(), &patches, &config, &examples)?;
-        sheet(&examples, &means, &options.out.join("sheet.png"))
-    })?;
-    let file = options.out.join("prior.safetensors");
-    Ok(keep(&run.averaged(), &file)?)
+    Work::new(options, "mean", true)?.mean(options)
 }
 
 pub(crate) fn diffusion(options: &Options) -> Outcome<()> {
-    let (stage, source) = (Stage::new("diffusion", options)?, Source::new(options)?);
-    let missing = |name: &str| !options.out.join(name).exists();
-    if missing("reader.safetensors") {
-        words(&options.before("words"))?;
+    Work::new(options, "diffusion", true)?.diffusion(options)
+}
+
+/// One folder, its model and its data.
+struct Work<'a> {
+    options: &'a Options,
+    config: WakeModelConfig,
+    source: Option<Source>,
+    folder: RunFolder,
+}
+
+impl<'a> Work<'a> {
+    /// Takes the folder; whatever is refused is refused before anything is written.
+    fn new(options: &'a Options, stage: &str, with_data: bool) -> Outcome<Self> {
+        let devices = options.learning_devices()?.len();
+        let config = config(options)?;
+        let batch = BATCHES.iter().find(|(name, _)| *name == stage);
+        if let Some(&(_, batch)) = batch {
+            options.run(1, batch, Value::Null).validate(devices)?;
+        }
+        let source = with_data
+            .then(|| Source::new(options, &config))
+            .transpose()?;
+        let identity = source.as_ref().map(Source::identity).transpose()?;
+        let identity = identity.unwrap_or_default();
+        let begin = (stage, options.resume);
+        Ok(Self {
+            folder: RunFolder::open(&options.out, &config, &identity, begin)?,
+            options,
+            config,
+            source,
+        })
     }
-    if missing("prior.safetensors") {
-        mean(&options.before("mean"))?;
+
+    fn source(&self) -> Outcome<&Source> {
+        Ok(self.source.as_ref().ok_or("this stage has no data")?)
     }
-    let config = config(options)?;
-    let device = options.devices()?.remove(0);
-    let model = WakeModel {
-        patches: patches(options, &source, &config)?,
-        parser: part(config.init_parser(&device), options, "reader.safetensors")?,
-        prior: part(config.init_prior(&device), options, "prior.safetensors")?,
-        flow: config.init_flow(&device),
-    };
-    let set = latents(&source, &model.patches, &config)?;
-    let bar = progress::bar(set.len() as u64, "residuals");
-    let set = set.residuals(&model.prior, config.grid(), |n| {
-        bar.inc(n as u64);
-    });
-    bar.finish_and_clear();
-    let steps = options.steps(6000);
-    let devices = options.learning_devices()?;
-    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
-    let mut run = Run::new("diffusion", &config, init, options.run(steps, 8), devices)?;
-    let task = FlowTask {
-        set: &set,
-        patches: &model.patches,
-        config: &config,
-        seed: options.seed,
-    };
-    let examples = sheet_examples(&source)?;
-    stage.train(&mut run, steps, &task, |run: &Run<Flow>| {
-        let flow = run.averaged();
-        keep(&flow, &options.out.join("flow.safetensors"))?;
-        let sampler = WakeSampler::new(
-            WakeModel {
+
+    fn words(&mut self, options: &Options) -> Outcome<()> {
+        let recipe = Recipe::default().with_assignments(&PROMPT_RANGES)?;
+        let identity = json!({"prompts": recipe});
+        let prompts = Prompts::new(Simulated::new(recipe, options.seed)?);
+        let vocabulary = Vocabulary::new(self.config.vocabulary.iter().copied());
+        let steps = options.steps(4000);
+        let devices = options.learning_devices()?;
+        let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
+        let constants = options.run(steps, BATCHES[0].1, identity);
+        let run = Run::new("words", &self.config, init, constants, devices)?;
+        let task = WordsTask {
+            prompts: &prompts,
+            vocabulary: &vocabulary,
+        };
+        let file = options.out.join(PARSER);
+        let show = |run: &Run<PromptParser>| Ok(keep(&run.averaged(), &file)?);
+        let stage = Stage {
+            name: "words",
+            options,
+            steps,
+            results: &[PARSER],
+        };
+        stage.train(&mut self.folder, run, &task, show)
+    }
+
+    fn mean(&mut self, options: &Options) -> Outcome<()> {
+        let source = self.source()?;
+        let patches = self.patches()?;
+        let identity = json!({"data": source.identity()?, "patches": self.fingerprint(PATCHES)?});
+        let set = self.latents(&patches)?;
+        let steps = options.steps(6000);
+        let devices = options.learning_devices()?;
+        let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
+        let constants = options.run(steps, BATCHES[1].1, identity);
+        let run = Run::new("mean", &self.config, init, constants, devices)?;
+        let task = PriorTask {
+            set: &set,
+            grid: self.config.grid(),
+            seed: options.seed,
+        };
+        let examples = sheet_examples(source)?;
+        let (config, out) = (self.config.clone(), &options.out);
+        let show = |run: &Run<Prior>| {
+            let prior = run.averaged();
+            keep(&prior, &out.join(PRIOR))?;
+            let means = expected_images(&prior, &patches, &config, &examples)?;
+            sheet(&examples, &means, &out.join(SHEET))
+        };
+        let stage = Stage {
+            name: "mean",
+            options,
+            steps,
+            results: &[PRIOR],
+        };
+        stage.train(&mut self.folder, run, &task, show)
+    }
+
+    fn diffusion(&mut self, options: &Options) -> Outcome<()> {
+        if let Some(earlier) = self.earlier("words", &[PARSER])? {
+            self.words(&earlier)?;
+        }
+        if let Some(earlier) = self.earlier("mean", &[PRIOR])? {
+            self.mean(&earlier)?;
+        }
+        let (config, source) = (self.config.clone(), self.source()?);
+        let device = options.devices()?.remove(0);
+        let model = WakeModel {
+            patches: self.patches()?,
+            parser: part(config.init_parser(&device), options, PARSER)?,
+            prior: part(config.init_prior(&device), options, PRIOR)?,
+            flow: config.init_flow(&device),
+        };
+        let identity = json!({
+            "data": source.identity()?, "patches": self.fingerprint(PATCHES)?,
+            "prior": self.fingerprint(PRIOR)?,
+        });
+        let set = self.latents(&model.patches)?;
+        let bar = progress::bar(set.len() as u64, "residuals");
+        let set = set.residuals(&model.prior, config.grid(), |n| {
+            bar.inc(n as u64);
+        });
+        bar.finish_and_clear();
+        let steps = options.steps(6000);
+        let devices = options.learning_devices()?;
+        let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+        let constants = options.run(steps, BATCHES[2].1, identity);
+        let run = Run::new("diffusion", &config, init, constants, devices)?;
+        let task = FlowTask {
+            set: &set,
+            patches: &model.patches,
+            config: &config,
+            seed: options.seed,
+        };
+        let examples = sheet_examples(source)?;
+        let scenes: Vec<Scene> = examples.iter().map(|pair| pair.scene.clone()).collect();
+        let show = |run: &Run<Flow>| {
+            let flow = run.averaged();
+            keep(&flow, &options.out.join(FLOW))?;
+            let model = WakeModel {
                 flow,
                 ..model.clone()
-            },
-            config.clone(),
-        )?;
-        let drawn = sampler.sample_scenes(&scenes_of(&examples, &config))?;
-        let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
-        sheet(&examples, &drawn, &options.out.join("sheet.png"))
-    })
+            };
+            let drawn = WakeSampler::new(model, config.clone())?.sample_scenes(&scenes)?;
+            let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
+            sheet(&examples, &drawn, &options.out.join(SHEET))
+        };
+        let stage = Stage {
+            name: "diffusion",
+            options,
+            steps,
+            results: &[FLOW, SHEET],
+        };
+        stage.train(&mut self.folder, run, &task, show)
+    }
+
+    /// What an earlier stage is told if its results are missing, older than its last checkpoint, or not done.
+    fn earlier(&self, stage: &str, results: &[&str]) -> Outcome<Option<Options>> {
+        let Some(left) = self.folder.unfinished(stage, results)? else {
+            return Ok(None);
+        };
+        let checkpoint = Checkpoint::newest(&self.folder.checkpoints(stage))?;
+        let state = checkpoint.map_or(Value::Null, |checkpoint| checkpoint.state);
+        Ok(Some(self.options.before(left, &state)))
+    }
+
+    fn fingerprint(&self, name: &str) -> wake_ldm::Result<String> {
+        fingerprint(&self.options.out.join(name))
+    }
+
+    /// Fits the patch transform and writes it with what it keeps.
+    fn fit(&self, source: &Source) -> Outcome<Shares> {
+        let (options, config) = (self.options, &self.config);
+        let device = options.devices()?.remove(0);
+        let count = source.len().min(FITTED);
+        let bar = progress::bar(count, "images for the patch transform");
+        let mut images = Vec::new();
+        for index in 0..count {
+            images.push(source.pair(index)?.image.pixels);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        let pixels = images.iter().map(Vec::as_slice);
+        let (transform, shares) =
+            PatchTransform::fit(pixels, config.image_size, config.latent_channels, &device);
+        let path = options.out.join(PATCHES);
+        save_as(&transform, Layout::Diffusers, &path, Precision::F32)?;
+        let rows: Vec<_> = (1..=64)
+            .map(|c| json!({"channels": c, "variance": shares.kept(c), "psnr_db": finite(shares.psnr(c))}))
+            .collect();
+        output::write_json(&options.out.join("shares.json"), &rows)?;
+        Ok(shares)
+    }
+
+    /// The patch transform of an earlier run, or a new one.
+    fn patches(&self) -> Outcome<PatchTransform> {
+        if !self.options.out.join(PATCHES).exists() {
+            self.fit(self.source()?)?;
+        }
+        let device = self.options.devices()?.remove(0);
+        let empty = PatchTransform::zeros(self.config.latent_channels, &device);
+        part(empty, self.options, PATCHES)
+    }
+
+    /// Encodes all pairs and the images expected of their scenes, which then stay in memory.
+    fn latents(&self, patches: &PatchTransform) -> Outcome<LatentSet> {
+        let source = self.source()?;
+        // Two numbers of 16 bits for each of the latents of an image.
+        let each = 4 * self.config.latent_channels * self.config.latent_size().pow(2);
+        let (needed, free) = (source.len().saturating_mul(each as u64), available_memory());
+        if let Some(free) = free.filter(|&free| free < needed) {
+            let [needed, free] = [needed, free].map(|bytes| bytes as f64 / (1u64 << 30) as f64);
+            let count = source.len();
+            return Err(format!(
+                "{count} pairs need {needed:.1} GiB of memory, but {free:.1} GiB are free; lower --count, or take a \
+                 smaller --data"
+            )
+            .into());
+        }
+        let bar = progress::bar(source.len(), "pairs");
+        let mut set = LatentSet::default();
+        for first in (0..source.len()).step_by(AT_ONCE) {
+            let read = |index: u64| -> wake_ldm::Result<_> {
+                let Pair { image, scene, .. } = source.pair(index)?;
+                let expected = expected_grey(&scene)?;
+                Ok(([image.pixels, expected], scene))
+            };
+            let chunk = first..source.len().min(first + AT_ONCE as u64);
+            let pairs: Vec<_> = chunk.into_par_iter().map(read).collect();
+            for pair in pairs {
+                let (images, scene) = pair?;
+                set.push(patches, images, scene)?;
+                bar.inc(1);
+            }
+        }
+        bar.finish_and_clear();
+        Ok(set)
+    }
 }
 
 /// Writes a part of the model as it ships.
@@ -157,82 +316,58 @@ fn keep(part: &impl Module, path: &Path) -> wake_ldm::Result<()> {
 struct Stage<'a> {
     name: &'static str,
     options: &'a Options,
-    checkpoint: Option<Checkpoint>,
+    steps: usize,
+    /// Files that are written after every checkpoint.
+    results: &'a [&'a str],
 }
 
-impl<'a> Stage<'a> {
-    /// Reads the newest checkpoint where the run is to go on; nothing is written yet.
-    fn new(name: &'static str, options: &'a Options) -> Outcome<Self> {
-        options.devices()?;
-        let checkpoint = match options.resume {
-            true => Some(newest(&options.checkpoints(name))?),
-            false => None,
-        };
-        Ok(Self {
-            name,
-            options,
-            checkpoint,
-        })
-    }
-
-    /// Makes all steps; `show` is called after every checkpoint.
+impl Stage<'_> {
+    /// Makes all steps; `show` writes the results.
     fn train<M: Module>(
         self,
-        run: &mut Run<M>,
-        steps: usize,
+        folder: &mut RunFolder,
+        mut run: Run<M>,
         task: &impl Task<M>,
         show: impl Fn(&Run<M>) -> Outcome<()>,
     ) -> Outcome<()> {
-        let (stage, out) = (self.name, &self.options.out);
-        if let Some(checkpoint) = self.checkpoint {
+        let Self {
+            name,
+            options,
+            steps,
+            results,
+        } = self;
+        if let Some(checkpoint) = folder.begin(name, options.resume)? {
             run.resume(checkpoint)?;
+            // A kill after the checkpoint leaves results of the one before.
+            if !folder.is_current(name, run.steps(), results) {
+                show(&run)?;
+            }
+            folder.note(name, run.steps(), steps)?;
         }
-        let mut metrics = Metrics::open(&out.join(format!("{stage}.jsonl")), run.steps())?;
-        let bar = progress::bar(steps as u64, stage);
+        let log = options.out.join(format!("{name}.jsonl"));
+        let mut metrics = Metrics::open(&log, run.steps())?;
+        let bar = progress::bar(steps as u64, name);
         while run.steps() < steps {
-            let (report, terms) = run.step(task);
+            let (report, terms) = run.step(task)?;
             let terms: Map<String, Value> = terms
                 .into_iter()
-                .map(|(name, value)| (name.to_owned(), json!(value)))
+                .map(|(term, value)| (term.to_owned(), json!(value)))
                 .collect();
             metrics.write(run.steps(), steps, report, &Value::Object(terms))?;
-            bar.set_message(format!("{stage}, loss {:.4}", report.loss));
+            bar.set_message(format!("{name}, loss {:.4}", report.loss));
             bar.set_position(run.steps() as u64);
-            if run.steps().is_multiple_of(self.options.every as usize) || run.steps() == steps {
-                run.checkpoint(&self.options.checkpoints(stage))?;
-                show(run)?;
+            if run.steps().is_multiple_of(options.every as usize) || run.steps() == steps {
+                run.checkpoint(&folder.checkpoints(name))?;
+                show(&run)?;
+                folder.note(name, run.steps(), steps)?;
             }
         }
         bar.finish_and_clear();
-        println!("{stage}: {steps} steps, results in {}", out.display());
-        Ok(())
+        let (made, out) = (run.steps(), options.out.display());
+        Ok(exit::say(&format!(
+            "{name}: {made} steps, results in {out}"
+        ))?)
     }
-}
-
-/// Fits the patch transform and writes it with what it keeps.
-fn fit(options: &Options, source: &Source, config: &WakeModelConfig) -> Outcome<Shares> {
-    let device = options.devices()?.remove(0);
-    let count = source.len().min(FITTED);
-    let bar = progress::bar(count, "images for the patch transform");
-    let mut images = Vec::new();
-    for index in 0..count {
-        images.push(source.pair(index)?.image.pixels);
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    let pixels = images.iter().map(Vec::as_slice);
-    let (transform, shares) =
-        PatchTransform::fit(pixels, config.image_size, config.latent_channels, &device);
-    let path = options.out.join("patches.safetensors");
-    save_as(&transform, Layout::Diffusers, &path, Precision::F32)?;
-    let rows: Vec<_> = (1..=64)
-        .map(|c| json!({"channels": c, "variance": shares.kept(c), "psnr_db": finite(shares.psnr(c))}))
-        .collect();
-    std::fs::write(
-        options.out.join("shares.json"),
-        format!("{:#}\n", json!(rows)),
-    )?;
-    Ok(shares)
 }
 
 /// JSON has no infinity: all 64 components lose nothing.
@@ -240,42 +375,33 @@ fn finite(number: f64) -> Option<f64> {
     Some(number).filter(|number| number.is_finite())
 }
 
-/// The patch transform of an earlier run, or a new one.
-fn patches(
-    options: &Options,
-    source: &Source,
-    config: &WakeModelConfig,
-) -> Outcome<PatchTransform> {
-    if !options.out.join("patches.safetensors").exists() {
-        fit(options, source, config)?;
-    }
-    let device = options.devices()?.remove(0);
-    part(
-        PatchTransform::zeros(config.latent_channels, &device),
-        options,
-        "patches.safetensors",
-    )
-}
-
 /// A part of the model with the weights of an earlier stage.
 fn part<M: Module>(module: M, options: &Options, name: &str) -> Outcome<M> {
     Ok(load(module, Layout::Diffusers, &options.out.join(name))?)
 }
 
-/// The widths of the model: those of --config, else those in --out, else the standard ones; written to --out.
+/// The widths of the model: those of --config, else those in --out, else the standard ones.
 fn config(options: &Options) -> Outcome<WakeModelConfig> {
     let written = options.out.join("config.json");
     let file = match &options.config {
         Some(file) => Some(file),
         None => Some(&written).filter(|file| file.exists()),
     };
-    let config = match file {
-        Some(file) => WakeModelConfig::from_json(&std::fs::read_to_string(file)?, file)?,
-        None => WakeModelConfig::standard(&vocabulary()?),
-    };
-    std::fs::create_dir_all(&options.out)?;
-    std::fs::write(&written, serde_json::to_string_pretty(&config)? + "\n")?;
-    Ok(config)
+    Ok(match file {
+        Some(file) => WakeModelConfig::read(file)?,
+        None => WakeModelConfig {
+            scene: trained_scene(options)?,
+            ..WakeModelConfig::standard(&vocabulary()?)
+        },
+    })
+}
+
+/// What the scenes of the data share, as far as a model is not told of it.
+fn trained_scene(options: &Options) -> wake_ldm::Result<Scene> {
+    Ok(match &options.data {
+        Some(path) => Folder::open(path)?.manifest().recipe.scene.clone(),
+        None => Scene::default(),
+    })
 }
 
 /// What prompts about wakes can contain: the words of every wording, and every digit.
@@ -291,42 +417,9 @@ fn vocabulary() -> Result<Vocabulary, wake_text::Error> {
     Ok(Vocabulary::new(ids))
 }
 
-/// Encodes all pairs and the images expected of their scenes, which then stay in memory.
-fn latents(
-    source: &Source,
-    patches: &PatchTransform,
-    config: &WakeModelConfig,
-) -> wake_ldm::Result<LatentSet> {
-    let bar = progress::bar(source.len(), "pairs");
-    let mut set = LatentSet::default();
-    let indices: Vec<u64> = (0..source.len()).collect();
-    let base = config.base_scene();
-    for chunk in indices.chunks(AT_ONCE) {
-        let read = |&index: &u64| -> wake_ldm::Result<_> {
-            let mut pair = source.pair(index)?;
-            let example = Example::of(&pair);
-            let expected = expected_grey(&example.conditions.onto(&base))?;
-            Ok((example, [std::mem::take(&mut pair.image.pixels), expected]))
-        };
-        let pairs: Vec<_> = chunk.par_iter().map(read).collect();
-        for pair in pairs {
-            let (example, images) = pair?;
-            set.push(patches, images, config.image_size, example)?;
-            bar.inc(1);
-        }
-    }
-    bar.finish_and_clear();
-    Ok(set)
-}
-
 fn sheet_examples(source: &Source) -> wake_ldm::Result<Vec<Pair>> {
-    (0..SHEET).map(|index| source.pair(index)).collect()
-}
-
-fn scenes_of(examples: &[Pair], config: &WakeModelConfig) -> Vec<Scene> {
-    let base = config.base_scene();
-    let scene = |pair: &Pair| Example::of(pair).conditions.onto(&base);
-    examples.iter().map(scene).collect()
+    let count = source.len().min(ACROSS);
+    (0..count).map(|index| source.pair(index)).collect()
 }
 
 /// The mean images of some scenes.
@@ -336,7 +429,7 @@ fn expected_images(
     config: &WakeModelConfig,
     examples: &[Pair],
 ) -> wake_ldm::Result<Vec<Vec<f32>>> {
-    let scenes = scenes_of(examples, config);
+    let scenes: Vec<Scene> = examples.iter().map(|pair| pair.scene.clone()).collect();
     let conditions: Vec<Conditions> = scenes.iter().map(Conditions::of_scene).collect();
     let wake = expected_latents(&scenes, patches)?;
     let expected = prior.forward(&Known::new(&conditions, config.grid(), wake));
@@ -348,17 +441,18 @@ fn expected_images(
 
 /// Simulated images above, images of the model below.
 fn sheet(examples: &[Pair], drawn: &[Vec<f32>], path: &Path) -> Outcome<()> {
-    let size = examples[0].image.rows as u32;
-    let mut sheet = image::GrayImage::new(size * examples.len() as u32, 2 * size);
+    let (size, width) = (
+        examples[0].image.rows,
+        examples[0].image.rows * examples.len(),
+    );
+    let mut sheet = vec![0; 2 * size * width];
     for (i, (pair, drawn)) in examples.iter().zip(drawn).enumerate() {
         for (row, pixels) in [(0, &pair.image.pixels), (1, drawn)] {
             for (p, &grey) in pixels.iter().enumerate() {
-                let (x, y) = (p as u32 % size, p as u32 / size);
-                let level = (255.0 * grey).round() as u8;
-                sheet.put_pixel(i as u32 * size + x, row * size + y, image::Luma([level]));
+                let (x, y) = (i * size + p % size, row * size + p / size);
+                sheet[y * width + x] = (255.0 * grey).round() as u8;
             }
         }
     }
-    sheet.save(path)?;
-    Ok(())
+    Ok(output::write_png(path, &sheet, 2 * size, width)?)
 }

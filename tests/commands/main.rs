@@ -2,6 +2,7 @@
 
 #[cfg(feature = "ldm")]
 mod evaluate;
+mod faults;
 #[cfg(feature = "ldm")]
 mod generate;
 #[cfg(feature = "train")]

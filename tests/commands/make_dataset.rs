@@ -123,3 +123,58 @@ fn a_broken_line_or_another_set_is_named_and_left_alone() {
     let data = ["autoencoder", "--data", text(&out)];
     refused_by("train", &data, &["metadata.jsonl, line 2"]);
 }
+
+/// A second process on the same folder is refused by name, and takes nothing from the first.
+#[test]
+fn two_processes_do_not_share_a_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [whole, shared] = ["whole", "shared"].map(|name| folder.path().join(name));
+    let arguments = [&SMALL[..], &["--count", "60", "--jobs", "1"]].concat();
+    let mut first = Command::new(example("make_dataset"))
+        .args(&arguments)
+        .args(["--out", text(&shared)])
+        .stderr(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("an example that starts");
+    while !shared.join("metadata.jsonl").exists() {
+        assert!(first.try_wait().expect("a child").is_none(), "ended early");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let output = super::run(
+        "make_dataset",
+        &[&arguments[..], &["--out", text(&shared)]].concat(),
+    );
+    let message = String::from_utf8(output.stderr).expect("Unicode");
+    if first.try_wait().expect("a child").is_none() {
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains("another process"), "{message}");
+    }
+    assert!(first.wait().expect("an end").success());
+    done("make_dataset", &arguments, &whole);
+    assert!(files(&shared) == files(&whole));
+}
+
+/// Killed at random moments again and again, the set still ends with the bytes of one run.
+#[test]
+fn many_kills_change_no_byte() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [whole, killed] = ["whole", "killed"].map(|name| folder.path().join(name));
+    let arguments = [&SMALL[..], &["--count", "40", "--jobs", "2"]].concat();
+    for k in 0..15_u64 {
+        let mut child = Command::new(example("make_dataset"))
+            .args(&arguments)
+            .args(["--out", text(&killed)])
+            .stderr(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("an example that starts");
+        std::thread::sleep(Duration::from_millis(2 + k * 7919 % 60));
+        // It may have ended.
+        let _ = child.kill();
+        child.wait().expect("an end");
+    }
+    done("make_dataset", &arguments, &killed);
+    done("make_dataset", &arguments, &whole);
+    assert!(files(&killed) == files(&whole));
+}

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::{done, files, refused_by, text};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::{done, example, files, refused_by, refused_into, text};
 
 /// Data of 64 × 64 pixels, and a model that fits it, in a folder.
 fn toys(folder: &Path) {
@@ -111,4 +114,247 @@ fn a_model_in_diffusers_layout_is_fine_tuned_whole_and_by_low_rank_changes() {
             &drawn,
         );
     }
+}
+
+/// A folder, its data and its model, with the arguments that name them.
+struct Toys {
+    folder: tempfile::TempDir,
+}
+
+impl Toys {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        toys(folder.path());
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn arguments(&self, stage: &[&str]) -> Vec<String> {
+        let (set, config) = (self.path("set"), self.path("model.json"));
+        let common = [
+            "--data",
+            text(&set),
+            "--config",
+            text(&config),
+            "--batch",
+            "2",
+        ];
+        stage
+            .iter()
+            .chain(&common)
+            .map(ToString::to_string)
+            .collect()
+    }
+
+    fn train(&self, stage: &[&str]) -> String {
+        let arguments = self.arguments(stage);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        done("train", &arguments, &self.path("run"))
+    }
+
+    fn refused(&self, stage: &[&str], words: &[&str]) {
+        let arguments = self.arguments(stage);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        refused_into("train", &arguments, words, &self.path("run"));
+    }
+}
+
+/// Weights of one run never come out of another: a folder is of one run, and what differs is named.
+#[test]
+fn a_folder_belongs_to_one_run() {
+    let toys = Toys::new();
+    toys.train(&["words", "--steps", "3"]);
+    let out = toys.path("run");
+    toys.refused(
+        &["words", "--steps", "2"],
+        &["stage words has made 3 steps", "--resume"],
+    );
+    toys.refused(
+        &["words", "--steps", "4", "--resume", "--rate", "1e-2"],
+        &["rate = 0.001", "expected 0.01"],
+    );
+    toys.refused(
+        &["words", "--steps", "4", "--resume", "--seed", "5"],
+        &["seed = 0", "expected 5"],
+    );
+    toys.train(&["mean", "--steps", "1"]);
+    let other = toys.path("other");
+    let size = [
+        "--set",
+        "scene.grid.rows=64",
+        "--set",
+        "scene.grid.columns=64",
+    ];
+    done(
+        "make_dataset",
+        &[&size[..], &["--count", "4", "--seed", "9"]].concat(),
+        &other,
+    );
+    let config = toys.path("model.json");
+    let arguments = [
+        "mean",
+        "--resume",
+        "--data",
+        text(&other),
+        "--config",
+        text(&config),
+    ];
+    refused_into(
+        "train",
+        &arguments,
+        &["data.set.count = 10", "expected 4"],
+        &out,
+    );
+}
+
+/// Whatever was lost after the last checkpoint, a resumed run makes what it promised.
+#[test]
+fn results_are_made_again_from_the_last_checkpoint() {
+    let toys = Toys::new();
+    toys.train(&["words", "--steps", "2"]);
+    toys.train(&["mean", "--steps", "2"]);
+    toys.train(&["diffusion", "--steps", "2", "--every", "1"]);
+    let out = toys.path("run");
+    let before = files(&out);
+    let results = [
+        "flow.safetensors",
+        "sheet.png",
+        "prior.safetensors",
+        "reader.safetensors",
+    ];
+    for name in results {
+        // As a kill leaves them: one is missing, the others are of an earlier checkpoint.
+        std::fs::remove_file(out.join(name)).expect("a result");
+    }
+    let record = std::fs::read_to_string(out.join("run.json")).expect("a record");
+    let stale = record.replace("\"results_after\": 2", "\"results_after\": 1");
+    assert_ne!(record, stale);
+    std::fs::write(out.join("run.json"), stale).expect("a file");
+    std::fs::write(out.join("flow.safetensors"), "old").expect("a file");
+    toys.train(&["diffusion", "--steps", "2", "--resume"]);
+    let after = files(&out);
+    for name in results {
+        assert!(after[Path::new(name)] == before[Path::new(name)], "{name}");
+    }
+}
+
+/// Killed at random moments until it is done, a run ends with the weights of one that nobody killed.
+#[test]
+fn many_kills_change_no_weight() {
+    let toys = Toys::new();
+    let (whole, killed) = (toys.path("whole"), toys.path("run"));
+    let arguments = toys.arguments(&["words", "--steps", "30", "--every", "2"]);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    done("train", &arguments, &whole);
+    let resumed = [&arguments[..], &["--resume"]].concat();
+    let has_begun = || {
+        let checkpoints = std::fs::read_dir(killed.join("checkpoints/words"));
+        checkpoints.is_ok_and(|entries| {
+            let names = entries.filter_map(|entry| Some(entry.ok()?.file_name()));
+            names
+                .into_iter()
+                .any(|name| name.to_string_lossy().starts_with("step-"))
+        })
+    };
+    for k in 0..12_u64 {
+        let arguments = if has_begun() { &resumed } else { &arguments };
+        let mut child = Command::new(example("train"))
+            .args(arguments)
+            .args(["--out", text(&killed)])
+            .stderr(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("an example that starts");
+        std::thread::sleep(Duration::from_millis(50 + k * 7919 % 400));
+        // It may have ended.
+        let _ = child.kill();
+        child.wait().expect("an end");
+    }
+    let last = if has_begun() { &resumed } else { &arguments };
+    done("train", last, &killed);
+    let file = |folder: &Path, name: &str| std::fs::read(folder.join(name)).expect("a file");
+    let name = "reader.safetensors";
+    assert!(file(&whole, name) == file(&killed, name));
+    let temporary = files(&killed)
+        .into_keys()
+        .find(|path| text(path).ends_with(".tmp"));
+    assert_eq!(temporary, None);
+}
+
+#[test]
+fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
+    let toys = Toys::new();
+    let config = toys.path("model.json");
+    for (rows, columns) in [("8", "8"), ("32", "96"), ("128", "128")] {
+        let set = toys.path(&format!("{rows}x{columns}"));
+        let (rows_set, columns_set) = (
+            format!("scene.grid.rows={rows}"),
+            format!("scene.grid.columns={columns}"),
+        );
+        done(
+            "make_dataset",
+            &["--set", &rows_set, "--set", &columns_set, "--count", "1"],
+            &set,
+        );
+        let pixels = format!("{rows} × {columns} pixels");
+        for stage in ["autoencoder", "mean", "diffusion"] {
+            let arguments = [stage, "--data", text(&set), "--config", text(&config)];
+            refused_by("train", &arguments, &[&pixels, "64 × 64"]);
+        }
+    }
+    for rate in ["nan", "inf", "1e300", "0", "-1"] {
+        let rate = format!("--rate={rate}");
+        for stage in ["words", "mean", "diffusion"] {
+            refused_by("train", &[stage, &rate], &["rate is", "outside"]);
+        }
+    }
+    let count = ["mean", "--count", "18446744073709551615"];
+    refused_by("train", &count, &["--count", "10000000"]);
+}
+
+/// Fewer pairs than a sheet shows are pairs to learn from, too.
+#[test]
+fn a_set_of_three_images_is_learnt() {
+    let toys = Toys::new();
+    let (set, out) = (toys.path("three"), toys.path("run"));
+    let size = [
+        "--set",
+        "scene.grid.rows=64",
+        "--set",
+        "scene.grid.columns=64",
+    ];
+    done(
+        "make_dataset",
+        &[&size[..], &["--count", "3"]].concat(),
+        &set,
+    );
+    let config = toys.path("model.json");
+    let common = ["--data", text(&set), "--config", text(&config)];
+    done(
+        "train",
+        &[&["mean", "--steps", "1", "--batch", "2"], &common[..]].concat(),
+        &out,
+    );
+    assert!(out.join("sheet.png").is_file());
+}
+
+/// A model is told of no polarisation: images of another than its own would teach it what nobody can ask for.
+#[test]
+fn scenes_that_the_model_is_not_told_of_are_refused_by_name() {
+    let toys = Toys::new();
+    let set = toys.path("other");
+    let changes = [
+        "scene.grid.rows=64",
+        "scene.grid.columns=64",
+        "scene.radar.polarization=HH",
+    ];
+    let mut arguments = vec!["--count", "1"];
+    arguments.extend(changes.iter().flat_map(|change| ["--set", *change]));
+    done("make_dataset", &arguments, &set);
+    let config = toys.path("model.json");
+    let arguments = ["mean", "--data", text(&set), "--config", text(&config)];
+    refused_by("train", &arguments, &["radar.polarization", "HH", "VV"]);
 }

@@ -139,7 +139,10 @@ fn rooms_meet_only_where_they_may() {
     let mut wrong = Vec::new();
     let models = ["stable_diffusion", "wake_model"];
     let foreign: [(&str, &[&str]); 2] = [
-        ("wake_physics", &["error", "wake_model", "dataset", "train"]),
+        (
+            "wake_physics",
+            &["error", "files", "wake_model", "dataset", "train"],
+        ),
         (
             "wake_text",
             &["error", "stable_diffusion", "wake_model", "dataset"],

@@ -133,6 +133,10 @@ pub enum Error {
     #[error("cannot start a thread: {source}; use fewer threads")]
     Threads { source: std::io::Error },
 
+    /// Training went astray.
+    #[error("training diverged at step {step}: {what}; lower the rate, or look at the data")]
+    Diverged { step: usize, what: String },
+
     /// A device computes other numbers than the reference backend.
     #[error(
         "device {device} computes wrong numbers: {stage} differs by {difference:e} of its largest \

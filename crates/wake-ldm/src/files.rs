@@ -1,27 +1,26 @@
 //! Text files that are read to a limit, and files that are either whole or not there.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Read, Write};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
+use wake_physics::output;
 
 /// No configuration file is longer than this.
 const LONGEST_TEXT: u64 = 16 << 20;
 
-/// Tells apart the files that one process writes at the same time.
-static COUNTER: AtomicU64 = AtomicU64::new(0);
-
 /// Reads a configuration file.
 pub(crate) fn read_text(path: &Path) -> Result<String> {
     let io = |source| unreadable(path, source);
-    if fs::metadata(path).map_err(io)?.len() > LONGEST_TEXT {
-        return Err(io(std::io::Error::other(
-            "longer than 16 MiB, so no configuration",
-        )));
+    let mut text = String::new();
+    let mut file = File::open(path).map_err(io)?.take(LONGEST_TEXT + 1);
+    file.read_to_string(&mut text).map_err(io)?;
+    if text.len() as u64 > LONGEST_TEXT {
+        let message = "longer than 16 MiB, so no configuration";
+        return Err(io(std::io::Error::other(message)));
     }
-    fs::read_to_string(path).map_err(io)
+    Ok(text)
 }
 
 /// The error for a file that cannot be read.
@@ -46,27 +45,12 @@ pub(crate) fn write_atomically(
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(failed)?;
     }
-    let number = COUNTER.fetch_add(1, Ordering::Relaxed);
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = path.with_file_name(format!(".{name}.{}-{number}.tmp", std::process::id()));
-    let written = write_all(&temporary, write).and_then(|()| fs::rename(&temporary, path));
-    if written.is_err() {
-        // The write failed already; a left-over temporary file is the lesser trouble.
-        fs::remove_file(&temporary).ok();
-    }
-    written.map_err(failed)
-}
-
-fn write_all(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let mut writer = BufWriter::with_capacity(1 << 20, File::create_new(path)?);
-    write(&mut writer)?;
-    writer
-        .into_inner()
-        .map_err(std::io::IntoInnerError::into_error)?
-        .sync_all()
+    let synced = |writer: &mut BufWriter<File>| {
+        write(writer)?;
+        writer.flush()?;
+        writer.get_ref().sync_all()
+    };
+    output::write_with(path, synced).map_err(failed)
 }
 
 /// Writes a text file that is either whole or not there.
@@ -96,5 +80,14 @@ mod tests {
         ));
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn devices_without_end_are_read_to_the_limit() {
+        let path = Path::new("/dev/zero");
+        if path.exists() {
+            let refused = read_text(path).unwrap_err().to_string();
+            assert!(refused.contains("longer than 16 MiB"), "{refused}");
+        }
     }
 }

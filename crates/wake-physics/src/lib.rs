@@ -85,7 +85,8 @@ mod plan;
 mod simulate;
 pub mod measure;
 
-pub use error::{Error, Result};
+pub use error::{Error, Result, quoted, sentence};
+pub use memory::available as available_memory;
 pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;

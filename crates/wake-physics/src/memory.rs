@@ -1,10 +1,12 @@
 //! Will the fields fit? Asked before anything is computed.
 
 use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
 
 /// Checks that `needed` bytes for a grid are free.
 ///
-/// Where the system does not tell (only Linux is asked, through `/proc/meminfo`) nothing is refused.
+/// What is free is what the machine has left or, where less, what the limits of the control groups of this process
+/// leave (containers). Where the system does not tell (only Linux is asked) nothing is refused.
 ///
 /// # Errors
 ///
@@ -24,8 +26,59 @@ pub(crate) fn check([rows, columns]: [usize; 2], margin: [usize; 2], needed: u64
 
 const GIB: f64 = (1u64 << 30) as f64;
 
-fn available() -> Option<u64> {
-    parse(&std::fs::read_to_string("/proc/meminfo").ok()?)
+/// Bytes of memory that this process can still have; `None` where the system does not tell.
+pub fn available() -> Option<u64> {
+    let machine = parse(&std::fs::read_to_string("/proc/meminfo").ok()?)?;
+    let groups = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let group = limits(&groups, Path::new("/sys/fs/cgroup"));
+    Some(group.map_or(machine, |group| group.min(machine)))
+}
+
+/// The least memory that a control group of this process leaves, of the second version or the first; `None` without a
+/// limit.
+///
+/// - `groups`: content of `/proc/self/cgroup`, lines `0::/PATH` or `N:memory:/PATH`
+/// - `root`: where the groups are mounted
+fn limits(groups: &str, root: &Path) -> Option<u64> {
+    let number =
+        |path: PathBuf| -> Option<u64> { std::fs::read_to_string(path).ok()?.trim().parse().ok() };
+    let left = |folder: &Path, limit: &str, used: &str, cache: &str| {
+        // "max" is no number: no limit.
+        let limit = number(folder.join(limit))?;
+        let used = number(folder.join(used))?;
+        let stat = std::fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
+        let cached = stat
+            .lines()
+            .find_map(|line| line.strip_prefix(cache)?.trim().parse().ok());
+        // Files that were read stay in memory until it is needed.
+        Some(limit.saturating_sub(used.saturating_sub(cached.unwrap_or(0))))
+    };
+    let mut least = None;
+    for line in groups.lines() {
+        let mut fields = line.splitn(3, ':').skip(1);
+        let (Some(kind), Some(path)) = (fields.next(), fields.next()) else {
+            continue;
+        };
+        let root = match kind {
+            "" => root.to_owned(),
+            "memory" => root.join("memory"),
+            _ => continue,
+        };
+        // A container sees its own group as the root; a parent's limit holds below it, too.
+        let path = root.join(path.trim_start_matches('/'));
+        for folder in path
+            .ancestors()
+            .take_while(|folder| folder.starts_with(&root))
+        {
+            let new = left(folder, "memory.max", "memory.current", "inactive_file ");
+            let old = || {
+                let names = ["memory.limit_in_bytes", "memory.usage_in_bytes"];
+                left(folder, names[0], names[1], "total_inactive_file ")
+            };
+            least = least.into_iter().chain(new.or_else(old)).min();
+        }
+    }
+    least
 }
 
 /// The line `MemAvailable:  123 kB` of `/proc/meminfo`, in bytes.
@@ -45,6 +98,40 @@ mod tests {
         assert_eq!(parse(text), Some(2 << 20));
         assert_eq!(parse("MemTotal: 10 kB"), None);
         assert_eq!(parse("MemAvailable: lots"), None);
+    }
+
+    /// Trees as the kernel shows them, of both versions.
+    #[test]
+    fn the_limit_of_a_container_is_read() {
+        let tree = tempfile::tempdir().unwrap();
+        let root = tree.path();
+        let put = |name: &str, text: &str| {
+            let path = root.join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        let groups = "0::/a/b\n";
+        assert_eq!(limits(groups, root), None);
+        put("a/b/memory.max", "max\n");
+        put("a/b/memory.current", "50\n");
+        assert_eq!(limits(groups, root), None);
+        // The parent has the limit; 30 of what it uses are files that can go.
+        put("a/memory.max", "1000\n");
+        put("a/memory.current", "130\n");
+        put("a/memory.stat", "anon 70\ninactive_file 30\n");
+        assert_eq!(limits(groups, root), Some(900));
+        put("a/b/memory.max", "60\n");
+        assert_eq!(limits(groups, root), Some(10));
+        assert_eq!(limits("0::/\n", root), None);
+        let old = "7:cpu,cpuacct:/c\n6:memory:/c\n";
+        put("memory/c/memory.limit_in_bytes", "500\n");
+        put("memory/c/memory.usage_in_bytes", "700\n");
+        assert_eq!(limits(old, root), Some(0));
+        put(
+            "memory/c/memory.stat",
+            "inactive_file 1\ntotal_inactive_file 300\n",
+        );
+        assert_eq!(limits(old, root), Some(100));
     }
 
     #[test]

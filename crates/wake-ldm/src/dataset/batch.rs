@@ -1,7 +1,6 @@
 //! Pairs as tensors: the only file of the data set that knows burn.
 
-use super::epochs::Epochs;
-use super::folder::Folder;
+use super::folder::{Epochs, Folder};
 use super::ordered::Ordered;
 use super::pair::Pair;
 use super::scenes::Simulated;
@@ -41,14 +40,26 @@ impl Batcher<Pair, Batch> for ToBatch {
     }
 }
 
-/// Endless: [`burn::data::dataset::transform::PartialDataset`] cuts an epoch out of it.
-impl Dataset<Pair> for Simulated {
+/// The first pairs of a source, as a data set of burn.
+#[derive(Debug, Clone)]
+pub struct Finite<S> {
+    /// The source.
+    pub source: S,
+    /// How many pairs.
+    pub length: usize,
+}
+
+impl<S: Source> Dataset<Pair> for Finite<S> {
     fn get(&self, index: usize) -> Result<Pair, DatasetError> {
-        self.pair(index as u64).map_err(DatasetError::new)
+        if index >= self.length {
+            let message = format!("no pair {index}, there are {}", self.length);
+            return Err(DatasetError::new(std::io::Error::other(message)));
+        }
+        self.source.pair(index as u64).map_err(DatasetError::new)
     }
 
     fn len(&self) -> usize {
-        usize::MAX
+        self.length
     }
 }
 
@@ -62,8 +73,8 @@ impl Dataset<Pair> for Folder {
     }
 }
 
-/// An endless sequence of pairs.
-pub trait Endless: Send + Sync + 'static {
+/// An endless sequence of pairs, each with the scene that made its image.
+pub trait Source: Send + Sync + 'static {
     /// The pair at a position, always the same.
     ///
     /// # Errors
@@ -72,13 +83,13 @@ pub trait Endless: Send + Sync + 'static {
     fn pair(&self, position: u64) -> Result<Pair>;
 }
 
-impl Endless for Simulated {
+impl Source for Simulated {
     fn pair(&self, position: u64) -> Result<Pair> {
         Self::pair(self, position)
     }
 }
 
-impl Endless for Epochs {
+impl Source for Epochs {
     fn pair(&self, position: u64) -> Result<Pair> {
         Self::pair(self, position)
     }
@@ -121,7 +132,7 @@ impl Batches {
     /// # Errors
     ///
     /// [`Error::Threads`](crate::Error::Threads) if the system gives no thread.
-    pub fn new(source: impl Endless, loading: Loading, device: &Device) -> Result<Self> {
+    pub fn new(source: impl Source, loading: Loading, device: &Device) -> Result<Self> {
         let indices = loading.start_index..u64::MAX;
         let pairs = Ordered::new(indices, loading.threads, move |index| source.pair(index))?;
         Ok(Self {
@@ -146,7 +157,6 @@ mod tests {
     use super::*;
     use crate::dataset::{Manifest, Recipe, write};
     use burn::data::dataloader::DataLoaderBuilder;
-    use burn::data::dataset::transform::PartialDataset;
 
     fn source() -> Simulated {
         let changes = [
@@ -166,7 +176,7 @@ mod tests {
     }
 
     /// Indices and pixels of the first batches.
-    fn first(source: impl Endless, loading: Loading, batches: usize) -> Vec<(Vec<u64>, Vec<f32>)> {
+    fn first(source: impl Source, loading: Loading, batches: usize) -> Vec<(Vec<u64>, Vec<f32>)> {
         let of = |batch: Batch| {
             assert_eq!(batch.images.dims(), [3, 1, 16, 24]);
             let indices = batch.pairs.iter().map(|pair| pair.index).collect();
@@ -208,7 +218,10 @@ mod tests {
             .batch_size(3)
             .num_workers(2)
             .set_device(device)
-            .build(PartialDataset::new(source(), 0, 6));
+            .build(Finite {
+                source: source(),
+                length: 6,
+            });
         let mut batches: Vec<(Vec<u64>, Vec<f32>)> = loader
             .iter()
             .map(|batch| {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use wake_physics::grey::GreyScale;
 
 /// Version of the layout; a reader refuses others.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// What a data set is: the content of its `dataset.json`, from which every other file follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -108,7 +108,10 @@ impl Manifest {
             return Ok(None);
         };
         if manifest.format != FORMAT {
-            let message = format!("format {} is not {FORMAT}", manifest.format);
+            let message = format!(
+                "format {} is not {FORMAT}; make the set again with this version",
+                manifest.format
+            );
             return Err(broken(&path, 1, message));
         }
         manifest.shard = read_json(&Layout(folder).shard_note())?;

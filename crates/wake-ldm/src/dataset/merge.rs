@@ -1,7 +1,7 @@
 //! Joins the shards of a data set into the set that one run would have made.
 
 use super::layout::{Layout, Manifest, Shard, broken, cannot};
-use super::log::{Rows, parse};
+use super::metadata::{Rows, parse};
 use super::write::{claim, finish, is_text};
 use crate::error::Result;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub fn merge(folder: &Path) -> Result<Manifest> {
         shard: None,
         ..shards[0].1.clone()
     };
-    claim(folder, &manifest_text(&shards[0].0)?, None)?;
+    let _lock = claim(folder, &manifest_text(&shards[0].0)?, None)?;
     for (path, manifest) in &shards {
         move_files(folder, path, manifest)?;
     }

@@ -19,7 +19,6 @@
 //! ```
 
 // Which scenes.
-mod parameters;
 mod ranges;
 mod recipe;
 mod scenes;
@@ -30,28 +29,26 @@ mod pair;
 mod prompts;
 
 // Pairs ⇄ folder.
-mod boxes;
-mod coco;
-mod epochs;
+mod annotations;
 mod folder;
 mod layout;
-mod log;
 mod merge;
-mod row;
+mod metadata;
 mod write;
-mod yolo;
 
 mod batch;
 
-pub use batch::{Batch, Batches, Endless, Loading, ToBatch};
-pub use epochs::Epochs;
-pub use folder::Folder;
+pub use batch::{Batch, Batches, Finite, Loading, Source, ToBatch};
+pub(crate) use folder::shuffled;
+pub use folder::{Epochs, Folder};
 pub use layout::{Manifest, Shard};
 pub use merge::{merge, shard_folder};
 pub use pair::{Grey, Pair};
-pub use parameters::Parameters;
 pub use prompts::Prompts;
 pub use ranges::{Place, Ranges};
 pub use recipe::{Draw, Recipe};
 pub use scenes::Simulated;
 pub use write::{Progress, write};
+
+#[cfg(test)]
+mod tests;

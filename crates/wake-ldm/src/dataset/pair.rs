@@ -1,12 +1,11 @@
 //! One image with its words, numbers and labels.
 
-use super::parameters::Parameters;
 use super::scenes::Simulated;
 use crate::error::Result;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
-use wake_physics::{Field, Simulator, labels_of};
+use wake_physics::{Field, Scene, Simulator, labels_of};
 
 /// A picture in grey 0…1.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +18,7 @@ pub struct Grey {
     pub pixels: Vec<f32>,
 }
 
-/// An image with its prompt, the numbers it was made from, and its labels.
+/// An image with its prompt, the scene it was made from, and its labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
     /// Its number in the data set.
@@ -28,8 +27,8 @@ pub struct Pair {
     pub image: Grey,
     /// The scene in words.
     pub prompt: String,
-    /// The scene in numbers.
-    pub parameters: Parameters,
+    /// The scene that was drawn.
+    pub scene: Scene,
     /// What is where.
     pub labels: Labels,
 }
@@ -78,8 +77,8 @@ impl Simulated {
                 pixels: Vec::new(),
             },
             prompt: self.wording(index).prompt(&scene)?,
-            parameters: Parameters::of(&scene),
             labels: labels_of(&scene),
+            scene,
         })
     }
 }

@@ -3,11 +3,9 @@
 use super::scenes::Simulated;
 use crate::conditioning::Conditions;
 use crate::error::Result;
-use crate::noise::NoiseSource;
+use crate::noise::{NoiseSource, uniform};
 use wake_text::{PartialScene, Wording};
 
-/// Stream that wordings, orders and gaps are drawn from.
-const STREAM: u32 = 1002;
 /// Draws of one prompt.
 const DRAWS: u64 = 8;
 /// Part of the prompts whose sentences are moved about.
@@ -34,7 +32,7 @@ impl Prompts {
     /// [`Error::Text`](crate::Error::Text) for a scene that no prompt can state.
     pub fn prompt(&self, position: u64) -> Result<(String, Conditions)> {
         let random = NoiseSource::new(self.scenes.seed());
-        let draw = |i: u64| random.uniform(STREAM, position * DRAWS + i);
+        let draw = |i: u64| random.uniform(uniform::PROMPTS, position * DRAWS + i);
         let wording = Wording::ALL[(draw(0) * Wording::ALL.len() as f64) as usize];
         let text = wording.prompt(&self.scenes.scene(position))?;
         let text = if draw(1) < MOVED {

@@ -1,9 +1,9 @@
 //! Scenes drawn from ranges.
 
-use super::parameters::with_length;
 use crate::error::{Error, Result, check_range};
-use crate::noise::NoiseSource;
-use serde::{Deserialize, Serialize};
+use crate::noise::{NoiseSource, uniform};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::cmp::Ordering;
 use wake_physics::Scene;
 use wake_physics::scene::Ship;
@@ -22,18 +22,25 @@ pub struct Ranges {
     /// Where the ship is.
     pub place: Place,
     /// Ship speed [m/s].
+    #[serde(deserialize_with = "two")]
     pub ship_speed: Range,
     /// Where the ship moves to [deg clockwise from azimuth].
+    #[serde(deserialize_with = "two")]
     pub ship_heading: Range,
     /// Length of the ship \[m\], in steps of 0.1; beam and draft keep their proportion to it.
+    #[serde(deserialize_with = "two")]
     pub ship_length: Range,
     /// Wind speed at 10 m height [m/s].
+    #[serde(deserialize_with = "two")]
     pub wind_speed: Range,
     /// Where the wind blows to [deg clockwise from azimuth].
+    #[serde(deserialize_with = "two")]
     pub wind_toward: Range,
     /// Fetch \[m\].
+    #[serde(deserialize_with = "two")]
     pub fetch: Range,
     /// Incidence angle \[deg\].
+    #[serde(deserialize_with = "two")]
     pub incidence: Range,
 }
 
@@ -83,7 +90,7 @@ enum Value {
 impl Ranges {
     /// Scene number `index`: `base` with the drawn values in place of its own, not yet rounded.
     pub(super) fn scene(&self, base: &Scene, source: NoiseSource, index: u64) -> Scene {
-        let draw = |value: Value| source.uniform(value as u32, index);
+        let draw = |value: Value| source.uniform(uniform::VALUES + value as u32, index);
         if draw(Value::OpenSea) < self.open_sea {
             let scene = self.set(base, draw);
             return Scene {
@@ -139,11 +146,26 @@ impl Ranges {
                 });
             }
         }
+        // Where the fetch is no positive number it has no logarithm to draw from.
+        for fetch in self.fetch {
+            let mut scene = base.clone();
+            scene.sea.fetch = fetch;
+            scene.validate()?;
+        }
         for end in [0.0, 1.0] {
             self.set(base, |_| end).validate()?;
         }
         Ok(())
     }
+}
+
+/// Exactly two numbers.
+fn two<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Range, D::Error> {
+    let numbers = Vec::<f64>::deserialize(deserializer)?;
+    let count = numbers.len();
+    let expected =
+        |_| D::Error::custom(format!("{count} numbers, expected the two ends of a range"));
+    numbers.try_into().map_err(expected)
 }
 
 fn tenths(value: f64) -> f64 {
@@ -155,4 +177,19 @@ fn place(pixels: usize, spacing: f64, at: f64) -> f64 {
     let first = -((pixels / 2) as f64);
     let pixel = first + at * (pixels - 1) as f64;
     tenths(spacing * pixel)
+}
+
+/// A ship of another length; beam and draft keep their proportion to it, in steps of 0.1 mm, so that every reader of
+/// JSON gets the same numbers.
+fn with_length(ship: &Ship, length: f64) -> Ship {
+    if length == ship.length {
+        return ship.clone();
+    }
+    let scaled = |size: f64| (1e4 * size * length / ship.length).round() / 1e4;
+    Ship {
+        length,
+        beam: scaled(ship.beam),
+        draft: scaled(ship.draft),
+        ..ship.clone()
+    }
 }

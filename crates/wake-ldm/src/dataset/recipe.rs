@@ -4,8 +4,8 @@ use super::ranges::Ranges;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use wake_physics::Scene;
 use wake_physics::scene::Grid;
+use wake_physics::{Scene, sentence};
 
 /// Which scenes a data set has, and how they become images and prompts.
 ///
@@ -90,12 +90,7 @@ impl Recipe {
     ///
     /// [`Error::Io`] if the file cannot be read, else as [`Recipe::from_toml`].
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
-            action: "read",
-            path: path.to_owned(),
-            source,
-        })?;
-        Self::from_toml(&text)
+        Self::from_toml(&crate::files::read_text(path)?)
     }
 
     /// The recipe with assignments such as `scene.radar.looks=1` made, in order, then checked.
@@ -122,7 +117,9 @@ impl Recipe {
     }
 
     fn merged(&self, text: &str) -> Result<Self> {
-        let fail = |message: String| Error::Recipe { message };
+        let fail = |message: String| Error::Recipe {
+            message: sentence(&message),
+        };
         let changes: toml::Table = toml::from_str(text).map_err(|e| fail(one_line(text, &e)))?;
         let mut table = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
         merge(&mut table, changes);

@@ -2,14 +2,10 @@
 
 use super::recipe::{Draw, Recipe};
 use crate::error::Result;
-use crate::noise::NoiseSource;
+use crate::noise::{NoiseSource, uniform};
 use wake_physics::Scene;
 use wake_physics::scene::paper_grid;
 use wake_text::{PartialScene, Wording};
-
-/// Streams of random numbers beside those of the values that are drawn.
-const SEA_STREAM: u32 = 1000;
-const WORDING_STREAM: u32 = 1001;
 
 /// Number of scenes in the paper's grid.
 const PAPER_SCENES: u64 = 3456;
@@ -59,7 +55,7 @@ impl Simulated {
         };
         let mut scene = PartialScene::of(&drawn).onto(&drawn).unwrap_or(drawn);
         // 52 bits: every reader of JSON takes them for a whole number.
-        scene.seed = (random.uniform(SEA_STREAM, index) * (1u64 << 52) as f64) as u64;
+        scene.seed = (random.uniform(uniform::SEEDS, index) * (1u64 << 52) as f64) as u64;
         scene
     }
 
@@ -69,7 +65,7 @@ impl Simulated {
             return Wording::Paper;
         }
         let count = Wording::ALL.len();
-        let draw = NoiseSource::new(self.seed).uniform(WORDING_STREAM, index);
+        let draw = NoiseSource::new(self.seed).uniform(uniform::WORDINGS, index);
         Wording::ALL[(draw * count as f64) as usize % count]
     }
 }
@@ -84,5 +80,282 @@ fn paper_scene(index: u64, base: &Scene) -> Scene {
 }
 
 #[cfg(test)]
-#[path = "scenes_tests.rs"]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::dataset::{Place, Ranges};
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn simulated(ranges: Ranges, seed: u64) -> Simulated {
+        let recipe = Recipe {
+            draw: Draw::Ranges(ranges),
+            ..Recipe::default()
+        };
+        Simulated::new(recipe, seed).unwrap()
+    }
+
+    /// A range within [min, max].
+    fn range(min: f64, max: f64) -> impl Strategy<Value = [f64; 2]> {
+        (min..=max, min..=max).prop_map(|(a, b)| [a.min(b), a.max(b)])
+    }
+
+    prop_compose! {
+        fn ranges()(
+            open_sea in 0.0..=1.0_f64,
+            random in any::<bool>(),
+            ship_speed in range(0.0, 40.0),
+            ship_heading in range(-400.0, 400.0),
+            ship_length in range(30.0, 500.0),
+            wind_speed in range(0.0, 30.0),
+            wind_toward in range(-400.0, 400.0),
+            fetch in range(100.0, 1e7),
+            incidence in range(5.0, 75.0),
+        ) -> Ranges {
+            let place = if random { Place::Random } else { Place::Fixed };
+            Ranges {
+                open_sea, place, ship_speed, ship_heading, ship_length, wind_speed, wind_toward, fetch, incidence,
+            }
+        }
+    }
+
+    /// Whether a value lies in a range, but for rounding to a step.
+    fn within(value: f64, [low, high]: [f64; 2], step: f64) -> bool {
+        let slack = 0.5 * step * (1.0 + 1e-9) + 1e-9;
+        (low - slack..=high + slack).contains(&value)
+    }
+
+    /// Whether a direction lies in a range, give or take full turns and half a degree.
+    fn turned_within(value: f64, range: [f64; 2]) -> bool {
+        (-3..=3).any(|turn| within(value + 360.0 * f64::from(turn), range, 1.0))
+    }
+
+    proptest! {
+        #[test]
+        fn drawn_values_lie_in_their_ranges(ranges in ranges(), seed in any::<u64>(), index in any::<u64>()) {
+            let source = simulated(ranges.clone(), seed);
+            let scene = source.scene(index);
+            prop_assert!(scene.validate().is_ok());
+            prop_assert!(within(scene.sea.wind_speed, ranges.wind_speed, 0.1));
+            prop_assert!(turned_within(scene.sea.wind_toward, ranges.wind_toward));
+            prop_assert!(within(scene.sea.fetch, ranges.fetch, 1.0));
+            prop_assert!(within(scene.radar.incidence, ranges.incidence, 1.0));
+            if let Some(ship) = &scene.ship {
+                prop_assert!(within(ship.speed, ranges.ship_speed, 0.1));
+                prop_assert!(turned_within(ship.heading, ranges.ship_heading));
+                prop_assert!(within(ship.length, ranges.ship_length, 0.1));
+                // Half a step of 0.1 mm on a length of 30 m or more, and rounding.
+                prop_assert!((ship.beam / ship.length - 26.0 / 195.0).abs() < 0.5e-4 / 30.0 + 1e-12);
+                // 256 pixels of 4 m around pixel 128.
+                for coordinate in [ship.position[0], -ship.position[1]] {
+                    let reach = if ranges.place == Place::Random { [-512.0, 508.0] } else { [0.0, 0.0] };
+                    prop_assert!(within(coordinate, reach, 0.1));
+                }
+            }
+        }
+
+        /// A scene depends on nothing but recipe, seed and index; every wording states all that was drawn.
+        #[test]
+        fn scenes_repeat_and_are_fully_stated(ranges in ranges(), seed in any::<u64>(), index in any::<u64>()) {
+            let source = simulated(ranges.clone(), seed);
+            let scene = source.scene(index);
+            let _others: Vec<_> = (0..3).map(|i| source.scene(i)).collect();
+            prop_assert_eq!(&simulated(ranges, seed).scene(index), &scene);
+            // A line of JSON gives it back to the bit.
+            let line = serde_json::to_string(&scene).unwrap();
+            prop_assert_eq!(&serde_json::from_str::<Scene>(&line).unwrap(), &scene);
+            for wording in Wording::ALL {
+                let said = PartialScene::read(&wording.prompt(&scene).unwrap()).unwrap();
+                prop_assert_eq!(&said.onto(&scene).unwrap(), &scene);
+            }
+        }
+    }
+
+    #[test]
+    fn draws_are_independent_and_even() {
+        let source = simulated(Ranges::default(), 3);
+        let n = 4000;
+        let scenes: Vec<Scene> = (0..n).map(|i| source.scene(i)).collect();
+        let ships: Vec<_> = scenes.iter().filter_map(|s| s.ship.clone()).collect();
+        // Five standard deviations of a binomial count.
+        let empty = (n as usize - ships.len()) as f64;
+        assert!((empty - 0.2 * n as f64).abs() < 5.0 * (0.16 * n as f64).sqrt());
+        let share = |values: &[f64], [low, high]: [f64; 2]| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            (mean - low) / (high - low)
+        };
+        // Five standard errors of the mean of n uniform numbers, √(1/12 n).
+        let even = |values: Vec<f64>, range| {
+            let allowed = 5.0 / (12.0 * values.len() as f64).sqrt();
+            assert!((share(&values, range) - 0.5).abs() < allowed, "{range:?}");
+        };
+        even(ships.iter().map(|s| s.speed).collect(), [6.0, 12.0]);
+        even(
+            ships.iter().map(|s| s.position[0]).collect(),
+            [-512.0, 508.0],
+        );
+        even(
+            ships.iter().map(|s| s.position[1]).collect(),
+            [-508.0, 512.0],
+        );
+        even(
+            scenes.iter().map(|s| s.sea.wind_speed).collect(),
+            [3.0, 7.0],
+        );
+        even(
+            scenes.iter().map(|s| s.radar.incidence).collect(),
+            [16.0, 32.0],
+        );
+        let fetch = scenes.iter().map(|s| s.sea.fetch.ln()).collect();
+        even(fetch, [10e3_f64.ln(), 70e3_f64.ln()]);
+        // Uncorrelated: the mean of a product of two centred uniform numbers is within 5 of its √(1/144 n).
+        let products = ships
+            .iter()
+            .map(|s| (s.speed - 9.0) / 6.0 * (s.heading / 360.0 - 0.5));
+        let mean = products.sum::<f64>() / ships.len() as f64;
+        assert!(mean.abs() < 5.0 / (144.0 * ships.len() as f64).sqrt());
+        let seeds: BTreeSet<u64> = scenes.iter().map(|s| s.seed).collect();
+        assert_eq!(seeds.len(), n as usize);
+        assert!(seeds.iter().all(|&seed| seed < 1 << 53));
+    }
+
+    #[test]
+    fn other_seeds_make_other_scenes() {
+        let [one, two] = [1, 2].map(|seed| simulated(Ranges::default(), seed));
+        assert!((0..50).all(|i| one.scene(i) != two.scene(i)));
+    }
+
+    /// Every scene of the grid once, all other values at their defaults; the next round differs in its seas.
+    #[test]
+    fn the_papers_grid_is_complete_and_mixed() {
+        let source = Simulated::new(Recipe::paper(), 5).unwrap();
+        let text = |scene: &Scene| {
+            Scene {
+                seed: 7,
+                ..scene.clone()
+            }
+            .to_toml()
+            .unwrap()
+        };
+        let walked: Vec<Scene> = (0..PAPER_SCENES).map(|i| source.scene(i)).collect();
+        let all: BTreeSet<String> = walked.iter().map(text).collect();
+        assert_eq!(all, paper_grid().map(|s| text(&s)).collect());
+        let again = source.scene(PAPER_SCENES + 17);
+        assert_eq!(text(&again), text(&walked[17]));
+        assert_ne!(again.seed, walked[17].seed);
+        // The first 24 already have every speed, heading, wind, direction, fetch and incidence.
+        let distinct = |value: fn(&Scene) -> f64| {
+            let values: BTreeSet<u64> = walked[..24].iter().map(|s| value(s).to_bits()).collect();
+            values.len()
+        };
+        let counts = [
+            distinct(|s| s.ship.as_ref().unwrap().speed),
+            distinct(|s| s.ship.as_ref().unwrap().heading),
+            distinct(|s| s.sea.wind_speed),
+            distinct(|s| s.sea.wind_toward),
+            distinct(|s| s.sea.fetch),
+            distinct(|s| s.radar.incidence),
+        ];
+        assert_eq!(counts, [4, 8, 3, 4, 3, 3]);
+    }
+
+    #[test]
+    fn paraphrases_take_every_wording() {
+        let recipe = Recipe {
+            paraphrase: true,
+            ..Recipe::default()
+        };
+        let source = Simulated::new(recipe, 1).unwrap();
+        let count = |wording| (0..400).filter(|&i| source.wording(i) == wording).count();
+        // Five standard deviations of a binomial count of 400 at 1/4.
+        assert!(Wording::ALL.iter().all(|&w| count(w).abs_diff(100) < 44));
+    }
+
+    #[test]
+    fn a_recipe_file_changes_what_it_names() {
+        let text = "speckle = true\n[scene.grid]\nrows = 96\n[draw.ranges]\nship_speed = [8, 9]\nplace = \"fixed\"";
+        let recipe = Recipe::from_toml(text).unwrap();
+        let expected = Ranges {
+            ship_speed: [8.0, 9.0],
+            place: Place::Fixed,
+            ..Ranges::default()
+        };
+        assert_eq!(recipe.draw, Draw::Ranges(expected));
+        assert!(recipe.speckle);
+        let grid = &recipe.scene.grid;
+        assert_eq!((grid.rows, grid.columns), (96, 256));
+        assert_eq!(Recipe::from_toml("").unwrap(), Recipe::default());
+        let paper = Recipe::from_toml("draw = \"paper-grid\"").unwrap();
+        assert_eq!(paper.draw, Draw::PaperGrid);
+        let json = serde_json::to_string(&recipe).unwrap();
+        assert_eq!(serde_json::from_str::<Recipe>(&json).unwrap(), recipe);
+    }
+
+    #[test]
+    fn assignments_take_toml_values_and_bare_words() {
+        let changes = [
+            "speckle=true",
+            "draw.ranges.place = fixed",
+            "draw.ranges.fetch=[1e4, 2e4]",
+            "scene.ship.hull=full",
+        ];
+        let recipe = Recipe::default().with_assignments(&changes).unwrap();
+        let expected = Ranges {
+            place: Place::Fixed,
+            fetch: [1e4, 2e4],
+            ..Ranges::default()
+        };
+        assert_eq!(recipe.draw, Draw::Ranges(expected));
+        assert!(recipe.speckle);
+        assert_eq!(
+            Recipe::default()
+                .with_assignments(&["draw=paper-grid"])
+                .unwrap()
+                .draw,
+            Draw::PaperGrid
+        );
+        for bad in ["speckle", "=3", "speckle=maybe", "scene.sea"] {
+            assert!(Recipe::default().with_assignments(&[bad]).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn bad_recipes_are_refused_by_name() {
+        for (text, word) in [
+            ("speckles = true", "speckles"),
+            ("draw = \"papers\"", "papers"),
+            ("[draw.ranges]\nspeed = [1, 2]", "speed"),
+            ("[draw.ranges]\nship_speed = [9, 8]", "ship_speed"),
+            ("[draw.ranges]\nship_speed = [1, nan]", "ship_speed"),
+            (
+                "[draw.ranges]\nship_speed = [1, 41]",
+                "ship.speed is 41, outside 0 to 40",
+            ),
+            (
+                "[draw.ranges]\nship_length = [0.5, 20]",
+                "ship.length is 0.5",
+            ),
+            ("[draw.ranges]\nfetch = [1, 1e4]", "sea.fetch"),
+            (
+                "[draw.ranges]\nfetch = [0, 1]",
+                "sea.fetch is 0, outside 100",
+            ),
+            (
+                "[draw.ranges]\nfetch = [-1, 1e4]",
+                "sea.fetch is -1, outside 100",
+            ),
+            ("[draw.ranges]\nship_speed = [6, 8, 12]", "3 numbers"),
+            ("[scene.ship]\nposition = [1, 2, 3]", "3 numbers"),
+            ("[draw.ranges]\nopen_sea = 1.5", "open_sea is 1.5"),
+            ("[draw.ranges]\nplace = \"left\"", "left"),
+            ("[scene.sea]\nwind = 3", "wind"),
+            ("[scene.grid]\nrows = 0", "grid.rows"),
+            ("speckle = [", "line 1"),
+        ] {
+            let message = Recipe::from_toml(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+            assert_eq!(message.lines().count(), 1, "{message}");
+        }
+        let message = Recipe::read(std::path::Path::new("no/such.toml")).unwrap_err();
+        assert!(message.to_string().contains("no/such.toml"), "{message}");
+    }
+}

@@ -1,14 +1,12 @@
 //! Makes a data set in a folder, or what is missing of it.
 
-use super::coco::Coco;
+use super::annotations::{Coco, data_yaml, yolo};
 use super::layout::{Layout, Manifest, Shard, broken, cannot};
-use super::log::{Log, Rows, echo};
+use super::metadata::{Log, Row, Rows, echo};
 use super::ordered::Ordered;
-use super::row::Row;
-use super::yolo::{data_yaml, yolo};
 use crate::error::Result;
 use std::path::Path;
-use wake_physics::output;
+use wake_physics::output::{self, FolderLock};
 
 /// How far a data set is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +34,7 @@ pub fn write(
     jobs: usize,
     mut watch: impl FnMut(Progress),
 ) -> Result<()> {
-    claim(folder, &manifest.text()?, manifest.shard)?;
+    let _lock = claim(folder, &manifest.text()?, manifest.shard)?;
     let mut log = Log::open(folder, manifest)?;
     let missing = missing(folder, manifest, log.rows.len());
     let total = manifest.indices().end - manifest.indices().start;
@@ -60,8 +58,10 @@ pub fn write(
 }
 
 /// Takes a folder that is empty, or that an earlier run began for the same `dataset.json` and shard.
-pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Result<()> {
-    output::make_folder(folder)?;
+///
+/// The folder is this process's until the lock is dropped.
+pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Result<FolderLock> {
+    let lock = output::lock_folder(folder)?;
     let layout = Layout(folder);
     let path = layout.manifest();
     match Manifest::read(folder)? {
@@ -85,9 +85,7 @@ pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Resu
     for inner in [layout.images(), layout.labels()] {
         output::make_folder(&inner)?;
     }
-    [folder, &layout.images(), &layout.labels()]
-        .into_iter()
-        .try_for_each(sweep)
+    Ok(lock)
 }
 
 /// Whether a file has exactly this content.
@@ -104,24 +102,9 @@ fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
             let name = e.file_name();
             let name = name.to_string_lossy();
             let own_note = shard.is_some() && name == "shard.json";
-            own_note || name.starts_with("shard-") || is_temporary(&name)
+            own_note || name.starts_with("shard-") || output::is_temporary(&e.path())
         })
     }))
-}
-
-fn is_temporary(name: &str) -> bool {
-    name.starts_with('.') && name.ends_with(".tmp")
-}
-
-/// Removes the half-written files of a killed run.
-fn sweep(folder: &Path) -> Result<()> {
-    for entry in std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))? {
-        let entry = entry.map_err(|e| cannot("read", folder, e))?;
-        if is_temporary(&entry.file_name().to_string_lossy()) {
-            std::fs::remove_file(entry.path()).map_err(|e| cannot("remove", &entry.path(), e))?;
-        }
-    }
-    Ok(())
 }
 
 /// Indices without a line, or without their files.
@@ -161,7 +144,10 @@ fn make(
 /// Writes what is known only at the end.
 pub(super) fn finish(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<()> {
     let (layout, grid) = (Layout(folder), &manifest.recipe.scene.grid);
-    let coco = Coco::of(rows, [grid.rows, grid.columns]);
+    let images = rows
+        .iter()
+        .map(|(index, row)| (*index, row.file_name.as_str(), &row.objects));
+    let coco = Coco::of(images, [grid.rows, grid.columns]);
     output::write_json(&layout.coco(), &coco)?;
     output::write_atomically(&layout.yolo(), data_yaml().as_bytes())?;
     Ok(())

@@ -27,6 +27,8 @@ pub type Tensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 pub struct Checkpoint {
     /// Steps made.
     pub step: usize,
+    /// Those of them that changed the weights.
+    pub applied: usize,
     /// Whatever is no tensor.
     pub state: Value,
     /// Weights, averages.
@@ -34,7 +36,8 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Writes the checkpoint below a folder and removes all but the two newest.
+    /// Writes the checkpoint below a folder and removes all but the two newest, and what killed runs left: a folder
+    /// belongs to one run and one process, see [`RunFolder`](super::RunFolder).
     ///
     /// # Errors
     ///
@@ -53,12 +56,25 @@ impl Checkpoint {
             fs::remove_dir_all(&temporary).ok();
         }
         written.map_err(|source| io("write", &target, source))?;
+        sweep(folder)?;
         let mut old = checkpoints(folder)?;
         old.truncate(old.len().saturating_sub(KEPT));
         for (_, path) in old {
             fs::remove_dir_all(&path).map_err(|source| io("remove", &path, source))?;
         }
         Ok(target)
+    }
+
+    /// What keeps a run of this `state` from going on here, if anything does.
+    pub(super) fn differs(&self, state: &Value) -> Option<Error> {
+        let (key, there, here) = difference("", &self.state, state)?;
+        Some(Error::InvalidOption {
+            option: "checkpoint".to_owned(),
+            value: format!("of a run with {key} = {there}"),
+            expected: format!(
+                "{here}; go on with what it was begun with, or choose another folder"
+            ),
+        })
     }
 
     fn write_files(&self, folder: &Path) -> std::io::Result<()> {
@@ -73,7 +89,8 @@ impl Checkpoint {
             part.push((name, shape, numbers));
         }
         write_part(folder, number, &part)?;
-        let state = serde_json::json!({"step": self.step, "state": self.state});
+        let state =
+            serde_json::json!({"step": self.step, "applied": self.applied, "state": self.state});
         fs::write(folder.join("state.json"), format!("{state:#}\n"))?;
         for entry in fs::read_dir(folder)? {
             fs::File::open(entry?.path())?.sync_all()?;
@@ -93,6 +110,11 @@ impl Checkpoint {
         }
     }
 
+    /// The step of the newest checkpoint below a folder.
+    pub(super) fn newest_step(folder: &Path) -> Result<Option<usize>> {
+        Ok(checkpoints(folder)?.pop().map(|(step, _)| step))
+    }
+
     /// Reads one checkpoint.
     ///
     /// # Errors
@@ -101,8 +123,21 @@ impl Checkpoint {
     pub fn read(path: &Path) -> Result<Self> {
         let file = path.join("state.json");
         let text = fs::read_to_string(&file).map_err(|source| io("read", &file, source))?;
-        let mut state: Value =
-            serde_json::from_str(&text).map_err(|source| Error::Json { path: file, source })?;
+        let mut state: Value = serde_json::from_str(&text).map_err(|source| Error::Json {
+            path: file.clone(),
+            source,
+        })?;
+        let count = |key: &str| {
+            let count = state[key].as_u64().and_then(|n| usize::try_from(n).ok());
+            count.ok_or_else(|| Error::Dataset {
+                path: file.clone(),
+                line: 0,
+                message: format!(
+                    "no whole number '{key}'; remove this checkpoint to go on from the one before"
+                ),
+            })
+        };
+        let (step, applied) = (count("step")?, count("applied")?);
         let mut tensors = Tensors::new();
         let entries = fs::read_dir(path).map_err(|source| io("read", path, source))?;
         for entry in entries {
@@ -115,10 +150,40 @@ impl Checkpoint {
             }
         }
         Ok(Self {
-            step: state["step"].as_u64().unwrap_or(0) as usize,
+            step,
+            applied,
             state: state["state"].take(),
             tensors,
         })
+    }
+}
+
+/// The first value in which two trees differ: its path, and both values.
+pub(super) fn difference(path: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
+    let below = |key: &str| match path {
+        "" => key.to_owned(),
+        _ => format!("{path}.{key}"),
+    };
+    match (a, b) {
+        _ if a == b => None,
+        (Value::Object(x), Value::Object(y)) => {
+            let keys: std::collections::BTreeSet<&String> = x.keys().chain(y.keys()).collect();
+            let find = |key: &String| difference(&below(key), &a[key], &b[key]);
+            keys.into_iter().find_map(find)
+        }
+        (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
+            let find = |k: usize| difference(&below(&k.to_string()), &x[k], &y[k]);
+            (0..x.len()).find_map(find)
+        }
+        _ => Some((path.to_owned(), short(a), short(b))),
+    }
+}
+
+/// A value in a few words.
+fn short(value: &Value) -> String {
+    match value {
+        Value::Null => "nothing".to_owned(),
+        _ => value.to_string().chars().take(80).collect(),
     }
 }
 
@@ -128,6 +193,17 @@ fn io(action: &'static str, path: &Path, source: std::io::Error) -> Error {
         path: path.to_owned(),
         source,
     }
+}
+
+/// Removes checkpoints half-written.
+fn sweep(folder: &Path) -> Result<()> {
+    for entry in fs::read_dir(folder).map_err(|source| io("read", folder, source))? {
+        let path = entry.map_err(|source| io("read", folder, source))?.path();
+        if wake_physics::output::is_temporary(&path) {
+            fs::remove_dir_all(&path).map_err(|source| io("remove", &path, source))?;
+        }
+    }
+    Ok(())
 }
 
 /// The checkpoints below a folder, the newest last.
@@ -197,6 +273,7 @@ mod tests {
         let large = vec![0.25; 2_000_000];
         Checkpoint {
             step,
+            applied: step - 1,
             state: serde_json::json!({"seed": 3}),
             tensors: BTreeMap::from([
                 (
@@ -245,11 +322,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         checkpoint(7).write(folder.path()).unwrap();
         // What a killed run leaves behind has another name.
-        fs::create_dir(folder.path().join(".step-00000009.1.tmp")).unwrap();
+        let half = folder.path().join(".step-00000009.1.tmp");
+        fs::create_dir(&half).unwrap();
         assert_eq!(
             Checkpoint::newest(folder.path()).unwrap().map(|c| c.step),
             Some(7)
         );
+        checkpoint(8).write(folder.path()).unwrap();
+        assert!(!half.exists());
+        fs::remove_dir_all(folder.path().join("step-00000008")).unwrap();
         let file = folder.path().join("step-00000007/tensors-000.safetensors");
         fs::write(&file, b"short").unwrap();
         let refused = Checkpoint::newest(folder.path());

@@ -4,10 +4,9 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use half::f16;
 use rayon::prelude::*;
-use wake_physics::scene::Ship;
+use wake_physics::Scene;
 
 use crate::conditioning::{Conditions, MapGrid};
-use crate::dataset::Pair;
 use crate::error::{Error, Result};
 use crate::network::{Known, PatchTransform, Prior};
 
@@ -15,35 +14,12 @@ use crate::network::{Known, PatchTransform, Prior};
 const RESIDUALS: usize = 8;
 
 /// One example beside its latents.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Example {
-    /// The scene's numbers.
-    pub conditions: Conditions,
+    /// The scene that made the image.
+    pub scene: Scene,
     /// Mean grey of the image.
     pub grey: f32,
-}
-
-impl Example {
-    /// The numbers of a pair; its mean grey follows from its image.
-    pub fn of(pair: &Pair) -> Self {
-        let values = &pair.parameters;
-        let conditions = Conditions {
-            ship: Some(values.ship),
-            ship_length: values.ship.then(|| Ship::default().length),
-            depth: Some(f64::INFINITY),
-            ship_speed: values.ship_speed,
-            ship_heading: values.ship_heading,
-            ship_position: values.ship_x.zip(values.ship_y).map(|(x, y)| [x, y]),
-            wind_speed: Some(values.wind_speed),
-            wind_toward: Some(values.wind_toward),
-            fetch: Some(values.fetch),
-            incidence: Some(values.incidence),
-        };
-        Self {
-            conditions,
-            grey: 0.0,
-        }
-    }
 }
 
 /// Latents of many images and of the images expected of their scenes, 16 bits a number.
@@ -59,18 +35,25 @@ impl LatentSet {
     /// Encodes an image and adds it.
     ///
     /// - `images`: the image and the one expected of its scene, [`expected_grey`](crate::network::expected_grey), each
-    ///   `size × size` pixels in rows
+    ///   with the pixels of the scene's grid in rows
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for an image of another size than those before.
+    /// [`Error::InvalidOption`] for an image that is not square, or of another size than its grid or those before.
     pub fn push(
         &mut self,
         transform: &PatchTransform,
         images: [Vec<f32>; 2],
-        size: usize,
-        mut example: Example,
+        scene: Scene,
     ) -> Result<()> {
+        let (size, columns) = (scene.grid.rows, scene.grid.columns);
+        if size != columns || images.iter().any(|image| image.len() != size * size) {
+            return Err(Error::InvalidOption {
+                option: "grid".to_owned(),
+                value: format!("{size} x {columns} pixels"),
+                expected: format!("a square of {} pixels", images[0].len()),
+            });
+        }
         let data = TensorData::new(images.concat(), [2, 1, size, size]);
         let device = transform.devices().into_iter().next().unwrap_or_default();
         let (latents, grey) = transform.encode(Tensor::from_data(data, &device));
@@ -84,12 +67,12 @@ impl LatentSet {
             });
         }
         self.shape = shape;
-        example.grey = grey.narrow(0, 0, 1).into_scalar::<f32>();
+        let grey = grey.narrow(0, 0, 1).into_scalar::<f32>();
         let latents = halves(latents);
         let (image, expected) = latents.split_at(latents.len() / 2);
         self.latents.extend(image);
         self.expected.extend(expected);
-        self.examples.push(example);
+        self.examples.push(Example { scene, grey });
         Ok(())
     }
 
@@ -113,10 +96,7 @@ impl LatentSet {
 
     fn residual(&self, indices: &[usize], prior: &Prior, grid: MapGrid) -> Vec<f16> {
         let device = prior.devices().into_iter().next().unwrap_or_default();
-        let conditions: Vec<Conditions> = indices
-            .iter()
-            .map(|&i| self.examples[i].conditions)
-            .collect();
+        let conditions = self.conditions(indices);
         let wake = self.expected(indices, &device);
         let expected = prior.forward(&Known::new(&conditions, grid, wake));
         halves(expected.residual(self.latents(indices, &device)))
@@ -140,6 +120,12 @@ impl LatentSet {
     /// One example.
     pub fn example(&self, index: usize) -> &Example {
         &self.examples[index]
+    }
+
+    /// What the model is told of some examples.
+    pub(super) fn conditions(&self, indices: &[usize]) -> Vec<Conditions> {
+        let scenes = indices.iter().map(|&i| &self.examples[i].scene);
+        scenes.map(Conditions::of_scene).collect()
     }
 
     /// Some latent pixels of one example, `[channels, cells]`.

@@ -1,11 +1,12 @@
 //! What a run reports: one JSON object a line, and how long it still takes.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Value, json};
+use wake_physics::output;
 
 use super::trainer::StepReport;
 use crate::error::{Error, Result};
@@ -25,7 +26,8 @@ impl Metrics {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] when the file cannot be read or written.
+    /// [`Error::Io`] when the file cannot be read or written, [`Error::Dataset`] with the number of a line that is none
+    /// of a log.
     pub fn open(path: &Path, step: usize) -> Result<Self> {
         let io = |source| Error::Io {
             action: "write",
@@ -35,10 +37,8 @@ impl Metrics {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(io)?;
         }
-        let kept = kept_lines(path, step).map_err(io)?;
-        let temporary = path.with_extension("tmp");
-        fs::write(&temporary, kept).map_err(io)?;
-        fs::rename(&temporary, path).map_err(io)?;
+        let kept = kept_lines(path, step)?;
+        output::write_atomically(path, kept.as_bytes())?;
         Ok(Self {
             file: OpenOptions::new().append(true).open(path).map_err(io)?,
             path: path.to_owned(),
@@ -78,21 +78,33 @@ impl Metrics {
     }
 }
 
-/// The lines of the first `step` steps.
-fn kept_lines(path: &Path, step: usize) -> std::io::Result<String> {
-    let file = match File::open(path) {
-        Ok(file) => file,
+/// The lines of the first `step` steps; half a line at the end, which a kill left, is dropped.
+fn kept_lines(path: &Path, step: usize) -> Result<String> {
+    let bytes = match fs::read(path) {
+        Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
-        Err(error) => return Err(error),
+        Err(source) => return Err(crate::files::unreadable(path, source)),
     };
+    let whole = bytes
+        .iter()
+        .rposition(|&byte| byte == b'\n')
+        .map_or(0, |n| n + 1);
     let mut kept = String::new();
-    for line in BufReader::new(file).lines() {
-        let line = line?;
-        let parsed: Option<Value> = serde_json::from_str(&line).ok();
+    for (number, line) in bytes[..whole]
+        .split_inclusive(|&byte| byte == b'\n')
+        .enumerate()
+    {
+        let parsed: Option<Value> = serde_json::from_slice(line).ok();
         let made = parsed.and_then(|line| line["step"].as_u64());
-        if made.is_some_and(|made| made <= step as u64) {
-            kept.push_str(&line);
-            kept.push('\n');
+        let (Some(made), Ok(text)) = (made, std::str::from_utf8(line)) else {
+            return Err(Error::Dataset {
+                path: path.to_owned(),
+                line: number + 1,
+                message: "no line of a log of steps; move the file away to go on".to_owned(),
+            });
+        };
+        if made <= step as u64 {
+            kept.push_str(text);
         }
     }
     Ok(kept)
@@ -132,5 +144,18 @@ mod tests {
             })
             .collect();
         assert_eq!(steps, [1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn a_broken_line_is_named_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("words.jsonl");
+        for bad in [&b"{\"step\": \xff}"[..], b"nonsense", b"[]"] {
+            let text = [b"{\"step\": 1}\n", bad, b"\n{\"step\": 2}\n"].concat();
+            fs::write(&path, &text).unwrap();
+            let refused = Metrics::open(&path, 5).unwrap_err().to_string();
+            assert!(refused.contains("words.jsonl, line 2"), "{refused}");
+            assert_eq!(fs::read(&path).unwrap(), text);
+        }
     }
 }

@@ -26,14 +26,36 @@ pub trait Task<M>: Sync {
 }
 
 /// Constants of a [`Run`].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RunOptions {
     /// Examples of a batch.
     pub batch: usize,
     /// Seed of everything that is drawn.
     pub seed: u64,
+    /// What the run learns from, such as the manifest of its data set: a checkpoint of another is refused.
+    pub identity: Value,
     /// The loop.
     pub trainer: TrainerOptions,
+}
+
+impl RunOptions {
+    /// Checks that batches can be cut and steps be made.
+    ///
+    /// # Errors
+    ///
+    /// As [`TrainerOptions::validate`], and [`Error::InvalidOption`] for a batch that cannot be cut evenly.
+    pub fn validate(&self, devices: usize) -> Result<()> {
+        self.trainer.validate()?;
+        let parts = devices * self.trainer.accumulation;
+        if parts > 0 && self.batch > 0 && self.batch.is_multiple_of(parts) {
+            return Ok(());
+        }
+        Err(Error::InvalidOption {
+            option: "batch".to_owned(),
+            value: self.batch.to_string(),
+            expected: format!("a multiple of the {parts} parts that devices and accumulation make"),
+        })
+    }
 }
 
 /// A run that trains one part of a [`WakeModel`](crate::network::WakeModel).
@@ -53,7 +75,7 @@ impl<M: Module> Run<M> {
     ///
     /// # Errors
     ///
-    /// As [`WakeModelConfig::validate`], and [`Error::InvalidOption`] for a batch that cannot be cut evenly.
+    /// As [`WakeModelConfig::validate`] and [`RunOptions::validate`].
     pub fn new(
         part: &str,
         config: &WakeModelConfig,
@@ -62,22 +84,14 @@ impl<M: Module> Run<M> {
         devices: Vec<Device>,
     ) -> Result<Self> {
         config.validate()?;
-        let parts = devices.len() * options.trainer.accumulation;
-        if parts == 0 || !options.batch.is_multiple_of(parts) || options.batch == 0 {
-            return Err(Error::InvalidOption {
-                option: "batch".to_owned(),
-                value: options.batch.to_string(),
-                expected: format!(
-                    "a multiple of the {parts} parts that devices and accumulation make"
-                ),
-            });
-        }
+        options.validate(devices.len())?;
         devices[0].seed(options.seed);
         let model = init(config, &devices[0]);
         Ok(Self {
             trainer: Trainer::new(model, options.trainer, devices),
             state: json!({
                 "part": part, "model": config, "seed": options.seed, "batch": options.batch,
+                "identity": options.identity, "trainer": options.trainer.state(),
             }),
             options,
         })
@@ -87,7 +101,7 @@ impl<M: Module> Run<M> {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for a checkpoint of another part or model, or another seed or batch.
+    /// [`Error::InvalidOption`] with the first value in which the checkpoint's run differs from this one.
     pub fn resume(&mut self, checkpoint: Checkpoint) -> Result<()> {
         self.trainer.restore(checkpoint, &self.state)
     }
@@ -96,9 +110,9 @@ impl<M: Module> Run<M> {
     ///
     /// # Errors
     ///
-    /// As [`Checkpoint::write`].
+    /// [`Error::Diverged`] for weights that are no finite numbers, else as [`Checkpoint::write`].
     pub fn checkpoint(&self, folder: &Path) -> Result<PathBuf> {
-        self.trainer.checkpoint(&self.state).write(folder)
+        self.trainer.checkpoint(&self.state)?.write(folder)
     }
 
     /// Steps made so far.
@@ -112,7 +126,11 @@ impl<M: Module> Run<M> {
     }
 
     /// One step on the next batch; the terms are means over the batch.
-    pub fn step(&mut self, task: &impl Task<M>) -> (StepReport, Terms) {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Diverged`] when many steps in a row, or all of the run, had no finite loss and gradient.
+    pub fn step(&mut self, task: &impl Task<M>) -> Result<(StepReport, Terms)> {
         let parts = self.trainer.parts();
         let each = (self.options.batch / parts) as u64;
         let first = (self.trainer.steps() * self.options.batch) as u64;
@@ -124,7 +142,8 @@ impl<M: Module> Run<M> {
             loss
         });
         let terms = terms.into_inner().unwrap_or_else(PoisonError::into_inner);
-        (report, mean_terms(&terms))
+        self.trainer.check()?;
+        Ok((report, mean_terms(&terms)))
     }
 }
 

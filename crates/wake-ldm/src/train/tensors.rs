@@ -6,21 +6,21 @@ use burn::tensor::{DType, Gradients, Tensor};
 use crate::nn::cast_to;
 
 /// Names and shapes of all parameters, in the order of [`values`].
-pub fn names<M: Module>(module: &M) -> Vec<(String, Vec<usize>)> {
+pub(super) fn names<M: Module>(module: &M) -> Vec<(String, Vec<usize>)> {
     let mut lister = Names::default();
     module.visit(&mut lister);
     lister.found
 }
 
 /// The parameters, flat, outside autodiff.
-pub fn values<M: Module>(module: &M) -> Vec<Tensor<1>> {
+pub(super) fn values<M: Module>(module: &M) -> Vec<Tensor<1>> {
     let mut lister = Values { found: Vec::new() };
     module.visit(&mut lister);
     lister.found
 }
 
 /// The gradients of all parameters, flat, of 32 bits; zeros where the loss does not depend on one.
-pub fn gradients<M: Module>(module: &M, gradients: Gradients) -> Vec<Tensor<1>> {
+pub(super) fn gradients<M: Module>(module: &M, gradients: Gradients) -> Vec<Tensor<1>> {
     let mut lister = Differentials {
         gradients,
         found: Vec::new(),
@@ -34,7 +34,7 @@ pub fn gradients<M: Module>(module: &M, gradients: Gradients) -> Vec<Tensor<1>> 
 /// # Panics
 ///
 /// When the list is not one that [`values`] could give for this module.
-pub fn replaced<M: Module>(module: M, values: Vec<Tensor<1>>) -> M {
+pub(super) fn replaced<M: Module>(module: M, values: Vec<Tensor<1>>) -> M {
     let mut replacer = Replacer {
         values: values.into_iter(),
     };

@@ -7,9 +7,11 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use burn::module::Module;
 use burn::tensor::{DType, Device, Tensor};
+use serde_json::Value;
 
+use super::trainer::Trainer;
 use super::*;
-use crate::conditioning::{Conditions, Vocabulary};
+use crate::conditioning::Vocabulary;
 use crate::dataset::{Prompts, Recipe, Simulated};
 use crate::network::{Flow, PatchTransform, WakeModelConfig};
 
@@ -42,20 +44,12 @@ fn set() -> (LatentSet, PatchTransform) {
     let (transform, _) = PatchTransform::fit(images.iter().map(Vec::as_slice), SIZE, 4, &device);
     let mut set = LatentSet::default();
     for (i, image) in images.into_iter().enumerate() {
-        let example = Example {
-            conditions: Conditions {
-                ship: Some(true),
-                ship_speed: Some(8.0),
-                ship_heading: Some((i as f64).to_degrees()),
-                ship_position: Some([0.0, 0.0]),
-                ..Conditions::default()
-            },
-            grey: 0.0,
-        };
+        let mut scene = config().base_scene();
+        let ship = scene.ship.as_mut().unwrap();
+        (ship.speed, ship.heading) = (8.0, (i as f64).to_degrees());
         // What is expected shows half of the wave.
         let expected = image.iter().map(|g| 0.5 + 0.5 * (g - 0.5)).collect();
-        let images = [image, expected];
-        set.push(&transform, images, SIZE, example).unwrap();
+        set.push(&transform, [image, expected], scene).unwrap();
     }
     (set, transform)
 }
@@ -64,6 +58,7 @@ fn options(accumulation: usize) -> RunOptions {
     RunOptions {
         batch: 4,
         seed: 5,
+        identity: Value::Null,
         trainer: TrainerOptions {
             rate: Rate {
                 peak: 3e-3,
@@ -106,7 +101,9 @@ fn advance(
         config: &config(),
         seed: 5,
     };
-    (0..steps).map(|_| run.step(&task).0.loss).collect()
+    (0..steps)
+        .map(|_| run.step(&task).unwrap().0.loss)
+        .collect()
 }
 
 /// The same start for several runs: random initialisation draws from a generator that other tests share.
@@ -228,7 +225,7 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
         grid: config().grid(),
         seed: 5,
     };
-    let steps: Vec<(StepReport, Terms)> = (0..300).map(|_| run.step(&task)).collect();
+    let steps: Vec<(StepReport, Terms)> = (0..300).map(|_| run.step(&task).unwrap()).collect();
     let losses: Vec<f64> = steps.iter().map(|(report, _)| report.loss).collect();
     let [_, late] = early_and_late(&losses);
     // Latents have variance 1: both terms of the loss are ½ where nothing is known but that.
@@ -261,7 +258,7 @@ fn a_reader_learns_to_tell_prompts_apart() {
         prompts: &prompts,
         vocabulary: &vocabulary,
     };
-    let losses: Vec<f64> = (0..60).map(|_| run.step(&task).0.loss).collect();
+    let losses: Vec<f64> = (0..60).map(|_| run.step(&task).unwrap().0.loss).collect();
     let [early, late] = early_and_late(&losses);
     assert!(late < 0.6 * early, "{early} {late}");
 }

@@ -1,12 +1,18 @@
 //! One step of training, on one device or several.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
+use serde_json::{Value, json};
 
-use super::adam::{Adam, AdamOptions};
-use super::average::Average;
-use super::rate::Rate;
-use super::tensors::{gradients, replaced, rounded, values};
+use super::checkpoint::{Checkpoint, Tensors};
+use super::optimizer::{Adam, AdamOptions, Average, Rate};
+use super::tensors::{gradients, names, replaced, rounded, values};
+use crate::error::{Error, Result, check_range};
+
+/// Groups of a checkpoint's tensors, in the order of [`Trainer::state`].
+const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
+/// So many steps in a row without a finite gradient end a run.
+const LOST: usize = 20;
 
 /// Constants of a [`Trainer`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +49,46 @@ impl Default for TrainerOptions {
     }
 }
 
+impl TrainerOptions {
+    /// Checks that steps of these sizes can be made.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] with the constant at fault.
+    pub fn validate(&self) -> Result<()> {
+        let AdamOptions {
+            beta_1,
+            beta_2,
+            epsilon,
+            weight_decay,
+        } = self.adam;
+        check_range("rate", self.rate.peak, 1e-12, 1.0)?;
+        check_range("beta_1", beta_1, 0.0, 0.9999)?;
+        check_range("beta_2", beta_2, 0.0, 0.999999)?;
+        check_range("epsilon", epsilon, 1e-16, 1.0)?;
+        check_range("weight_decay", weight_decay, 0.0, 1.0)?;
+        check_range("largest_norm", self.largest_norm, 1e-6, 1e6)?;
+        check_range("average_decay", self.average_decay, 0.0, 0.999999)?;
+        check_range("accumulation", self.accumulation as f64, 1.0, 65536.0)
+    }
+
+    /// What two runs must have in common for one to go on from the other; more steps may be asked of the second, and
+    /// `accumulation` changes no result.
+    pub(super) fn state(&self) -> Value {
+        let AdamOptions {
+            beta_1,
+            beta_2,
+            epsilon,
+            weight_decay,
+        } = self.adam;
+        json!({
+            "rate": self.rate.peak, "warmup": self.rate.warmup, "beta_1": beta_1, "beta_2": beta_2,
+            "epsilon": epsilon, "weight_decay": weight_decay, "largest_norm": self.largest_norm,
+            "average_decay": self.average_decay, "bf16": self.bf16,
+        })
+    }
+}
+
 /// What a step did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
@@ -61,13 +107,18 @@ pub struct StepReport {
 /// With several devices each computes the gradients of its own parts of the batch; they are averaged on the first
 /// device, which makes the step, as one device would with the whole batch.
 #[derive(Debug)]
-pub struct Trainer<M> {
+pub(super) struct Trainer<M> {
     model: M,
     adam: Adam,
     average: Average,
     options: TrainerOptions,
     devices: Vec<Device>,
+    /// Steps made.
     step: usize,
+    /// Those that changed the weights: what optimizer and average count.
+    applied: usize,
+    /// Steps since the last of them.
+    lost: usize,
 }
 
 impl<M: Module> Trainer<M> {
@@ -76,62 +127,74 @@ impl<M: Module> Trainer<M> {
     /// # Panics
     ///
     /// When there is no device.
-    pub fn new(model: M, options: TrainerOptions, devices: Vec<Device>) -> Self {
+    pub(super) fn new(model: M, options: TrainerOptions, devices: Vec<Device>) -> Self {
         let model = model.fork(devices.first().expect("at least one device"));
         let weights = values(&model);
         Self {
-            adam: Adam::new(options.adam, &weights),
+            adam: Adam::new(options.adam, weights.len()),
             average: Average::new(weights, options.average_decay),
             model,
             options,
             devices,
             step: 0,
+            applied: 0,
+            lost: 0,
         }
     }
 
-    /// Goes back to what it was after `step` steps; the lists are those of [`state`](Self::state).
-    pub fn resume(&mut self, [weights, average, first, second]: [Vec<Tensor<1>>; 4], step: usize) {
-        self.model = replaced(self.model.clone(), weights);
-        self.average = Average::new(average, self.options.average_decay);
-        self.adam = Adam::resumed(self.options.adam, [first, second], step);
-        self.step = step;
-    }
-
     /// Weights, averaged weights, and both averages of the optimizer.
-    pub fn state(&self) -> [Vec<Tensor<1>>; 4] {
-        let [first, second] = self.adam.state();
-        [
-            values(&self.model),
-            self.average.values().to_vec(),
-            first.to_vec(),
-            second.to_vec(),
-        ]
+    pub(super) fn state(&self) -> [Vec<Tensor<1>>; 4] {
+        let weights = values(&self.model);
+        let [first, second] = self.adam.averages(&weights);
+        [weights, self.average.values().to_vec(), first, second]
     }
 
     /// The model as it is now, on its autodiff device.
-    pub fn model(&self) -> &M {
+    pub(super) fn model(&self) -> &M {
         &self.model
     }
 
     /// The model with averaged weights, outside autodiff.
-    pub fn averaged(&self) -> M {
+    pub(super) fn averaged(&self) -> M {
         replaced(self.model.valid(), self.average.values().to_vec())
     }
 
     /// Steps made so far.
-    pub fn steps(&self) -> usize {
+    pub(super) fn steps(&self) -> usize {
         self.step
     }
 
     /// Parts that a batch is cut into.
-    pub fn parts(&self) -> usize {
+    pub(super) fn parts(&self) -> usize {
         self.devices.len() * self.options.accumulation
+    }
+
+    /// Whether the run still learns.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Diverged`] where none of many steps in a row, or of all so far, could be made.
+    pub(super) fn check(&self) -> Result<()> {
+        let never = self.step > 0 && self.applied == 0;
+        if self.lost >= LOST || (never && self.step >= self.options.rate.steps) {
+            return Err(Error::Diverged {
+                step: self.step,
+                what: format!(
+                    "the last {} steps had no finite loss and gradient",
+                    self.lost
+                ),
+            });
+        }
+        Ok(())
     }
 
     /// One step against the mean of `loss` over all parts.
     ///
     /// - `loss`: of the model on a device, and the number of a part, below [`parts`](Self::parts)
-    pub fn step(&mut self, loss: impl Fn(&M, &Device, usize) -> Tensor<1> + Sync) -> StepReport {
+    pub(super) fn step(
+        &mut self,
+        loss: impl Fn(&M, &Device, usize) -> Tensor<1> + Sync,
+    ) -> StepReport {
         let (gradients, loss) = self.gradients(&loss);
         let norm = global_norm(&gradients);
         let rate = self.options.rate.at(self.step);
@@ -139,8 +202,12 @@ impl<M: Module> Trainer<M> {
         if applied {
             let scale = (self.options.largest_norm / (norm + 1e-6)).min(1.0);
             let weights = self.adam.step(values(&self.model), gradients, rate, scale);
-            self.average.update(&weights, self.step + 1);
+            self.applied += 1;
+            self.average.update(&weights, self.applied);
             self.model = replaced(self.model.clone(), weights);
+            self.lost = 0;
+        } else {
+            self.lost += 1;
         }
         self.step += 1;
         StepReport {
@@ -216,4 +283,76 @@ fn in_threads<M: Send>(
 fn global_norm(gradients: &[Tensor<1>]) -> f64 {
     let squares = gradients.iter().map(|g| g.clone().square().sum()).collect();
     f64::from(Tensor::cat(squares, 0).sum().sqrt().into_scalar::<f32>())
+}
+
+impl<M: Module> Trainer<M> {
+    /// Weights, their average and the optimizer's averages after the last step.
+    ///
+    /// - `state`: what a run must have in common with this one to go on from here
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Diverged`] for weights that are no finite numbers.
+    pub(super) fn checkpoint(&self, state: &Value) -> Result<Checkpoint> {
+        let names = names(self.model());
+        let mut tensors = Tensors::new();
+        for (group, values) in GROUPS.iter().zip(self.state()) {
+            for ((name, shape), value) in names.iter().zip(values) {
+                let numbers: Vec<f32> = value.into_data().iter::<f32>().collect();
+                if numbers.iter().any(|number| !number.is_finite()) {
+                    return Err(Error::Diverged {
+                        step: self.step,
+                        what: format!("{group}.{name} holds numbers that are not finite"),
+                    });
+                }
+                tensors.insert(format!("{group}.{name}"), (shape.clone(), numbers));
+            }
+        }
+        Ok(Checkpoint {
+            step: self.step,
+            applied: self.applied,
+            state: state.clone(),
+            tensors,
+        })
+    }
+
+    /// Goes on where a checkpoint left off.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidOption`] for a checkpoint of another `state`, or without a tensor of the model.
+    pub(super) fn restore(&mut self, checkpoint: Checkpoint, state: &Value) -> Result<()> {
+        if let Some(error) = checkpoint.differs(state) {
+            return Err(error);
+        }
+        let mut tensors = checkpoint.tensors;
+        let devices = self.model().devices();
+        let device = devices.into_iter().next().unwrap_or_default().inner();
+        let names = names(self.model());
+        let mut group = |group: &str| -> Result<Vec<Tensor<1>>> {
+            let take = |(name, shape): &(String, Vec<usize>)| {
+                let name = format!("{group}.{name}");
+                let found = tensors.remove(&name).filter(|(found, _)| found == shape);
+                let (_, numbers) = found.ok_or_else(|| Error::InvalidOption {
+                    option: "checkpoint".to_owned(),
+                    value: format!("without {name} {shape:?}"),
+                    expected: "all tensors of the model".to_owned(),
+                })?;
+                let length = numbers.len();
+                Ok(Tensor::from_data(
+                    TensorData::new(numbers, [length]),
+                    &device,
+                ))
+            };
+            names.iter().map(take).collect()
+        };
+        let [a, b, c, d] = GROUPS;
+        let state = [group(a)?, group(b)?, group(c)?, group(d)?];
+        let [weights, average, first, second] = state;
+        self.model = replaced(self.model.clone(), weights);
+        self.average = Average::new(average, self.options.average_decay);
+        self.adam = Adam::resumed(self.options.adam, [first, second], checkpoint.applied);
+        (self.step, self.applied, self.lost) = (checkpoint.step, checkpoint.applied, 0);
+        Ok(())
+    }
 }

@@ -173,6 +173,14 @@ impl WeightFiles {
 
 impl WeightFile {
     fn open(path: &Path) -> Result<Self> {
+        // Opening a pipe would wait for somebody to write into it.
+        let found = std::fs::metadata(path).map_err(|source| unreadable(path, source))?;
+        if !found.is_file() {
+            return Err(Error::InvalidSafetensors {
+                path: path.to_owned(),
+                reason: "no regular file".to_owned(),
+            });
+        }
         let file = File::open(path).map_err(|source| unreadable(path, source))?;
         Self::new(path, Contents::Disk(file))
     }

@@ -2,8 +2,12 @@
 
 use super::Scene;
 use super::keys::SET_BY_SENSOR;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, quoted, sentence};
+use std::io::Read;
 use std::path::Path;
+
+/// No scene file is longer than this \[bytes\].
+const LONGEST: u64 = 1 << 20;
 
 impl Scene {
     /// Reads a scene from the text of a scene file and checks it.
@@ -23,9 +27,9 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`Error::File`] if the file cannot be read or is no scene, else what [`Scene::validate`] finds.
+    /// [`Error::File`] if the file cannot be read, is longer than 1 MiB or is no scene, else what [`Scene::validate`] finds.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::File {
+        let text = text_of(path).map_err(|e| Error::File {
             action: "read",
             path: path.to_owned(),
             message: e.to_string(),
@@ -44,7 +48,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// [`Error::Parse`] if a value has no form in TOML (a seed above 2⁶³ − 1).
+    /// [`Error::Parse`] if a value has no form in TOML.
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string(self).map_err(|e| Error::Parse {
             message: e.to_string(),
@@ -71,8 +75,8 @@ impl Scene {
 
     fn assigned(&self, assignment: &str) -> Result<Self> {
         let fail = |message: String| Error::Assignment {
-            assignment: assignment.to_owned(),
-            message,
+            assignment: quoted(assignment),
+            message: sentence(&message),
         };
         let (key, value) = assignment
             .split_once('=')
@@ -110,16 +114,27 @@ fn forget_radar(root: &mut toml::Table) {
     forget("grid", &["spacing"]);
 }
 
+/// The text of a file that is no longer than a scene can be.
+fn text_of(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    let file = std::fs::File::open(path)?;
+    file.take(LONGEST + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > LONGEST {
+        return Err(std::io::Error::other("longer than 1 MiB, so no scene"));
+    }
+    Ok(text)
+}
+
 /// The message of an error of TOML on one line, with the number of the line it is about.
 fn with_line(text: &str, error: &toml::de::Error) -> String {
-    let message = error.message().trim().replace('\n', ", ");
+    let message = sentence(&error.message().trim().replace('\n', ", "));
     let Some(span) = error.span() else {
         return message;
     };
     let before = text.get(..span.start).unwrap_or(text);
     let number = before.matches('\n').count();
     let line = text.lines().nth(number).unwrap_or_default().trim();
-    format!("line {}, '{line}': {message}", number + 1)
+    format!("line {}, '{}': {message}", number + 1, quoted(line))
 }
 
 /// Parses a TOML value; what is no TOML value is a string; nothing is `None`.
@@ -232,6 +247,95 @@ mod tests {
                 .unwrap_err()
                 .to_string();
             assert!(message.contains(text), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn every_seed_can_be_written_read_and_set() {
+        for seed in [0, (1 << 63) - 1, 1 << 63, u64::MAX] {
+            let scene = Scene {
+                seed,
+                ..Scene::default()
+            };
+            assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+            let json = serde_json::to_string(&scene).unwrap();
+            assert_eq!(serde_json::from_str::<Scene>(&json).unwrap(), scene);
+            let set = Scene::default()
+                .with_assignments(&[format!("seed={seed}")])
+                .unwrap();
+            assert_eq!(set.seed, seed);
+            // Another key does not mind it.
+            assert_eq!(set.with_assignments(&["ship.speed=8"]).unwrap().seed, seed);
+        }
+        for seed in ["18446744073709551616", "-1", "1.5"] {
+            let refused = Scene::default().with_assignments(&[format!("seed={seed}")]);
+            assert!(
+                refused
+                    .unwrap_err()
+                    .to_string()
+                    .contains("18446744073709551615"),
+                "{seed}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_place_is_two_numbers() {
+        for (numbers, count) in [("[1.0, 2.0, 3.0]", "3"), ("[1]", "1"), ("[]", "0")] {
+            let assignment = format!("ship.position={numbers}");
+            for refused in [
+                Scene::default().with_assignments(&[assignment]),
+                Scene::from_toml(&format!("[ship]\nposition = {numbers}")),
+            ] {
+                let message = refused.unwrap_err().to_string();
+                assert!(
+                    message.contains(&format!("{count} numbers, expected 2")),
+                    "{message}"
+                );
+            }
+        }
+    }
+
+    /// Whatever a file or an assignment holds, what is said of it is short, on one line and without control characters.
+    #[test]
+    fn errors_are_short_and_harmless() {
+        let long = "\u{1b}[31m\u{7}x".repeat(20_000);
+        let word = "x".repeat(100_000);
+        for text in [
+            long.clone(),
+            format!("[sea]\nspectrum = \"{word}\""),
+            format!("{word} = 1"),
+            format!("a = \"{long}"),
+        ] {
+            for refused in [
+                Scene::from_toml(&text),
+                Scene::default().with_assignments(&[&text]),
+                Scene::default().with_assignments(&[format!("sea.spectrum={text}")]),
+            ] {
+                let message = refused.unwrap_err().to_string();
+                assert!(
+                    message.chars().count() < 900,
+                    "{} characters",
+                    message.chars().count()
+                );
+                assert!(!message.chars().any(char::is_control), "{message:?}");
+            }
+        }
+    }
+
+    /// A device that never ends, and a file that is too long, are read to the limit.
+    #[test]
+    fn files_are_read_to_a_limit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, "# ".repeat(1 << 19) + "#").unwrap();
+        let mut paths = vec![path];
+        if Path::new("/dev/zero").exists() {
+            paths.push("/dev/zero".into());
+        }
+        for path in paths {
+            let message = Scene::read(&path).unwrap_err().to_string();
+            assert!(message.contains("longer than 1 MiB"), "{message}");
         }
     }
 

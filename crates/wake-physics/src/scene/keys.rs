@@ -1,6 +1,7 @@
 //! The keys of a scene file: what is absent comes from the sensor, and where there is none from the defaults.
 
 use super::sensor::SensorMode;
+use super::forms;
 use super::{Grid, Model, Polarization, Radar, Scene, Sea, Sensor, Ship, default_seed};
 use crate::window::Window;
 use serde::Deserialize;
@@ -12,7 +13,10 @@ const AMBIGUITY: f64 = -25.0;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename = "Scene")]
 pub(super) struct SceneKeys {
-    #[serde(default = "default_seed")]
+    #[serde(
+        default = "default_seed",
+        deserialize_with = "forms::seed::deserialize"
+    )]
     seed: u64,
     #[serde(default)]
     grid: GridKeys,

@@ -1,8 +1,8 @@
 //! The scene: what is simulated, in the units and ranges of a scene file.
 
 mod check;
-mod depth;
 mod file;
+mod forms;
 mod keys;
 mod model;
 mod paper;
@@ -21,7 +21,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "keys::SceneKeys")]
 pub struct Scene {
-    /// Seed of the random sea and of the speckle.
+    /// Seed of the random sea and of the speckle; from 2⁶³ on, a file holds it as a string of digits.
+    #[serde(with = "forms::seed")]
     pub seed: u64,
     /// The pixels.
     pub grid: Grid,
@@ -89,7 +90,7 @@ pub struct Sea {
     /// How the resolved waves spread around the wind.
     pub spreading: SpreadingModel,
     /// Water depth \[m\], 1 to infinite (`inf`, or the word "infinite" where a format has no infinity).
-    #[serde(with = "depth")]
+    #[serde(with = "forms::depth")]
     pub depth: f64,
     /// Time \[s\], 0 to 1e5; moves sea, ship and wake together.
     pub time: f64,
@@ -181,6 +182,7 @@ pub struct Ship {
     /// Where it moves to [deg clockwise from azimuth].
     pub heading: f64,
     /// Midship (x, y) at time 0 \[m\].
+    #[serde(deserialize_with = "forms::two")]
     pub position: [f64; 2],
     /// Form of the hull.
     pub hull: HullForm,

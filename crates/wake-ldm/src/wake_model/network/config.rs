@@ -77,6 +77,15 @@ impl WakeModelConfig {
         Ok(config)
     }
 
+    /// Reads a file of the JSON that serde writes.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if it cannot be read, else as [`from_json`](Self::from_json).
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::from_json(&crate::files::read_text(path)?, path)
+    }
+
     /// Checks that a model of this shape can be built.
     ///
     /// # Errors

@@ -6,7 +6,6 @@ use burn::tensor::Device;
 
 use super::WakeSampler;
 use crate::error::Result;
-use crate::files::read_text;
 use crate::wake_model::network::{WakeModel, WakeModelConfig};
 use crate::weights::{Layout, load, load_bytes};
 
@@ -56,7 +55,7 @@ impl WakeSampler {
     /// [`load`] finds for files that are not there or do not fit.
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let file = folder.join(CONFIG);
-        let config = WakeModelConfig::from_json(&read_text(&file)?, &file)?;
+        let config = WakeModelConfig::read(&file)?;
         let (model, layout) = (config.init(device), Layout::Diffusers);
         let model = WakeModel {
             patches: load(model.patches, layout, &folder.join(PATCHES))?,

@@ -1,0 +1,178 @@
+//! `metadata.jsonl`: one line a pair, in order; it grows as pairs are made.
+
+use super::annotations::Objects;
+use super::layout::{Layout, Manifest, broken, cannot, image_name};
+use super::pair::Pair;
+use crate::error::Result;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use wake_physics::Scene;
+use wake_physics::scene::Ship;
+
+/// One pair as a line of `metadata.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Row {
+    /// Path of the image, below the folder.
+    pub(super) file_name: String,
+    /// The prompt.
+    pub(super) text: String,
+    #[serde(flatten)]
+    columns: Columns,
+    /// The scene that made the image.
+    pub(super) scene: Scene,
+    /// What is where.
+    pub(super) objects: Objects,
+}
+
+impl Row {
+    /// The line of a pair; `echo`: whether the ship itself is drawn.
+    pub(super) fn of(pair: &Pair, echo: bool) -> Self {
+        Self {
+            file_name: image_name(pair.index),
+            text: pair.prompt.clone(),
+            columns: Columns::of(&pair.scene),
+            scene: pair.scene.clone(),
+            objects: Objects::of(&pair.labels, echo),
+        }
+    }
+}
+
+/// The values of a scene that a data set varies, a column of its table each, so that other readers need not know scenes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Columns {
+    /// Whether there is a ship; without one the values of the ship are `None`.
+    ship: bool,
+    ship_speed: Option<f64>,
+    ship_heading: Option<f64>,
+    ship_x: Option<f64>,
+    ship_y: Option<f64>,
+    ship_length: Option<f64>,
+    wind_speed: f64,
+    wind_toward: f64,
+    fetch: f64,
+    incidence: f64,
+    seed: u64,
+}
+
+impl Columns {
+    fn of(scene: &Scene) -> Self {
+        let ship = |value: fn(&Ship) -> f64| scene.ship.as_ref().map(value);
+        Self {
+            ship: scene.ship.is_some(),
+            ship_speed: ship(|s| s.speed),
+            ship_heading: ship(|s| s.heading),
+            ship_x: ship(|s| s.position[0]),
+            ship_y: ship(|s| s.position[1]),
+            ship_length: ship(|s| s.length),
+            wind_speed: scene.sea.wind_speed,
+            wind_toward: scene.sea.wind_toward,
+            fetch: scene.sea.fetch,
+            incidence: scene.radar.incidence,
+            seed: scene.seed,
+        }
+    }
+}
+
+/// The rows of a folder with their indices, in order.
+pub(super) type Rows = Vec<(u64, Row)>;
+
+/// The growing `metadata.jsonl` of a folder.
+pub(super) struct Log {
+    path: PathBuf,
+    file: File,
+    /// Bytes up to the end of the last whole line.
+    length: u64,
+    pub(super) rows: Rows,
+}
+
+impl Log {
+    /// Opens the log of a folder, cuts off a line that a killed run left unfinished, and checks all others.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first line that the set does not have.
+    pub(super) fn open(folder: &Path, manifest: &Manifest) -> Result<Self> {
+        let path = Layout(folder).metadata();
+        let failed = |e| cannot("open", &path, e);
+        let mut options = OpenOptions::new();
+        let open = options.read(true).write(true).create(true).truncate(false);
+        let mut file = open.open(&path).map_err(failed)?;
+        let text = std::fs::read(&path).map_err(failed)?;
+        let whole = text.iter().rposition(|&b| b == b'\n').map_or(0, |n| n + 1);
+        let rows = parse(&path, &text[..whole], manifest)?;
+        check(&path, &text[..whole], &rows, manifest)?;
+        let length = whole as u64;
+        file.set_len(length).map_err(failed)?;
+        file.seek(SeekFrom::Start(length)).map_err(failed)?;
+        Ok(Self {
+            path,
+            file,
+            length,
+            rows,
+        })
+    }
+
+    /// Adds a line; if it cannot be written whole, not a part of it stays.
+    pub(super) fn push(&mut self, index: u64, row: Row) -> Result<()> {
+        let line = line(&row)?;
+        if let Err(e) = self.file.write_all(line.as_bytes()) {
+            // If this fails too, the next run cuts the line off.
+            let _ = self.file.set_len(self.length);
+            return Err(cannot("write", &self.path, e));
+        }
+        self.length += line.len() as u64;
+        self.rows.push((index, row));
+        Ok(())
+    }
+
+    /// Waits until all of it is on disk.
+    pub(super) fn finish(self) -> Result<Rows> {
+        let synced = self.file.sync_all();
+        synced.map_err(|e| cannot("write", &self.path, e))?;
+        Ok(self.rows)
+    }
+}
+
+/// Whether the ship itself is drawn.
+pub(super) fn echo(manifest: &Manifest) -> bool {
+    let ship = manifest.recipe.scene.ship.as_ref();
+    ship.is_some_and(|ship| ship.echo)
+}
+
+/// A row as its line.
+fn line(row: &Row) -> Result<String> {
+    let text = serde_json::to_string(row);
+    let text = text.map_err(|e| cannot("encode", Path::new(&row.file_name), e.into()))?;
+    Ok(text + "\n")
+}
+
+/// The rows of whole lines.
+pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Rows> {
+    let lines = text.split_inclusive(|&b| b == b'\n').enumerate();
+    let mut indices = manifest.indices();
+    let parse = |(at, line): (usize, &[u8])| -> Result<(u64, Row)> {
+        let row = serde_json::from_slice(line)
+            .map_err(|e| broken(path, at + 1, format!("not a line of a data set: {e}")))?;
+        let index = indices
+            .next()
+            .ok_or_else(|| broken(path, at + 1, "more lines than pairs"))?;
+        Ok((index, row))
+    };
+    lines.map(parse).collect()
+}
+
+/// Checks that the lines are those that this set makes, byte for byte.
+fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<()> {
+    let (source, echo) = (manifest.source()?, echo(manifest));
+    let lines = text.split_inclusive(|&b| b == b'\n');
+    for (at, (found, (index, _))) in lines.zip(rows).enumerate() {
+        let row = Row::of(&source.pair_without_image(*index)?, echo);
+        if found != line(&row)?.as_bytes() {
+            let message = format!("not the line of pair {index} of this recipe and seed");
+            return Err(broken(path, at + 1, message));
+        }
+    }
+    Ok(())
+}

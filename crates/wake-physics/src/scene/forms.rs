@@ -1,0 +1,90 @@
+//! Values that a file cannot hold as they are: no infinity in JSON, no whole number above 2⁶³ − 1 in TOML, and lists of
+//! two numbers that must not be three.
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serializer};
+
+/// A depth as a number, or "infinite".
+pub(super) mod depth {
+    use super::{Deserialize, Deserializer, Serializer};
+
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a depth in metres, inf or \"infinite\"")]
+    enum Depth {
+        Metres(f64),
+        Word(Word),
+    }
+
+    #[derive(Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    enum Word {
+        Infinite,
+    }
+
+    pub(in crate::scene) fn serialize<S: Serializer>(
+        depth: &f64,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        if depth.is_finite() {
+            serializer.serialize_f64(*depth)
+        } else {
+            serializer.serialize_str("infinite")
+        }
+    }
+
+    pub(in crate::scene) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<f64, D::Error> {
+        Ok(match Depth::deserialize(deserializer)? {
+            Depth::Metres(metres) => metres,
+            Depth::Word(Word::Infinite) => f64::INFINITY,
+        })
+    }
+}
+
+/// A seed as a number, or as a string of digits where TOML has no such number.
+pub(super) mod seed {
+    use super::{Deserialize, Deserializer, Serializer};
+
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a whole number from 0 to 18446744073709551615")]
+    enum Seed {
+        Number(u64),
+        Digits(String),
+    }
+
+    pub(in crate::scene) fn serialize<S: Serializer>(
+        seed: &u64,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        match i64::try_from(*seed) {
+            Ok(_) => serializer.serialize_u64(*seed),
+            Err(_) => serializer.collect_str(seed),
+        }
+    }
+
+    pub(in crate::scene) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<u64, D::Error> {
+        use serde::de::Error as _;
+        match Seed::deserialize(deserializer)? {
+            Seed::Number(seed) => Ok(seed),
+            Seed::Digits(digits) => digits.parse().map_err(|_| {
+                D::Error::custom(format!(
+                    "{} is no whole number from 0 to {}",
+                    crate::error::quoted(&digits),
+                    u64::MAX
+                ))
+            }),
+        }
+    }
+}
+
+/// Exactly two numbers.
+pub(super) fn two<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 2], D::Error> {
+    let numbers = Vec::<f64>::deserialize(deserializer)?;
+    let count = numbers.len();
+    numbers
+        .try_into()
+        .map_err(|_| D::Error::custom(format!("{count} numbers, expected 2")))
+}

@@ -1,0 +1,209 @@
+//! Attack on everything that reads what others wrote: mutated files and texts must give a value or one short sentence,
+//! never a panic, a hang or a control character.
+//!
+//! ```text
+//! cargo test --features train --test fuzz                                          # corpora, then a second each
+//! FUZZ_SECONDS=600 cargo test --release --features train --test fuzz -- --nocapture   # for long; prints executions
+//! ARBTEST_SEED=…                                                                   # as a failure names it: in `attack`
+//! ```
+//!
+//! An input that broke something is kept in `fuzz/corpus/TARGET/`, where every run replays it.
+
+mod mutation;
+
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use arbtest::arbtest;
+use burn::tensor::Device;
+use wake_ldm::dataset::{Folder, Recipe};
+use wake_ldm::network::{PatchTransform, WakeModelConfig};
+use wake_ldm::scheduler::SchedulerConfig;
+use wake_ldm::train::{Checkpoint, Metrics};
+use wake_ldm::unet::UNetConfig;
+use wake_ldm::weights::{Layout, load};
+use wake_physics::Scene;
+use wake_text::{PartialScene, TOKENS, Tokenizer};
+
+/// No sentence about an input is longer [characters].
+const LONGEST: usize = 4000;
+
+/// Replays the corpus of a target, then mutates it for a while.
+fn attack(target: &str, check: impl Fn(&[u8])) {
+    let corpus = corpus(target);
+    assert!(!corpus.is_empty(), "no corpus for {target}");
+    corpus.iter().for_each(|input| check(input));
+    let seconds = std::env::var("FUZZ_SECONDS").ok();
+    let seconds = seconds.map_or(1.0, |text| text.parse().expect("FUZZ_SECONDS is a number"));
+    let executions = Cell::new(corpus.len());
+    arbtest(|u| {
+        let input = mutation::mutated(u, &corpus)?;
+        check(&input);
+        executions.set(executions.get() + 1);
+        Ok(())
+    })
+    .budget(Duration::from_secs_f64(seconds));
+    println!("{target}: {} executions", executions.get());
+}
+
+fn corpus(target: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fuzz/corpus")
+        .join(target);
+    let entries = std::fs::read_dir(&folder).expect("a corpus");
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("an entry").path())
+        .collect();
+    paths.sort();
+    paths
+        .iter()
+        .map(|path| std::fs::read(path).expect("a file"))
+        .collect()
+}
+
+/// The value, or nothing after a look at the sentence.
+fn said<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
+    match result {
+        Ok(value) => Some(value),
+        Err(error) => {
+            let sentence = error.to_string();
+            let length = sentence.chars().count();
+            assert!(length > 0 && length < LONGEST, "{length} characters");
+            None
+        }
+    }
+}
+
+/// As [`said`], of an error that no foreign control character may be in.
+fn said_harmlessly<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
+    if let Err(error) = &result {
+        let sentence = error.to_string();
+        assert!(!sentence.contains(char::is_control), "{sentence:?}");
+    }
+    said(result)
+}
+
+/// Text as a file may hold it; what is no Unicode is refused before it is read.
+fn text(input: &[u8]) -> String {
+    String::from_utf8_lossy(input).into_owned()
+}
+
+#[test]
+fn scenes() {
+    attack("scene", |input| {
+        let Some(scene) = said_harmlessly(Scene::from_toml(&text(input))) else {
+            return;
+        };
+        let again =
+            Scene::from_toml(&scene.to_toml().expect("a form in TOML")).expect("its own form");
+        assert_eq!(again, scene);
+    });
+}
+
+#[test]
+fn assignments() {
+    let recipe = Recipe::default();
+    attack("assignment", |input| {
+        let text = text(input);
+        if let Some(scene) = said_harmlessly(Scene::default().with_assignments(&[&text])) {
+            assert!(scene.validate().is_ok());
+        }
+        said_harmlessly(recipe.with_assignments(&[&text]));
+    });
+}
+
+#[test]
+fn prompts() {
+    attack("prompt", |input| {
+        said(PartialScene::read(&text(input)));
+    });
+}
+
+#[test]
+fn tokens() {
+    attack("tokens", |input| {
+        let text = text(input);
+        let tokens = Tokenizer::clip().encode(&text);
+        assert_eq!(tokens.ids.len(), TOKENS);
+        assert!(tokens.ids.iter().all(|&id| id < 49_408));
+        assert!(
+            tokens
+                .truncated_at
+                .is_none_or(|at| text.is_char_boundary(at))
+        );
+        // Cleaned text is clean: reading what was read gives the same.
+        assert_eq!(Tokenizer::clip().encode(&text).ids, tokens.ids);
+    });
+}
+
+/// A folder with one file, whose content is the input.
+fn with_file<T>(folder: &Path, name: &str, input: &[u8], work: impl FnOnce(&Path) -> T) -> T {
+    let path = folder.join(name);
+    std::fs::write(&path, input).expect("a file");
+    work(&path)
+}
+
+#[test]
+fn weights() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let device = Device::default();
+    attack("weights", |input| {
+        with_file(folder.path(), "model.safetensors", input, |path| {
+            let empty = PatchTransform::zeros(4, &device);
+            said(load(empty, Layout::Diffusers, path));
+        });
+    });
+}
+
+#[test]
+fn configurations() {
+    attack("config", |input| {
+        let (text, path) = (text(input), Path::new("config.json"));
+        said(SchedulerConfig::from_json(&text, path));
+        said(UNetConfig::from_json(&text, path));
+        said(WakeModelConfig::from_json(&text, path));
+    });
+}
+
+/// A set of one image whose `metadata.jsonl` is the input.
+#[test]
+fn lines_of_data_sets() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let recipe = Recipe::default();
+    let manifest = wake_ldm::dataset::Manifest::new(recipe, 7, 1).expect("a manifest");
+    let text = serde_json::to_string(&manifest).expect("JSON");
+    std::fs::write(folder.path().join("dataset.json"), text).expect("a file");
+    attack("metadata", |input| {
+        with_file(folder.path(), "metadata.jsonl", input, |_| {
+            if let Some(set) = said(Folder::open(folder.path())) {
+                said(set.pair(0));
+            }
+        });
+    });
+}
+
+#[test]
+fn states_of_runs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let step = folder.path().join("step-00000001");
+    std::fs::create_dir(&step).expect("a folder");
+    attack("checkpoint", |input| {
+        with_file(&step, "state.json", input, |_| {
+            said(Checkpoint::newest(folder.path()))
+        });
+        with_file(
+            &step,
+            "state.json",
+            b"{\"step\": 1, \"applied\": 1, \"state\": {}}",
+            |_| (),
+        );
+        with_file(&step, "tensors-000.safetensors", input, |path| {
+            said(Checkpoint::newest(folder.path()));
+            std::fs::remove_file(path).expect("a file that was written");
+        });
+        with_file(folder.path(), "log.jsonl", input, |path| {
+            said(Metrics::open(path, 3))
+        });
+    });
+}
