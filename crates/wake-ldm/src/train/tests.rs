@@ -190,7 +190,10 @@ fn sixteen_bits_learn_as_32_bits_do() {
         let mut options = options(1);
         options.trainer.bf16 = bf16;
         let mut run = Run::new("flow", &config(), init, options, devices).unwrap();
-        run.resume(start.clone()).unwrap();
+        // The same weights; a run of its own would begin with 32 bits or go on with them.
+        let mut start = start.clone();
+        start.state["trainer"]["bf16"] = bf16.into();
+        run.resume(start).unwrap();
         let losses = advance(&mut run, &set, 40);
         assert_eq!(run.averaged().dtype(), DType::F32);
         losses

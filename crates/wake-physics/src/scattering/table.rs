@@ -91,7 +91,7 @@ impl BackscatterTable {
             let facets = Facets::sample(&backscatter, &axes, range, spacing);
             let mut average = facets.averaged(error);
             let exhausted = 2 * facets.lattice.values.len() > MOST_FACETS;
-            let plane = facets.std == [0.0; 2];
+            let plane = facets.std.iter().all(|&s| s <= 0.0);
             if plane && average.error <= error {
                 let facet = |point| backscatter.two_scale.facet(axes.slope(point));
                 average.error = average

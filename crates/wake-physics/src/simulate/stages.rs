@@ -340,8 +340,21 @@ impl<'a> Stages<'a> {
         }
         let asked = SHARES.table * self.scene.model.tolerance;
         let slopes = [facets.slope_x, facets.slope_y];
-        let (last, mean) = (last_table.take(), self.plan.mean_sigma0);
-        let table = BackscatterTable::covering_or(last, backscatter, slopes, asked * mean);
+        let (last, mut mean) = (last_table.take(), self.plan.mean_sigma0);
+        let table = |last, mean: f64| {
+            BackscatterTable::covering_or(last, backscatter.clone(), slopes, asked * mean)
+        };
+        let mut sigma0 = workspace.field(&self.raster);
+        let mut made = table(last, mean);
+        made.fill_sigma0(&mut sigma0, &facets);
+        // The mean is known now; without a sea near nadir it is far from the one that was expected.
+        let found = sigma0.mean();
+        if found > 0.0 && made.error() > asked * found {
+            mean = found;
+            made = table(None, mean);
+            made.fill_sigma0(&mut sigma0, &facets);
+        }
+        let table = made;
         accuracy.table = Some(Reached {
             asked,
             reached: if mean > 0.0 {
@@ -351,8 +364,6 @@ impl<'a> Stages<'a> {
             },
         });
         accuracy.table_nodes = table.size();
-        let mut sigma0 = workspace.field(&self.raster);
-        table.fill_sigma0(&mut sigma0, &facets);
         *last_table = Some(table);
         sigma0
     }
