@@ -182,9 +182,6 @@ fn place(pixels: usize, spacing: f64, at: f64) -> f64 {
 /// A ship of another length; beam and draft keep their proportion to it, in steps of 0.1 mm, so that every reader of
 /// JSON gets the same numbers.
 fn with_length(ship: &Ship, length: f64) -> Ship {
-    if length == ship.length {
-        return ship.clone();
-    }
     let scaled = |size: f64| (1e4 * size * length / ship.length).round() / 1e4;
     Ship {
         length,

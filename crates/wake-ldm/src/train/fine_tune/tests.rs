@@ -218,7 +218,7 @@ fn the_prediction_of_a_flow_and_useless_rates_are_refused() {
             options(prediction, peak),
             &learning,
         );
-        let refused = run.err().expect("a refusal").to_string();
+        let refused = run.expect_err("a refusal").to_string();
         assert!(refused.contains(word), "{refused}");
     }
 }
