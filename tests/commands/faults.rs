@@ -1,6 +1,7 @@
 //! What a machine does to a program: closed pipes, full disks, kills, no home, folders that cannot be written, two
 //! processes at once, devices for files.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -186,7 +187,11 @@ fn killed_simulations_leave_whole_files_and_the_next_run_sweeps() {
         let _ = child.kill();
         child.wait().expect("an end");
         let expected = files(&whole);
-        let left = killed.exists().then(|| files(&killed)).unwrap_or_default();
+        let left = if killed.exists() {
+            files(&killed)
+        } else {
+            BTreeMap::new()
+        };
         for (name, content) in left {
             let temporary = text(&name).starts_with('.');
             // The report tells seconds, which differ.
