@@ -114,6 +114,33 @@ fn threads_that_no_machine_has_are_refused() {
     );
 }
 
+/// Fine pixels and a high platform need a margin much larger than the image: that is said first.
+#[test]
+fn a_costly_scene_says_so_first() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let scene = [
+        "grid.rows=1",
+        "grid.columns=2000",
+        "grid.spacing=0.5",
+        "radar.range_to_velocity=120",
+    ];
+    let mut arguments: Vec<&str> = scene.iter().flat_map(|set| ["--set", *set]).collect();
+    arguments.extend(["--out", text(&out)]);
+    let (code, message) = into("simulate", &arguments, Stdio::null());
+    assert_eq!(code, Some(0), "{message}");
+    assert!(
+        message.contains("times those of the image") && message.contains("grid.spacing"),
+        "{message}"
+    );
+    let (_, message) = into(
+        "simulate",
+        &[&TINY[..], &["--out", text(&out)]].concat(),
+        Stdio::null(),
+    );
+    assert_eq!(message, "");
+}
+
 /// Text of files and of the command line is quoted short, and without what moves a terminal.
 #[test]
 fn foreign_text_reaches_no_terminal() {
