@@ -99,7 +99,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let rows = compare::textures(&simulation.speckled, folder)?;
         output::write_json(&arguments.out.join("texture.json"), &rows)?;
         if !arguments.json {
-            compare::print(&rows);
+            exit::say(&compare::table(&rows))?;
         }
     }
     if arguments.json {

@@ -63,9 +63,9 @@ fn unreadable(path: &Path, cause: &dyn std::fmt::Display) -> Error {
     }
 }
 
-/// Prints one line an image.
-pub(crate) fn print(rows: &[(String, Option<Texture>)]) {
-    println!(
+/// One line an image.
+pub(crate) fn table(rows: &[(String, Option<Texture>)]) -> String {
+    let mut lines = vec![format!(
         "{:<16} {:>7} {:>6}  {:<23}  {:<23} {:>8}  {:<12}",
         "image",
         "windows",
@@ -74,14 +74,14 @@ pub(crate) fn print(rows: &[(String, Option<Texture>)]) {
         "along columns",
         "skewness",
         "blocks 8, 32"
-    );
+    )];
     for (name, texture) in rows {
         let Some(t) = texture else {
-            println!("{name:<16} no window of open sea");
+            lines.push(format!("{name:<16} no window of open sea"));
             continue;
         };
         let lags = |lags: [f64; 4]| lags.map(|r| format!("{r:5.2}")).join(" ");
-        println!(
+        lines.push(format!(
             "{name:<16} {:>7} {:>6.1}  {}  {} {:>8.2}  {:.3} {:.3}",
             t.windows,
             t.looks,
@@ -90,6 +90,7 @@ pub(crate) fn print(rows: &[(String, Option<Texture>)]) {
             t.skewness,
             t.block_variation[0],
             t.block_variation[1]
-        );
+        ));
     }
+    lines.join("\n")
 }

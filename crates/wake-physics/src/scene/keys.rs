@@ -1,7 +1,7 @@
 //! The keys of a scene file: what is absent comes from the sensor, and where there is none from the defaults.
 
-use super::sensor::SensorMode;
 use super::forms;
+use super::sensor::SensorMode;
 use super::{Grid, Model, Polarization, Radar, Scene, Sea, Sensor, Ship, default_seed};
 use crate::window::Window;
 use serde::Deserialize;
