@@ -340,29 +340,21 @@ impl<'a> Stages<'a> {
         }
         let asked = SHARES.table * self.scene.model.tolerance;
         let slopes = [facets.slope_x, facets.slope_y];
-        let (last, mut mean) = (last_table.take(), self.plan.mean_sigma0);
-        let table = |last, mean: f64| {
+        let table_for = |last, mean: f64| {
             BackscatterTable::covering_or(last, backscatter.clone(), slopes, asked * mean)
         };
         let mut sigma0 = workspace.field(&self.raster);
-        let mut made = table(last, mean);
-        made.fill_sigma0(&mut sigma0, &facets);
+        let mut table = table_for(last_table.take(), self.plan.mean_sigma0);
+        table.fill_sigma0(&mut sigma0, &facets);
         // The mean is known now; without a sea near nadir it is far from the one that was expected.
-        let found = sigma0.mean();
-        if found > 0.0 && made.error() > asked * found {
-            mean = found;
-            made = table(None, mean);
-            made.fill_sigma0(&mut sigma0, &facets);
+        let mean = sigma0.mean();
+        if mean > 0.0 && table.error() > asked * mean {
+            table = table_for(None, mean);
+            table.fill_sigma0(&mut sigma0, &facets);
         }
-        let table = made;
-        accuracy.table = Some(Reached {
-            asked,
-            reached: if mean > 0.0 {
-                table.error() / mean
-            } else {
-                0.0
-            },
-        });
+        let share = table.error() / mean;
+        let reached = if mean > 0.0 { share } else { 0.0 };
+        accuracy.table = Some(Reached { asked, reached });
         accuracy.table_nodes = table.size();
         *last_table = Some(table);
         sigma0
