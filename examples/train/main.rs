@@ -9,8 +9,9 @@
 //! reader of prompts, `mean` the mean and spread of the latents, and `diffusion` the flow that draws the rest. A stage
 //! runs the earlier ones first, or to their end, where their weights are not in `--out` yet. Writes there: `config.json`,
 //! `patches.safetensors`, `reader.safetensors`, `prior.safetensors`, `flow.safetensors` (averaged weights, 16 bits),
-//! `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and `checkpoints/`. A run that was killed goes on
-//! from its last checkpoint with `--resume`.
+//! `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, `run.json`, and `checkpoints/`. A run that was killed
+//! goes on from its last checkpoint with `--resume`; what it promises is then made again where it is missing or older. A
+//! folder belongs to one run: other data, another model, seed, rate or batch, and a new beginning, are refused by name.
 //!
 //! ```text
 //! cargo run --release --example train -- fine-tune --weights stable-diffusion-v1-4 --data out/make_dataset --rank 8
