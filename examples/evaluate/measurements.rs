@@ -75,6 +75,7 @@ impl Reading {
         let place = ShipPlace {
             position: ship.position,
             length: ship.length,
+            depth: scene.sea.depth,
         };
         let wake = measure_wake(image, &raster, &place);
         let heading = wake.heading.measurable_value().unwrap_or(ship.heading);

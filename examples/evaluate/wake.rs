@@ -71,8 +71,9 @@ fn wedge(scene: &Scene) -> Vec<bool> {
     let place = ShipPlace {
         position: ship.position,
         length: ship.length,
+        depth: scene.sea.depth,
     };
-    kelvin_wedge(&raster(scene), &place, ship.heading)
+    kelvin_wedge(&raster(scene), &place, ship.heading, ship.speed)
 }
 
 /// Pixel-wise mean of images.

@@ -49,6 +49,7 @@ const TRANSFER: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: INCIDENCE,
     relaxation_rate: 1.7,
+    steepness: 4.5,
 };
 
 /// Measures one stage.

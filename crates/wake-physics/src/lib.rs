@@ -76,22 +76,23 @@ pub mod scattering;
 pub mod sar;
 pub mod gusts;
 pub mod slicks;
-pub mod labels;
 pub mod grey;
 mod modulation;
 mod models;
 mod survey;
 mod plan;
+pub mod labels;
 mod simulate;
 pub mod measure;
 
 pub use error::{Error, Result, quoted, sentence};
+pub use labels::labels_of;
 pub use memory::available as available_memory;
 pub use plan::{Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
 pub use simulate::{
     Accuracy, DirectPixels, LinearSea, Method, Reached, SarImage, Seconds, Simulation, Simulator,
-    direct_intensity, expected_intensity, labels_of, simulate, simulate_with,
+    direct_intensity, expected_intensity, simulate, simulate_with,
 };
 pub use track::Track;

@@ -10,8 +10,8 @@ use crate::sar::geometry::direction;
 use crate::sar::impulse::Axis;
 use crate::sar::{AzimuthResolution, ImpulseResponse};
 use crate::scattering::breaking;
-use crate::scattering::hydrodynamic::relaxation_rate;
-use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale};
+use crate::scattering::hydrodynamic::{relaxation_rate, steepness};
+use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale, bragg};
 use crate::scene::{HullForm, Polarization, Radar, Scene, Ship, Term, TermRule, Terms};
 use crate::slicks::{STRONGEST_WIND, Slicks};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
@@ -123,6 +123,11 @@ impl Models {
                 depth: scene.sea.depth,
                 incidence,
                 relaxation_rate: relaxation(scene),
+                steepness: steepness(
+                    &short_waves,
+                    bragg_wavenumber(&scene.radar),
+                    spectrum.wind(),
+                ),
             },
             two_scale: TwoScale::new(
                 incidence,
@@ -225,18 +230,17 @@ fn wind_sea(scene: &Scene) -> WindSea {
 
 /// The scene's relaxation rate, or that of its Bragg waves in its wind.
 fn relaxation(scene: &Scene) -> f64 {
-    let of_bragg_waves = |radar: &Radar| {
-        let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
-        let bragg = crate::scattering::bragg::wavenumber(k_e, radar.incidence.to_radians());
-        relaxation_rate(
-            friction_velocity(scene.sea.wind_speed, DragLaw::default()),
-            bragg,
-        )
+    let of_bragg_waves = || {
+        let friction = friction_velocity(scene.sea.wind_speed, DragLaw::default());
+        relaxation_rate(friction, bragg_wavenumber(&scene.radar))
     };
-    scene
-        .radar
-        .relaxation_rate
-        .unwrap_or_else(|| of_bragg_waves(&scene.radar))
+    scene.radar.relaxation_rate.unwrap_or_else(of_bragg_waves)
+}
+
+/// Wavenumber of the waves that a calm facet scatters with [rad/m].
+fn bragg_wavenumber(radar: &Radar) -> f64 {
+    let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
+    bragg::wavenumber(k_e, radar.incidence.to_radians())
 }
 
 /// The response that a scene asks for, unless pixels of their own do as well.
@@ -315,9 +319,8 @@ fn edge_response(radar: &Radar, wind_speed: f64, across: f64) -> f64 {
         Polarization::VV => breaking::SHARE[0],
         Polarization::HH => breaking::SHARE[1],
     };
-    let bragg = crate::scattering::bragg::wavenumber(k_e, radar.incidence.to_radians());
     response_time(
-        breaking::bragg_response(bragg, wind_speed),
+        breaking::bragg_response(bragg_wavenumber(radar), wind_speed),
         across,
         share,
         breaking::response_time(k_e, wind_speed),

@@ -1,7 +1,7 @@
-//! Random numbers that do not depend on the number of threads: one generator per line of a grid.
+//! Random numbers that do not depend on the number of threads: one generator per line of a grid, and one stream per use.
 
-use rand::SeedableRng;
 use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
 
 /// An odd constant that spreads line numbers over 64 bits, unlike the one that spreads the seed afterwards.
 const LINE_STEP: u64 = 0xD134_2543_DE82_EF95;
@@ -14,10 +14,29 @@ pub(crate) fn line_generator(seed: u64, line: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(seed ^ line.wrapping_add(1).wrapping_mul(LINE_STEP))
 }
 
+/// What random numbers of one seed are drawn for. Every use has a stream of its own, here and nowhere else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stream {
+    /// Amplitudes of the sea, by lines of its lattice.
+    Sea,
+    /// Speckle, by rows of the image.
+    Speckle,
+}
+
+/// The generator of one line of a stream.
+pub(crate) fn generator(seed: u64, stream: Stream, line: u64) -> Xoshiro256PlusPlus {
+    match stream {
+        Stream::Sea => line_generator(seed, line),
+        Stream::Speckle => {
+            let key = Xoshiro256PlusPlus::seed_from_u64(seed).next_u64();
+            Xoshiro256PlusPlus::seed_from_u64(key.wrapping_add(line))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::Rng;
     use std::collections::HashSet;
 
     #[test]
@@ -31,6 +50,20 @@ mod tests {
                     line_generator(seed, line).next_u64(),
                     line_generator(seed, line).next_u64()
                 );
+            }
+        }
+    }
+
+    /// No line of any stream and seed begins as another does.
+    #[test]
+    fn streams_do_not_overlap() {
+        let mut seen = HashSet::new();
+        for seed in [0, 1, 2, 7, 1 << 40, u64::MAX] {
+            for stream in [Stream::Sea, Stream::Speckle] {
+                for line in 0..20_000 {
+                    let first = generator(seed, stream, line).next_u64();
+                    assert!(seen.insert(first), "{seed} {stream:?} {line}");
+                }
             }
         }
     }

@@ -10,16 +10,14 @@ pub(super) type Box2 = [f64; 4];
 /// Class and box of what is seen in the image.
 ///
 /// Labels count from the centre of the first pixel, boxes from its corner, half a pixel before. Steps of 0.01 pixels.
-/// A ship has a box only where its echo is drawn: what cannot be seen cannot be found.
+/// A wake has a box only where it can be seen, a ship only where its echo is drawn: what cannot be seen cannot be found.
 fn boxes(labels: &Labels, echo: bool) -> Vec<(u32, Box2)> {
-    let wake = labels.wake.box_px.map(|b| (Class::Wake, b));
-    let ship = labels.ship.echo_box_px.filter(|_| echo);
-    let ship = ship.map(|b| (Class::Ship, b));
     let cornered = |[x, y, w, h]: Box2| [x + 0.5, y + 0.5, w, h].map(hundredths);
-    [wake, ship]
+    labels
+        .objects()
         .into_iter()
-        .flatten()
-        .map(|(class, b)| (class.number(), cornered(b)))
+        .filter(|object| echo || object.class != Class::Ship)
+        .map(|object| (object.class.number(), cornered(object.box_px)))
         .collect()
 }
 
@@ -145,6 +143,7 @@ mod tests {
     use super::super::layout::image_name;
     use super::*;
     use crate::dataset::{Recipe, Simulated};
+    use wake_physics::labels::{LabelledShip, ShipLabel, WakeLabel};
     use wake_physics::labels_of;
     use wake_physics::scene::{Grid, Scene};
 
@@ -164,32 +163,34 @@ mod tests {
         .unwrap()
     }
 
-    /// The bow is 5 pixels above the centre of row 50, the image ends 50 rows below it; a wedge of half-angle asin(1/3) is
-    /// 2·55/(2√2) pixels wide there, which is more than half of 61 columns to neither side.
-    #[test]
-    fn the_wake_of_a_northward_ship_is_where_geometry_says() {
-        let found = boxes(&labels_of(&northward()), false);
-        let half = 55.0 / 8f64.sqrt();
-        let expected = [30.5 - half, 45.5, 2.0 * half, 55.0];
-        assert_eq!(found.len(), 1);
-        assert_eq!(found[0].0, 0);
-        for (a, b) in found[0].1.iter().zip(&expected) {
-            // Both are exact but for steps of 0.01.
-            assert!((a - b).abs() <= 0.005 + 1e-9, "{found:?} {expected:?}");
+    /// Labels with a wake and a ship, as of an image of 101 × 61 pixels.
+    fn drawn() -> Labels {
+        let corners = [[29.35, 45.0], [30.65, 45.0], [30.65, 55.0], [29.35, 55.0]];
+        Labels {
+            ships: vec![LabelledShip {
+                ship: ShipLabel {
+                    echo_box_px: Some([29.35, 45.0, 1.3, 10.0]),
+                    echo_oriented_box_px: Some(corners),
+                    ..ShipLabel::default()
+                },
+                wake: WakeLabel {
+                    axis_deg: Some(180.0),
+                    half_angle_deg: Some(19.47),
+                    box_px: Some([10.554_44, 45.0, 38.891_12, 55.0]),
+                    oriented_box_px: Some(corners),
+                    ..WakeLabel::default()
+                },
+            }],
         }
     }
 
-    /// A ship along azimuth has no radial velocity: its echo is at its place, 26 by 200 m.
+    /// Labels count from the centre of the first pixel, boxes from its corner; steps of 0.01.
     #[test]
-    fn the_ship_has_a_box_where_it_is_drawn() {
-        let found = boxes(&labels_of(&northward()), true);
-        assert_eq!(found.len(), 2);
-        let (class, [x, y, w, h]) = found[1];
-        assert_eq!(class, 1);
-        let expected = [30.5 - 0.65, 50.5 - 5.0, 1.3, 10.0];
-        for (a, b) in [x, y, w, h].iter().zip(&expected) {
-            assert!((a - b).abs() <= 0.005 + 1e-9, "{found:?}");
-        }
+    fn boxes_are_those_of_the_labels_from_the_corner() {
+        let wake = (0, [11.05, 45.5, 38.89, 55.0]);
+        assert_eq!(boxes(&drawn(), false), [wake]);
+        let ship = (1, [29.85, 45.5, 1.3, 10.0]);
+        assert_eq!(boxes(&drawn(), true), [wake, ship]);
     }
 
     #[test]
@@ -218,17 +219,8 @@ mod tests {
 
     #[test]
     fn coco_counts_from_one_and_points_to_images() {
-        let empty = Scene {
-            ship: None,
-            ..northward()
-        };
-        let images = [(4, &northward()), (5, &empty), (6, &northward())].map(|(index, scene)| {
-            (
-                index,
-                image_name(index),
-                Objects::of(&labels_of(scene), true),
-            )
-        });
+        let images = [(4, drawn()), (5, Labels::default()), (6, drawn())]
+            .map(|(index, labels)| (index, image_name(index), Objects::of(&labels, true)));
         let images = images
             .iter()
             .map(|(index, name, objects)| (*index, name.as_str(), objects));

@@ -6,13 +6,14 @@
 //!
 //! with ξ forward of midship and η to port. The waves lie on one curve in the plane of wavenumbers, so the
 //! integral is a sum of plane waves as soon as its nodes are chosen ([`KelvinWake::plan`]); any field of
-//! them follows from [`synthesize`](crate::nufft::synthesize). Files: `steady` the curve, `zones` which part
+//! them follows from [`synthesize`](crate::nufft::synthesize). Files: `steady` the curve, `rays` where each wave is seen and how far the arms open, `zones` which part
 //! of it reaches a raster, `panels` the nodes, `fade` where the waves are shown, `resistance` the work the
 //! ship does for them, `direct` the slow integral that everything is checked against.
 
 mod direct;
 mod fade;
 mod panels;
+mod rays;
 mod resistance;
 mod steady;
 mod zones;
@@ -21,15 +22,14 @@ pub use direct::direct_quadrature;
 pub(crate) use fade::fill_fade;
 pub use fade::{fade, fade_field};
 pub use panels::{WakePlan, Zone};
+pub(crate) use rays::Ray;
+pub use rays::{KELVIN_ANGLE, half_angle};
 
 use crate::constants::GRAVITY;
 use crate::hull::Hull;
 use crate::track::Track;
 use num_complex::Complex64;
 use steady::{SteadyWave, SteadyWaves};
-
-/// Kelvin's angle arcsin(1/3) \[rad\]: the wake's arms leave the track at it.
-pub const KELVIN_ANGLE: f64 = 0.339_836_909_454_121_9;
 
 /// The direction θ \[rad\] of the waves on the arms, atan(1/√2): transverse waves below, divergent above.
 pub const CUSP_ANGLE: f64 = 0.615_479_708_670_387_3;

@@ -8,6 +8,7 @@ const DEEP: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: 0.5,
     relaxation_rate: 0.5,
+    steepness: 4.5,
 };
 
 fn wake(hull: Hull, speed: f64, heading: f64) -> KelvinWake {
@@ -220,8 +221,12 @@ fn assert_plan_is_right(wake: &KelvinWake, raster: &Raster, tolerances: &[f64]) 
                 .zip(exact)
                 .map(|(f, e)| (f - e).abs())
                 .fold(0.0, f64::max);
-            let error = worst / rms(exact);
-            assert!(error <= tolerance, "{error:e} > {tolerance:e} for {wake:?}");
+            // Not their ratio: waves shorter than those that modulate leave a modulation of 0.
+            let rms = rms(exact);
+            assert!(
+                worst <= tolerance * rms,
+                "{worst:e} > {tolerance:e} of {rms:e} for {wake:?}"
+            );
         }
     }
 }

@@ -20,11 +20,18 @@ impl Rectangle {
         (0..2).all(|a| (self.low[a]..=self.high[a]).contains(&point[a]))
     }
 
-    /// The part of a ray inside, from its start outward; `None` if it has no length.
+    /// The part of a ray inside, from its start outward and no farther than `longest`; `None` if it has no length.
+    ///
+    /// - `along`: a unit vector
     ///
     /// Liang and Barsky (1984), ACM Trans. Graph. 3: every side cuts the ray's parameter.
-    pub(super) fn clip_ray(&self, from: [f64; 2], along: [f64; 2]) -> Option<[[f64; 2]; 2]> {
-        let (mut start, mut end) = (0.0f64, f64::INFINITY);
+    pub(super) fn clip_ray(
+        &self,
+        from: [f64; 2],
+        along: [f64; 2],
+        longest: f64,
+    ) -> Option<[[f64; 2]; 2]> {
+        let (mut start, mut end) = (0.0f64, longest);
         for a in 0..2 {
             let to_low = (self.low[a] - from[a]) / along[a];
             let to_high = (self.high[a] - from[a]) / along[a];

@@ -1,7 +1,9 @@
 //! The heading from the wake's arms: a Radon transform along the half-lines that start at the bow.
 
-use super::Measured;
 use super::smooth::smooth;
+use super::stationary::FASTEST;
+use super::{Measured, ShipPlace};
+use crate::kelvin::{KELVIN_ANGLE, half_angle};
 use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 
@@ -9,6 +11,8 @@ use crate::sar::geometry::direction;
 const RAYS: i64 = 360;
 /// Half-width of the wedge: the Kelvin angle of 19.5° and what the bunching adds \[deg\].
 const HALF_WEDGE: i64 = 23;
+/// Opening of the arms beyond the Kelvin angle up to which the wedge holds them \[deg\].
+const LARGEST_EXCESS: f64 = 2.0;
 /// Width of the sea beside the wedge that it is compared with \[deg\].
 const BESIDE: i64 = 25;
 /// Width of an arm \[deg\].
@@ -30,10 +34,15 @@ const THRESHOLD: f64 = 3.0;
 /// R(φ) = ⟨ln ⟨(I_dB − ⟨I_dB⟩)²⟩⟩ along the half-line φ from the bow
 /// ```
 ///
-/// The sector of two Kelvin angles whose edges rise most above the sea beside them is the wake.
-pub(super) fn heading(decibel: &Field, raster: &Raster, position: [f64; 2], bow: f64) -> Measured {
+/// The sector of two Kelvin angles whose edges rise most above the sea beside them is the wake. Nothing is measurable
+/// where the fastest ship would open a wider one: of a wide wake the radar often shows one arm alone, and one arm of
+/// unknown opening has no heading.
+pub(super) fn heading(decibel: &Field, raster: &Raster, ship: &ShipPlace) -> Measured {
+    if half_angle(FASTEST, ship.depth) > KELVIN_ANGLE + LARGEST_EXCESS.to_radians() {
+        return Measured::NOTHING;
+    }
     let energy = log_energy(decibel, raster.spacing);
-    let mut apex = position;
+    let mut apex = ship.position;
     let mut found = None;
     // The arms start at the bow, which lies half a ship ahead on a heading found from midship first.
     for _ in 0..3 {
@@ -42,7 +51,7 @@ pub(super) fn heading(decibel: &Field, raster: &Raster, position: [f64; 2], bow:
         };
         let heading = (astern.0 as f64 + 180.0).rem_euclid(360.0);
         let ahead = direction(heading);
-        apex = [0, 1].map(|a| position[a] + bow * ahead[a]);
+        apex = [0, 1].map(|a| ship.position[a] + 0.5 * ship.length * ahead[a]);
         found = Some((heading, astern.1));
     }
     found.map_or(Measured::NOTHING, |(heading, contrast)| {

@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 /// Speeds tried [m/s]: first, step, number.
 const SPEEDS: (f64, f64, usize) = (4.6, 0.3, 32);
+/// The fastest of them [m/s].
+pub(super) const FASTEST: f64 = SPEEDS.0 + SPEEDS.1 * (SPEEDS.2 - 1) as f64;
 /// Headings tried to each side of the arms' \[deg\]: step, number.
 const HEADINGS: (f64, i64) = (2.0, 15);
 /// Wavenumbers used: from this many steps of the spectrum …
@@ -79,9 +81,8 @@ pub(super) fn velocity(
     // Steps back where the refinement ran away to another ridge.
     let kept = (fine_speed - speed).abs() < 2.0 * SPEEDS.1
         && angle_between(fine, tried).abs() < 3.0 * HEADINGS.0;
-    let last = SPEEDS.0 + SPEEDS.1 * (SPEEDS.2 - 1) as f64;
     // A maximum at the end of the lattice is the flank of something beyond it.
-    let inner = speed > SPEEDS.0 && speed < last;
+    let inner = speed > SPEEDS.0 && speed < FASTEST;
     let score = if inner { score } else { 0.0 };
     let (speed, heading) = if kept {
         (fine_speed, fine)

@@ -12,6 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 const SHIP: ShipPlace = ShipPlace {
     position: [0.0, 0.0],
     length: 195.0,
+    depth: f64::INFINITY,
 };
 
 fn raster() -> Raster {
@@ -232,11 +233,42 @@ fn differences_of_directions_go_the_short_way() {
     }
 }
 
+/// In water where the ship runs at twice the speed of the longest waves, the wedge is Mach's: sin 30° = ½. Half of a
+/// disc of large radius about the bow would be 180° wide.
+#[test]
+fn a_supercritical_wedge_is_machs() {
+    let raster = Raster::image(401, 401, 5.0);
+    let depth = (10.0f64 / 2.0).powi(2) / GRAVITY;
+    let ship = ShipPlace { depth, ..SHIP };
+    let inside = kelvin_wedge(&raster, &ship, 0.0, 10.0);
+    for astern in [100usize, 300, 600] {
+        let row = 200 + astern / 5;
+        let count = inside[row * 401..(row + 1) * 401]
+            .iter()
+            .filter(|&&v| v)
+            .count() as f64;
+        let half = (astern as f64 + 97.5) / 3f64.sqrt();
+        assert!((count - (1.0 + 2.0 * (half / 5.0).floor())).abs() < 0.5);
+    }
+}
+
+/// Where the arms may open wider than in deep water, no heading is read: a single arm of unknown opening has none.
+#[test]
+fn a_wake_in_shallow_water_is_not_measurable() {
+    let image = analytic_wake(8.0, 110.0);
+    for (depth, measurable) in [(5.0, false), (30.0, false), (100.0, true)] {
+        let ship = ShipPlace { depth, ..SHIP };
+        let found = measure_wake(&image, &raster(), &ship);
+        assert_eq!(found.heading.measurable, measurable, "{depth}: {found:?}");
+        assert_eq!(found.speed.measurable, measurable, "{depth}: {found:?}");
+    }
+}
+
 /// The wedge by trigonometry: its width astern of the bow, nothing ahead, and the same when turned by a quarter.
 #[test]
 fn the_wedge_opens_astern_at_the_kelvin_angle() {
     let raster = Raster::image(201, 201, 5.0);
-    let wedge = |heading| kelvin_wedge(&raster, &SHIP, heading);
+    let wedge = |heading| kelvin_wedge(&raster, &SHIP, heading, 10.0);
     let (north, east) = (wedge(0.0), wedge(90.0));
     for i in 0..201 {
         // Heading 0: row i is 5·(i − 100) m astern of midship.

@@ -2,18 +2,20 @@
 
 use super::spectrum::{PowerSpectrum, window};
 use super::{Measured, arms, stationary};
-use crate::kelvin::KELVIN_ANGLE;
+use crate::kelvin::half_angle;
 use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 use serde::Serialize;
 
-/// Where the ship is, known from elsewhere (its echo, or the labels of the scene).
+/// What is known of the ship from elsewhere (its echo, a chart, or the labels of the scene).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShipPlace {
     /// Midship (x, y) \[m\].
     pub position: [f64; 2],
     /// Length \[m\]: the arms start at the bow.
     pub length: f64,
+    /// Depth of the water \[m\], may be infinite: with the speed it sets how far the arms open.
+    pub depth: f64,
 }
 
 /// What the wake in an image tells of its ship.
@@ -49,8 +51,9 @@ const DARKEST: f64 = 1e-4;
 ///
 /// # Validity
 ///
-/// Deep water, speeds of 4.6 to 13.9 m/s, one wake, its ship in the image. An image without variation, or with nothing
-/// that looks like a wake, is not measurable.
+/// Deep water, speeds of 4.6 to 13.9 m/s, one wake, its ship in the image. Not measurable are water so shallow that the
+/// fastest of these ships would open its arms by 2° more than in deep water (below 36 m), an image without variation, and
+/// one with nothing that looks like a wake.
 #[must_use]
 pub fn measure_wake(intensity: &Field, raster: &Raster, ship: &ShipPlace) -> WakeMeasurement {
     let nothing = WakeMeasurement {
@@ -61,7 +64,7 @@ pub fn measure_wake(intensity: &Field, raster: &Raster, ship: &ShipPlace) -> Wak
     let Some(decibel) = decibel(intensity).filter(|_| fits) else {
         return nothing;
     };
-    let coarse = arms::heading(&decibel, raster, ship.position, 0.5 * ship.length);
+    let coarse = arms::heading(&decibel, raster, ship);
     if coarse.value.is_nan() {
         return nothing;
     }
@@ -128,12 +131,12 @@ fn sector(raster: &Raster, position: [f64; 2], towards: f64) -> Field {
 
 /// Which pixels lie inside the Kelvin wedge, astern of midship: where the wake, unlike the sea, is not random.
 ///
-/// - `heading` [deg clockwise from azimuth]
+/// - `heading` [deg clockwise from azimuth]; `speed` [m/s]: with the depth it opens the wedge, see [`half_angle`]
 /// - returns one value a pixel, row after row
 #[must_use]
-pub fn kelvin_wedge(raster: &Raster, ship: &ShipPlace, heading: f64) -> Vec<bool> {
+pub fn kelvin_wedge(raster: &Raster, ship: &ShipPlace, heading: f64, speed: f64) -> Vec<bool> {
     let [ax, ay] = direction(heading);
-    let slope = KELVIN_ANGLE.tan();
+    let slope = half_angle(speed, ship.depth).tan();
     (0..raster.len())
         .map(|n| {
             let dx = raster.x(n % raster.columns) - ship.position[0];

@@ -34,6 +34,8 @@ pub struct Plan {
     pub(crate) wake: WakePlan,
     /// Mean σ⁰ expected \[1\].
     pub(crate) mean_sigma0: f64,
+    /// Variance of the hydrodynamic modulation by the resolved sea \[1\].
+    pub(crate) modulation_variance: f64,
 }
 
 /// How much is computed.
@@ -109,6 +111,7 @@ impl Plan {
             notes: survey.notes(scene, models),
             wake,
             mean_sigma0: survey.mean[0] + survey.mean[1],
+            modulation_variance: survey.modulation_variance,
         })
     }
 

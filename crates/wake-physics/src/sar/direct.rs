@@ -1,13 +1,18 @@
 //! The oracle of velocity bunching: every pixel from all sources, exactly, in double precision; O(N³).
 
 use crate::raster::{Field, Raster};
-use crate::sar::imaging::{Imaging, Response, Sources};
+use crate::sar::geometry::{azimuth_displacement, layover};
+use crate::sar::imaging::{Imaging, Sources};
 use rayon::prelude::*;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
+
+/// Smallest standard deviation of a response in azimuth \[pixels\], the convention of the fast sum too.
+const SMALLEST_DEVIATION: f64 = 0.5;
 
 /// The bunching integral as a sum over all sources, ready to be evaluated at any pixel.
 ///
-/// Same places, widths and normalisation as [`Imaging::image`]; no cut-off, no steps, no tolerance.
+/// Places in metres from the formulas of the geometry, widths from the resolution: nothing of it is shared with
+/// [`Imaging::image`]. No cut-off, no steps, no tolerance.
 #[derive(Debug)]
 pub struct DirectImage {
     raster: Raster,
@@ -35,11 +40,10 @@ impl DirectImage {
     #[must_use]
     pub fn new(imaging: &Imaging, sources: &Sources<'_>, image: &Raster) -> Self {
         sources.check();
-        let response = Response::new(imaging, &sources.raster, image);
         let mut columns = vec![Vec::new(); image.columns];
         for i in 0..sources.raster.rows {
             for j in 0..sources.raster.columns {
-                let (column, source) = place(&response, sources, i, j);
+                let (column, source) = place(imaging, sources, image, i, j);
                 let left = column.floor();
                 let shares = [(left, 1.0 - (column - left)), (left + 1.0, column - left)];
                 for (at, share) in shares {
@@ -92,9 +96,8 @@ pub(crate) fn reaching(
     pixels: &[[usize; 2]],
 ) -> Vec<[usize; 2]> {
     sources.check();
-    let response = Response::new(imaging, &sources.raster, image);
     let reaches = |&[i, j]: &[usize; 2]| {
-        let (column, source) = place(&response, sources, i, j);
+        let (column, source) = place(imaging, sources, image, i, j);
         let rows = REACH * (0.5 / source.rate).sqrt() + SLACK;
         pixels.iter().any(|&[row, at]| {
             (column - at as f64).abs() < 1.0 + SLACK && (source.row - row as f64).abs() < rows
@@ -109,13 +112,20 @@ pub(crate) fn reaching(
 }
 
 /// Column (with fraction) and response of the source pixel `[i, j]`.
-fn place(response: &Response, sources: &Sources<'_>, i: usize, j: usize) -> (f64, Source) {
+fn place(
+    imaging: &Imaging,
+    sources: &Sources<'_>,
+    image: &Raster,
+    i: usize,
+    j: usize,
+) -> (f64, Source) {
     let at = |field: Option<&Field>| field.map_or(0.0, |f| f64::from(f.at(i, j)));
-    let [rows, columns] = response.offset;
-    let row = (i as i64 + rows) as f64 - response.rows_per_velocity * at(sources.radial_velocity);
-    let column =
-        (j as i64 + columns) as f64 - response.columns_per_elevation * at(sources.elevation);
-    let variance = response.variance_at(at(sources.radial_acceleration));
+    let x = sources.raster.x(j) + layover(at(sources.elevation), imaging.incidence);
+    let displaced = azimuth_displacement(imaging.range_to_velocity, at(sources.radial_velocity));
+    let [column, row] = image.pixel(x, sources.raster.y(i) + displaced);
+    let resolution = imaging.resolution.at(at(sources.radial_acceleration));
+    let deviation = resolution / (SQRT_2 * PI) / image.spacing;
+    let variance = deviation.max(SMALLEST_DEVIATION).powi(2);
     let source = Source {
         row,
         rate: 1.0 / (2.0 * variance),

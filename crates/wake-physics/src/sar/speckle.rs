@@ -1,8 +1,9 @@
 //! Speckle: the fluctuation of the intensity of N independent looks.
 
+use crate::random::{Stream, generator};
 use crate::raster::Field;
+use rand::Rng;
 use rand::rngs::Xoshiro256PlusPlus;
-use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, Gamma};
 use rayon::prelude::*;
 
@@ -28,14 +29,16 @@ const PRODUCT_LOOKS: u32 = 8;
 ///
 /// Goodman (1976), J. Opt. Soc. Am. 66.
 pub fn speckle(intensity: &mut Field, looks: u32, seed: u64) {
-    let key = Xoshiro256PlusPlus::seed_from_u64(seed).next_u64();
     intensity
         .values
         .par_chunks_mut(intensity.columns.max(1))
         .enumerate()
         .for_each(|(i, row)| {
-            let random = Xoshiro256PlusPlus::seed_from_u64(key.wrapping_add(i as u64));
-            speckle_row(row, looks.max(1), random);
+            speckle_row(
+                row,
+                looks.max(1),
+                generator(seed, Stream::Speckle, i as u64),
+            );
         });
 }
 

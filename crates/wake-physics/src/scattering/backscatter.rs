@@ -1,7 +1,6 @@
 //! All of σ⁰, evaluated exactly: the oracle of the table, and the figures by which a plan leaves terms out.
 
 use crate::raster::Field;
-use crate::scattering::hydrodynamic::bragg_factor;
 use crate::scattering::{SlopeCovariance, Specular, TwoScale};
 use rayon::prelude::*;
 
@@ -15,7 +14,8 @@ pub struct FacetFields<'a> {
     pub slope_x: &'a Field,
     /// Slope ∂ζ/∂y \[1\].
     pub slope_y: &'a Field,
-    /// Hydrodynamic modulation m of the Bragg waves \[1\], where it counts.
+    /// Factor on the Bragg return by hydrodynamic modulation \[1\], where it counts; see
+    /// [`to_bragg_factors`](crate::scattering::hydrodynamic::to_bragg_factors).
     pub modulation: Option<&'a Field>,
     /// Share of the Bragg waves that the turbulent wake leaves, 0 to 1, where it counts.
     pub damping: Option<&'a Field>,
@@ -34,7 +34,7 @@ impl FacetFields<'_> {
     /// σ⁰ of pixel `n` from its Bragg and specular parts: only the Bragg part is modulated and damped.
     #[inline(always)]
     pub(crate) fn combine(&self, n: usize, [bragg, specular]: [f64; 2]) -> f32 {
-        let modulation = self.modulation.map_or(1.0, |m| bragg_factor(m.values[n]));
+        let modulation = self.modulation.map_or(1.0, |m| m.values[n]);
         let damping = self.damping.map_or(1.0, |d| d.values[n]);
         (bragg * f64::from(modulation * damping) + specular) as f32
     }

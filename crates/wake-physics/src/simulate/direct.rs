@@ -78,6 +78,7 @@ impl Stages<'_> {
 
         let mut fields = self.harmonic_fields(workspace, &sources, &mut seconds);
         self.add_edge(&mut fields);
+        self.turn_into_factors(&mut fields);
         let damping = self.damping(workspace);
         let (backscatter, facets) = self.facets(&fields, damping.as_ref());
         let mut clock = Clock::start();

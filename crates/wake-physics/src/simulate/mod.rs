@@ -10,7 +10,6 @@
 mod accuracy;
 mod clock;
 mod direct;
-mod label;
 mod linear_sea;
 mod simulation;
 mod speckling;
@@ -20,11 +19,11 @@ mod surface_fields;
 pub use accuracy::{Accuracy, Reached};
 pub use clock::Seconds;
 pub use direct::{DirectPixels, direct_intensity};
-pub use label::labels_of;
 pub use linear_sea::LinearSea;
 pub use simulation::{Method, SarImage, Simulation};
 
 use crate::error::Result;
+use crate::labels::labels_of;
 use crate::models::Models;
 use crate::plan::Plan;
 use crate::raster::Field;

@@ -2,17 +2,20 @@
 
 use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
-use super::label::echo_of;
 use super::simulation::Method;
 use super::speckling::Exposure;
 use super::surface_fields::{SurfaceFields, Wanted, quantities};
+use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
+use crate::labels::echo_displacement;
 use crate::models::{Models, turbulent_wake};
 use crate::nufft;
 use crate::plan::{Plan, SHARES};
 use crate::raster::{Field, Raster};
 use crate::sar::direct::DirectImage;
-use crate::sar::{Imaging, Sources};
+use crate::sar::echo::ship_cross_section;
+use crate::sar::{Echo, Imaging, Sources};
+use crate::scattering::hydrodynamic::to_bragg_factors;
 use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
 use crate::scene::{Scene, Term};
 use crate::surface::Surface;
@@ -100,6 +103,7 @@ impl<'a> Stages<'a> {
         accuracy.wake = self.add_wake(workspace, &mut fields);
         seconds.kelvin = clock.lap();
         self.add_edge(&mut fields);
+        self.turn_into_factors(&mut fields);
         let damping = self.damping(workspace);
         seconds.turbulent = clock.lap();
         let damping_field = damping.as_ref();
@@ -238,6 +242,19 @@ impl<'a> Stages<'a> {
         };
         workspace.give(fade);
         reached
+    }
+
+    /// Once all waves are in: from the modulation to the factor on the Bragg return.
+    pub(super) fn turn_into_factors(&self, fields: &mut SurfaceFields) {
+        if self.plan.uses(Term::Hydrodynamic) {
+            let sea = self.plan.uses(Term::Sea);
+            let variance = if sea {
+                self.plan.modulation_variance
+            } else {
+                0.0
+            };
+            to_bragg_factors(&mut fields.modulation, variance);
+        }
     }
 
     /// What the turbulent wake and slicks leave of the short waves.
@@ -430,7 +447,7 @@ impl<'a> Stages<'a> {
     /// Adds the ship's own echo, unless an impulse response is to image it, and the radar's noise.
     pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
         if self.models.response.is_none()
-            && let Some(echo) = echo_of(self.scene, self.models)
+            && let Some(echo) = self.echo()
         {
             let resolution = self.models.resolution_at_rest().nominal;
             echo.add_to(intensity, &self.models.image, resolution);
@@ -440,5 +457,20 @@ impl<'a> Stages<'a> {
             let pixels = intensity.values.par_iter_mut().with_min_len(1 << 14);
             pixels.for_each(|value| *value += noise);
         }
+    }
+
+    /// The ship's own echo, if it is asked for.
+    fn echo(&self) -> Option<Echo> {
+        let ship = self.scene.ship.as_ref().filter(|ship| ship.echo)?;
+        let wake = self.models.wake.as_ref()?;
+        let displacement = SEA_WATER_DENSITY * wake.hull.volume();
+        Some(Echo {
+            position: wake.track.position,
+            heading: ship.heading,
+            length: ship.length,
+            beam: ship.beam,
+            cross_section: ship_cross_section(self.scene.radar.frequency, displacement),
+            displacement: echo_displacement(self.scene, ship),
+        })
     }
 }

@@ -70,7 +70,7 @@ pub(super) struct SurfaceFields {
     pub(super) velocity_z: Field,
     /// Acceleration toward the radar [m/s²].
     pub(super) radial_acceleration: Field,
-    /// Hydrodynamic modulation of the Bragg waves \[1\].
+    /// Hydrodynamic modulation of the Bragg waves \[1\]; once all waves are in, the factor on their return.
     pub(super) modulation: Field,
 }
 

@@ -4,7 +4,7 @@ use super::amplitude::Amplitudes;
 use super::vector::{cos_sin, ln};
 use super::wave_lattice::WaveLattice;
 use crate::dispersion::angular_frequency;
-use crate::random::line_generator;
+use crate::random::{Stream, generator};
 use crate::raster::Raster;
 use crate::vectorize::vectorized;
 use crate::wind_sea::DirectionalSpectrum;
@@ -108,7 +108,7 @@ impl<'a> Draw<'a> {
         let [up, down] = self.lattice.disk(line);
         even[up.end..down.start].fill(Complex32::ZERO);
         odd[up.end..down.start].fill(Complex32::ZERO);
-        let mut generator = line_generator(self.seed, line as u64);
+        let mut generator = generator(self.seed, Stream::Sea, line as u64);
         let mut variance = 0.0;
         for range in self.lattice.disk(line) {
             self.levels(line, range.clone(), work);

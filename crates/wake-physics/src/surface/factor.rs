@@ -6,7 +6,7 @@
 use super::vector::Lane;
 use super::wave_lattice::WaveLattice;
 use crate::constants::{GRAVITY, KINEMATIC_SURFACE_TENSION};
-use crate::waves::{BRAGG_SPECTRUM_STEEPNESS, Quantity, Transfer};
+use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity, Transfer};
 use num_complex::{Complex, Complex32};
 use std::ops::Range;
 
@@ -27,6 +27,7 @@ pub(super) struct Factors<'a, T> {
     sin: T,
     cos: T,
     rate: T,
+    steepness: T,
 }
 
 impl<'a, T: Lane> Factors<'a, T> {
@@ -43,6 +44,7 @@ impl<'a, T: Lane> Factors<'a, T> {
             sin: T::constant(transfer.incidence.sin()),
             cos: T::constant(transfer.incidence.cos()),
             rate: T::constant(transfer.relaxation_rate),
+            steepness: T::constant(transfer.steepness),
         }
     }
 
@@ -99,9 +101,14 @@ impl<'a, T: Lane> Factors<'a, T> {
                 e * Complex::new(-omega[n] * omega[n] * self.cos, horizontal)
             }),
             Quantity::Hydrodynamic => {
-                let steepness = T::constant(BRAGG_SPECTRUM_STEEPNESS);
+                let limit = T::constant(LARGEST_MODULATING_WAVENUMBER.powi(2));
                 let rate = self.rate;
                 let gain = |n: usize| {
+                    let steepness = if kx * kx + ky[n] * ky[n] > limit {
+                        T::zero()
+                    } else {
+                        self.steepness
+                    };
                     steepness * kx * kx * orbital[n] / (omega[n] * omega[n] + rate * rate)
                 };
                 map(out, even, |n, e| e * (gain(n) * omega[n]));

@@ -6,7 +6,7 @@ use crate::fft::Real;
 use std::f32::consts::{LN_2, LOG2_E, SQRT_2, TAU};
 
 /// The arithmetic of one precision beyond what an FFT needs.
-pub(super) trait Lane: Real {
+pub(super) trait Lane: Real + PartialOrd {
     /// Rounds a constant.
     fn constant(value: f64) -> Self;
     /// Widens an `f32`.

@@ -9,7 +9,7 @@ use crate::raster::Raster;
 use crate::sar::AzimuthResolution;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::{Scene, Term};
-use crate::waves::Quantity;
+use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Step of the differences that give the slope of ln σ⁰ \[1\].
@@ -59,6 +59,8 @@ pub(crate) struct Survey {
     pub(crate) mean: [f64; 2],
     /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
     pub(crate) backscatter: [f64; 2],
+    /// Variance of the hydrodynamic modulation by the resolved sea \[1\].
+    pub(crate) modulation_variance: f64,
     /// Pixel size \[m\].
     pub(crate) spacing: f64,
     /// Number of looks.
@@ -120,6 +122,7 @@ impl Survey {
             damping: damping(models),
             mean: sensitivity.mean,
             backscatter: [sensitivity.tilt_average, sensitivity.specular],
+            modulation_variance: modulation_variance(models),
             spacing: models.image.spacing,
             looks: f64::from(scene.radar.looks),
             absent: Vec::new(),
@@ -292,6 +295,19 @@ fn sampled_wake(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
     let area = (height * across).max(wedge);
     let waves = waves::wake(&nodes, wake.track.forward, track_length, area);
     (waves, area / wedge)
+}
+
+/// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate.
+fn modulation_variance(models: &Models) -> f64 {
+    let band = models
+        .image
+        .nyquist_wavenumber()
+        .min(LARGEST_MODULATING_WAVENUMBER);
+    let factor = |w: &WaveSample| {
+        let transfer = &models.transfer;
+        transfer.factor(Quantity::Hydrodynamic, w.k, w.omega)
+    };
+    rms(&waves::sea(&models.sea, band), factor).powi(2)
 }
 
 fn slopes(waves: &[WaveSample]) -> SlopeCovariance {

@@ -99,11 +99,14 @@ pub struct Transfer {
     pub incidence: f64,
     /// Relaxation rate μ of the Bragg waves [1/s].
     pub relaxation_rate: f64,
+    /// Steepness `m_B` of the spectrum of the Bragg waves \[1\], see [`crate::scattering::hydrodynamic::steepness`].
+    pub steepness: f64,
 }
 
-/// Strength of the hydrodynamic modulation for a spectrum falling with k⁻⁴ (Alpers, Ross and Rufenach 1981,
-/// J. Geophys. Res. 86, with γ = 1/2): 4 + γ.
-pub(crate) const BRAGG_SPECTRUM_STEEPNESS: f64 = 4.5;
+/// Waves shorter than 5 m do not modulate the Bragg waves (chosen): above the relaxation rate the modulation is `m_B`
+/// times the steepness of the wave whatever its length, so that without an end its variance would follow the grid.
+/// Largest wavenumber that modulates [rad/m], with 1e-4 more so that rounding does not decide on 5 m itself.
+pub(crate) const LARGEST_MODULATING_WAVENUMBER: f64 = std::f64::consts::TAU / 5.0 * 1.0001;
 
 impl Transfer {
     /// Complex factor T of a quantity: the field is Σ Re[T·a·exp(i k·x)].
@@ -112,11 +115,11 @@ impl Transfer {
     /// slopes            i kx, i ky
     /// velocity          vz: −iω     vx, vy: ω coth(kh)·kx/k, ω coth(kh)·ky/k
     /// toward the radar  v_r = vz cos θ − vx sin θ,  acceleration −iω v_r
-    /// hydrodynamic      4.5 ω coth(kh) (kx²/k)(ω − iμ)/(ω² + μ²)
+    /// hydrodynamic      m_B ω coth(kh) (kx²/k)(ω − iμ)/(ω² + μ²)     for waves of 5 m and more
     /// ```
     ///
     /// The water under a crest moves along +k. The last line is the relaxation model
-    /// ∂m/∂t + μ m = −4.5 ∂vx/∂x for Bragg waves along the line of sight.
+    /// ∂m/∂t + μ m = −`m_B` ∂vx/∂x for Bragg waves along the line of sight.
     ///
     /// - `kx`, `ky` [rad/m], not both 0 (there T is 0 but for the elevation)
     /// - `omega` ω [rad/s]
@@ -141,9 +144,10 @@ impl Transfer {
             Quantity::VelocityY => (horizontal * ky / k).into(),
             Quantity::VelocityZ => -i * omega,
             Quantity::RadialAcceleration => -i * omega * self.radial([kx, ky], omega),
+            Quantity::Hydrodynamic if k > LARGEST_MODULATING_WAVENUMBER => Complex64::ZERO,
             Quantity::Hydrodynamic => {
                 let gradient = i * kx * (horizontal * kx / k);
-                -BRAGG_SPECTRUM_STEEPNESS * gradient / (self.relaxation_rate - i * omega)
+                -self.steepness * gradient / (self.relaxation_rate - i * omega)
             }
         }
     }
@@ -239,6 +243,7 @@ mod tests {
         depth: 12.0,
         incidence: 0.5,
         relaxation_rate: 0.7,
+        steepness: 4.5,
     };
 
     fn value(quantity: Quantity, k: [f64; 2], [x, y, t]: [f64; 3]) -> f64 {
@@ -272,12 +277,22 @@ mod tests {
             slope(Quantity::Elevation, 2),
         );
         close(value(Quantity::RadialAcceleration, k, p), acceleration);
-        // The relaxation equation ∂m/∂t + μ m = −4.5 ∂vx/∂x.
+        // The relaxation equation ∂m/∂t + μ m = −m_B ∂vx/∂x, here with 4.5.
         let m = value(Quantity::Hydrodynamic, k, p);
         close(
             slope(Quantity::Hydrodynamic, 2) + TRANSFER.relaxation_rate * m,
             -4.5 * slope(Quantity::VelocityX, 0),
         );
+    }
+
+    /// Waves of 5 m modulate, shorter ones do not.
+    #[test]
+    fn short_waves_do_not_modulate() {
+        for (length, modulates) in [(10.0, true), (5.0, true), (4.99, false), (1.0, false)] {
+            let k = std::f64::consts::TAU / length;
+            let factor = TRANSFER.factor(Quantity::Hydrodynamic, [0.8 * k, 0.6 * k], 1.0);
+            assert_eq!(factor != Complex64::ZERO, modulates, "{length}");
+        }
     }
 
     /// Under a crest the water moves along the wave; continuity holds at the surface in deep water.

@@ -82,9 +82,10 @@ fn the_mean_over_seas_is_the_expected_image() {
         let place = ShipPlace {
             position: ship.position,
             length: ship.length,
+            depth: scene.sea.depth,
         };
         let raster = simulate(&scene).unwrap().raster;
-        let inside = kelvin_wedge(&raster, &place, ship.heading);
+        let inside = kelvin_wedge(&raster, &place, ship.heading, ship.speed);
         let between = Moments::new(&halves[0], &halves[1], &inside).correlation();
         // What of the variance of the mean over all seas drawn is not chance.
         let reliable = 2.0 * between / (1.0 + between);

@@ -15,6 +15,7 @@ mod plan;
 mod satellite;
 mod simulator;
 mod trends;
+mod visibility;
 
 use wake_physics::scene::Term;
 use wake_physics::{Scene, Simulation, simulate};

@@ -1,6 +1,7 @@
 //! Where the pixels of the latents lie in the ship's frame.
 
 use super::conditions::Conditions;
+use wake_physics::kelvin::half_angle;
 
 /// Side of the squares of pixels that become one latent pixel.
 pub(crate) const PATCH: usize = 8;
@@ -19,10 +20,6 @@ pub struct MapGrid {
     pub size: usize,
     /// Side of a pixel \[m\].
     pub spacing: f64,
-}
-
-fn half_angle(_speed: f64, _depth: f64) -> f64 {
-    (1.0f64 / 3.0).asin()
 }
 
 /// The ship's own axes.

@@ -70,8 +70,9 @@ fn the_wedge_is_that_of_the_simulators_measurements() {
         let ship = ShipPlace {
             position,
             length: SHIP_LENGTH,
+            depth: f64::INFINITY,
         };
-        let inside = kelvin_wedge(&raster, &ship, heading);
+        let inside = kelvin_wedge(&raster, &ship, heading, 8.0);
         for cell in GRID.cells() {
             let (row, column) = (cell / coarse * PATCH, cell % coarse * PATCH);
             let pixels = (0..PATCH * PATCH).map(|p| (row + p / PATCH, column + p % PATCH));

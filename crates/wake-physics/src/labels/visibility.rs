@@ -1,0 +1,392 @@
+//! How far a wake is seen, and how clearly: its expected contrast against sea and speckle, without an image.
+
+use crate::kelvin::{KelvinWake, Ray};
+use crate::models::{Models, turbulent_wake};
+use crate::modulation::{ModulationTransfer, smear};
+use crate::raster::Raster;
+use crate::scene::{Scene, Term};
+use crate::survey::Survey;
+use crate::turbulent::TurbulentWake;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, SQRT_2};
+
+/// Side of the windows in which a wake is looked for \[pixels\]: chosen.
+const WINDOW: usize = 16;
+
+/// A window shows the wake from this ratio on, of the root of the summed squares of what the wake changes to the standard
+/// deviation of a pixel: chosen; five deviations of a filter that knows the pattern, about ⅓ of one in each pixel.
+const THRESHOLD: f64 = 5.0;
+
+/// Resolution ρ of a Gaussian exp(−(πy/ρ)²) over its width at half power: π/(2√ln 2).
+const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
+
+/// Least standard deviation of a pixel that counts: the rounding of the fields.
+const LEAST_NOISE: f64 = 1e-6;
+
+/// How clearly a wake is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Visibility {
+    /// 10 log₁₀(1 + s), s the root of the mean square of the relative change of the intensity that the wake is expected
+    /// to make \[dB\]; 0 where nothing is to be seen.
+    pub contrast_db: f64,
+    /// s over the standard deviation of one pixel by sea and speckle \[1\].
+    pub snr: f64,
+}
+
+/// How far the parts of a wake are seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    /// Distance astern of the bow up to which waves are seen \[m\]; 0 where none is.
+    pub(super) waves: f64,
+    /// The same of the dark line.
+    pub(super) dark_line: f64,
+    /// Half-width of the dark line at its end \[m\].
+    pub(super) half_width: f64,
+    /// How clearly, on average up to the longer end, or in all of the wedge if nothing is seen; `None` where the wedge
+    /// does not meet the image.
+    pub(super) visibility: Option<Visibility>,
+}
+
+impl Extent {
+    /// No wake, or none in the image.
+    pub(super) const NOTHING: Self = Self {
+        waves: 0.0,
+        dark_line: 0.0,
+        half_width: 0.0,
+        visibility: None,
+    };
+}
+
+/// The waves of one ray as they are imaged.
+#[derive(Debug, Clone, Copy)]
+struct ImagedRay {
+    /// Distance off the track over the distance astern of midship, to port \[1\].
+    tangent: f64,
+    /// Mean square of the relative change of the image, integrated across the ray \[m\].
+    change: f64,
+    /// Mean square of the velocity toward the radar, likewise [m³/s²].
+    velocity: f64,
+    /// Squared azimuth phase by which a unit of velocity moves the wave, (ky R/V)² [s²/m²].
+    displaced: f64,
+}
+
+/// The sea that a wake is seen against.
+#[derive(Debug)]
+pub(super) struct Background {
+    transfer: ModulationTransfer,
+    raster: Raster,
+    /// Largest wavenumber that the computed pixels carry [rad/m].
+    largest: f64,
+    /// Share of the intensity that waves change: the rest are breaking waves and the radar's noise.
+    share: f64,
+    /// Resolution in range where it is not the pixel \[m\].
+    range_resolution: f64,
+    /// Azimuth resolution of the moving sea \[m\].
+    resolution: f64,
+    /// Standard deviation of one pixel over its mean.
+    noise: f64,
+    waves_drawn: bool,
+    dark_line_drawn: bool,
+}
+
+impl Background {
+    /// The open sea of a scene, and the wake of its ship; `None` if the image is dark.
+    pub(super) fn new(scene: &Scene) -> (Option<Self>, Option<KelvinWake>) {
+        let mut models = Models::new(scene);
+        let wake = models.wake.take();
+        let drawn = |term| scene.model.terms.allow(term);
+        let survey = Survey::new(scene, &models);
+        if survey.mean[0] + survey.mean[1] <= 0.0 {
+            return (None, wake);
+        }
+        let [range_resolution, own] = models.response.map_or([0.0; 2], |response| {
+            [response.range, response.azimuth].map(|axis| OF_HALF_POWER * axis.resolution)
+        });
+        let mut resolution = models.resolution_at_rest().nominal;
+        if drawn(Term::Sea) {
+            let (slopes, velocity) = survey.resolved_sea();
+            models.average_over(&slopes, velocity);
+        }
+        if drawn(Term::Bunching) {
+            resolution = models.resolution().at(0.0);
+        }
+        resolution = resolution.hypot(own);
+        let mut transfer = survey.modulation_of(&models);
+        if !drawn(Term::Bunching) {
+            transfer.range_to_velocity = 0.0;
+        }
+        let mut background = Self {
+            transfer,
+            raster: models.delivered,
+            largest: models.image.nyquist_wavenumber(),
+            share: 1.0 / (1.0 + survey.added.iter().sum::<f64>()),
+            resolution,
+            range_resolution,
+            noise: 0.0,
+            waves_drawn: drawn(Term::Kelvin),
+            dark_line_drawn: drawn(Term::Turbulent),
+        };
+        let sea: f64 = survey
+            .sea
+            .iter()
+            .filter(|_| drawn(Term::Sea))
+            .map(|w| w.variance * background.modulation(w.k, w.omega))
+            .sum();
+        let speckle = if drawn(Term::Speckle) {
+            (1.0 + sea) / f64::from(scene.radar.looks)
+        } else {
+            0.0
+        };
+        background.noise = (sea + speckle).sqrt().max(LEAST_NOISE);
+        (Some(background), wake)
+    }
+
+    /// Mean square of the relative change of the image by a wave of unit mean square elevation [1/m²].
+    fn modulation(&self, k: [f64; 2], omega: f64) -> f64 {
+        let smeared = smear(k[1], self.resolution) * smear(k[0], self.range_resolution);
+        let change = self.share * smeared;
+        self.transfer.at(k, omega).total().norm_sqr() * change * change
+    }
+
+    /// How far a wake is seen that opens by `half_angle` \[rad\].
+    pub(super) fn extent(&self, wake: &KelvinWake, half_angle: f64) -> Extent {
+        let step = WINDOW as f64 * self.raster.spacing;
+        let rays = self.rays(wake);
+        let band = DarkLine::new(self, wake);
+        let half_length = 0.5 * wake.hull.length();
+        let farthest = wake
+            .track
+            .corners(&self.raster)
+            .iter()
+            .map(|c| -half_length - c[0])
+            .fold(0.0, f64::max);
+        let mut extent = Extent::NOTHING;
+        let mut rows = Vec::new();
+        for n in 0..(farthest / step).ceil() as usize {
+            // Middle of the row of windows, astern of the stern.
+            let distance = (n as f64 + 0.5) * step;
+            let row = self.row(wake, distance, half_angle, &rays, &band);
+            let end = distance + 0.5 * step + 2.0 * half_length;
+            let seen = |square: f64| WINDOW as f64 * square.sqrt() >= THRESHOLD * self.noise;
+            if seen(row.largest[0]) {
+                extent.waves = end;
+            }
+            if seen(row.largest[1]) {
+                extent.dark_line = end;
+                extent.half_width = band.half_width(distance + 0.5 * step);
+            }
+            rows.push((end, row));
+        }
+        let seen = extent.waves.max(extent.dark_line);
+        let counted = rows.iter().filter(|(end, _)| seen == 0.0 || *end <= seen);
+        let (sum, count) = counted.fold((0.0, 0.0), |(sum, count), (_, row)| {
+            // Where no wave is seen the box holds the dark line alone.
+            let of = if extent.waves > 0.0 || seen == 0.0 {
+                row.wedge
+            } else {
+                row.line
+            };
+            (sum + of[0], count + of[1])
+        });
+        extent.visibility = (count > 0.0).then(|| self.visibility(sum / count));
+        extent
+    }
+
+    fn visibility(&self, mean_square: f64) -> Visibility {
+        let change = mean_square.sqrt();
+        Visibility {
+            contrast_db: 10.0 * (1.0 + change).log10(),
+            snr: change / self.noise,
+        }
+    }
+
+    /// The rays of the wake that are drawn, of both sides.
+    fn rays(&self, wake: &KelvinWake) -> Vec<ImagedRay> {
+        if !self.waves_drawn {
+            return Vec::new();
+        }
+        let of_side = |ray: &Ray, side: f64| {
+            let k = wake.track.turned([ray.k[0], side * ray.k[1]]);
+            let radial = self.transfer.transfer.radial(k, ray.omega);
+            ImagedRay {
+                tangent: side * ray.tangent,
+                change: ray.energy * self.modulation(k, ray.omega),
+                velocity: ray.energy * radial.norm_sqr(),
+                displaced: (k[1] * self.transfer.range_to_velocity).powi(2),
+            }
+        };
+        let rays = wake.rays(self.largest);
+        rays.iter()
+            .flat_map(|ray| [1.0, -1.0].map(|side| of_side(ray, side)))
+            .collect()
+    }
+
+    /// The windows across the track at one distance astern of the stern.
+    fn row(
+        &self,
+        wake: &KelvinWake,
+        distance: f64,
+        half_angle: f64,
+        rays: &[ImagedRay],
+        band: &DarkLine,
+    ) -> Row {
+        let width = WINDOW as f64 * self.raster.spacing;
+        let half_length = 0.5 * wake.hull.length();
+        let from_midship = distance + half_length;
+        let reach = (half_angle.tan() * (from_midship + half_length)).min(self.diagonal());
+        let half_band = band.half_width(distance);
+        let half = (reach.max(half_band) / width - 0.5).ceil().max(0.0) as usize;
+        let windows = 2 * half + 1;
+        let place = |ray: &ImagedRay| {
+            let place = (ray.tangent * from_midship / width).round() + half as f64;
+            (place >= 0.0 && place < windows as f64).then_some(place as usize)
+        };
+        // The velocity at the places of a window, by which its waves displace themselves.
+        let mut velocity = vec![0.0; windows];
+        for ray in rays {
+            if let Some(n) = place(ray) {
+                velocity[n] += ray.velocity / width;
+            }
+        }
+        let mut waves = vec![0.0; windows];
+        for ray in rays {
+            if let Some(n) = place(ray) {
+                waves[n] += ray.change / width * bunched(ray.displaced * velocity[n]);
+            }
+        }
+        let mut row = Row::default();
+        for (n, waves) in waves.into_iter().enumerate() {
+            let off = (n as f64 - half as f64) * width;
+            if !self.holds(wake.track.on_sea([-from_midship, off])) {
+                continue;
+            }
+            let dark = band.mean_square(distance, off, width);
+            row.largest = [row.largest[0].max(waves), row.largest[1].max(dark)];
+            row.wedge = [row.wedge[0] + waves + dark, row.wedge[1] + 1.0];
+            if off.abs() <= half_band.max(0.5 * width) {
+                row.line = [row.line[0] + waves + dark, row.line[1] + 1.0];
+            }
+        }
+        row
+    }
+
+    fn holds(&self, [x, y]: [f64; 2]) -> bool {
+        let [column, row] = self.raster.pixel(x, y);
+        (0.0..=self.raster.columns as f64 - 1.0).contains(&column)
+            && (0.0..=self.raster.rows as f64 - 1.0).contains(&row)
+    }
+
+    /// Farthest that two places of the image lie apart, twice \[m\]: windows beyond are outside.
+    fn diagonal(&self) -> f64 {
+        let [height, across] = [self.raster.rows, self.raster.columns].map(|n| n as f64);
+        2.0 * height.hypot(across) * self.raster.spacing
+    }
+}
+
+/// What the displacement by its own velocity leaves of the power of a wave.
+///
+/// ```text
+/// (2 J₁(C)/C)²,     C² = 2 (ky R/V)² ⟨u²⟩
+/// ```
+///
+/// The echoes of a sinusoid displaced by (C/ky) sin have the fundamental 2J₁(C), to first order C; harmonics, which the
+/// smear of the sea weakens most, are left out.
+///
+/// - `phase`: (ky R/V)² ⟨u²⟩ \[1\], at least 0
+fn bunched(phase: f64) -> f64 {
+    let c = (2.0 * phase).sqrt();
+    if c < 1e-4 {
+        return 1.0;
+    }
+    (2.0 * libm::j1(c) / c).powi(2)
+}
+
+/// The windows of one row.
+#[derive(Debug, Clone, Copy, Default)]
+struct Row {
+    /// Largest mean square of the change by waves, and by the dark line.
+    largest: [f64; 2],
+    /// Sum of the mean squares, and number of windows, in the wedge.
+    wedge: [f64; 2],
+    /// The same along the dark line.
+    line: [f64; 2],
+}
+
+/// The dark line as the radar shows it: the turbulent wake, smeared in azimuth.
+struct DarkLine {
+    wake: TurbulentWake,
+    /// Share of the intensity that it takes away at full damping, 0 if it is not drawn.
+    share: f64,
+    /// Standard deviation of the smear across the track \[m\].
+    smear: f64,
+}
+
+impl DarkLine {
+    fn new(background: &Background, wake: &KelvinWake) -> Self {
+        let deviation = background.resolution / (SQRT_2 * PI);
+        Self {
+            wake: turbulent_wake(wake),
+            share: if background.dark_line_drawn {
+                background.share * background.transfer.bragg_share
+            } else {
+                0.0
+            },
+            // The track's port side leans on azimuth by its y component.
+            smear: deviation * wake.track.port()[1].abs(),
+        }
+    }
+
+    /// Standard deviations of the damping across the track, without and with the smear \[m\].
+    fn deviations(&self, distance: f64) -> [f64; 2] {
+        let own = 0.5 * crate::turbulent::width(self.wake.beam, distance);
+        [own, own.hypot(self.smear)]
+    }
+
+    /// Two standard deviations \[m\].
+    fn half_width(&self, distance: f64) -> f64 {
+        2.0 * self.deviations(distance)[1]
+    }
+
+    /// Mean square of the change over a window around a place `off` the track \[m\], `width` wide.
+    fn mean_square(&self, distance: f64, off: f64, width: f64) -> f64 {
+        let [own, wide] = self.deviations(distance);
+        let centre = crate::turbulent::centre_damping(self.wake.speed, distance);
+        let depth = self.share * centre * own / wide;
+        let square = |n: usize| {
+            let at = off + ((n as f64 + 0.5) / WINDOW as f64 - 0.5) * width;
+            (-(at / wide).powi(2)).exp()
+        };
+        depth * depth * (0..WINDOW).map(square).sum::<f64>() / WINDOW as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bunched;
+    use std::f64::consts::TAU;
+
+    /// The fundamental of displaced echoes by counting them: places y + (C/k) sin(ky) of even sources.
+    #[test]
+    fn a_displaced_sinusoid_has_the_fundamental_of_its_echoes() {
+        for c in [0.1f64, 0.5, 1.0, 2.0, 3.0] {
+            let count = 4096;
+            let mean = |f: fn(f64) -> f64| -> f64 {
+                (0..count)
+                    .map(|n| {
+                        let phase = TAU * f64::from(n) / f64::from(count);
+                        f(phase + c * phase.sin())
+                    })
+                    .sum::<f64>()
+                    / f64::from(count)
+            };
+            let fundamental = 2.0 * mean(f64::cos).hypot(mean(f64::sin));
+            // A periodic sum of 4096 points of a smooth function is exact.
+            assert!(
+                (bunched(0.5 * c * c) - (fundamental / c).powi(2)).abs() < 1e-10,
+                "{c}"
+            );
+        }
+        assert!((bunched(0.0) - 1.0).abs() < 1e-15);
+    }
+}

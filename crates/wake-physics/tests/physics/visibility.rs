@@ -1,0 +1,227 @@
+//! How clearly labels say that a wake is seen, against images.
+
+use crate::{open_sea, run};
+use wake_physics::kelvin::half_angle;
+use wake_physics::labels::{Visibility, WakeLabel};
+use wake_physics::{Field, Raster, Scene, expected_intensity, labels_of};
+
+/// 320 × 320 pixels of 4 m, the ship near a corner and its wake across the image.
+fn scene(assignments: &[&str]) -> Scene {
+    let grid = [
+        "grid.rows=320",
+        "grid.columns=320",
+        "grid.spacing=4",
+        "ship.heading=50",
+        "ship.position=[380, 320]",
+    ];
+    Scene::default()
+        .with_assignments(&[&grid[..], assignments].concat())
+        .unwrap()
+}
+
+fn raster(scene: &Scene) -> Raster {
+    Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing)
+}
+
+fn wake(scene: &Scene) -> WakeLabel {
+    labels_of(scene).ships[0].wake.clone()
+}
+
+fn visibility(scene: &Scene) -> Visibility {
+    wake(scene).visibility.unwrap()
+}
+
+/// Root mean square of the change that a visibility states.
+fn change(visibility: Visibility) -> f64 {
+    10f64.powf(0.1 * visibility.contrast_db) - 1.0
+}
+
+/// The relative change of the expected image by the wake.
+fn expected_change(scene: &Scene) -> Vec<f64> {
+    let level = expected_intensity(&open_sea(scene.clone())).unwrap().mean();
+    let image = expected_intensity(scene).unwrap();
+    image
+        .values
+        .iter()
+        .map(|&v| f64::from(v) / level - 1.0)
+        .collect()
+}
+
+/// Distance astern of the stern and off the track of every pixel.
+fn places(scene: &Scene) -> Vec<[f64; 2]> {
+    let (raster, ship) = (raster(scene), scene.ship.as_ref().unwrap());
+    let (sin, cos) = ship.heading.to_radians().sin_cos();
+    (0..raster.len())
+        .map(|n| {
+            let dx = raster.x(n % raster.columns) - ship.position[0];
+            let dy = raster.y(n / raster.columns) - ship.position[1];
+            [
+                -(dx * sin + dy * cos) - 0.5 * ship.length,
+                dx * cos - dy * sin,
+            ]
+        })
+        .collect()
+}
+
+/// Pixels of the wedge astern of the stern, up to the end of what the label calls visible.
+fn wedge(scene: &Scene, length: f64) -> Vec<bool> {
+    let ship = scene.ship.as_ref().unwrap();
+    let tan = half_angle(ship.speed, scene.sea.depth).tan();
+    let inside = |[astern, aside]: [f64; 2]| {
+        let from_bow = astern + ship.length;
+        astern > 0.0 && from_bow <= length && aside.abs() <= tan * from_bow
+    };
+    places(scene).into_iter().map(inside).collect()
+}
+
+fn rms(values: &[f64], inside: &[bool]) -> f64 {
+    let squares = values.iter().zip(inside).filter(|(_, i)| **i);
+    let (sum, count) = squares.fold((0.0, 0.0), |(s, n), (v, _)| (s + v * v, n + 1.0));
+    (sum / f64::from(count as u32)).sqrt()
+}
+
+fn length_m(scene: &Scene) -> f64 {
+    wake(scene).length_px * scene.grid.spacing
+}
+
+/// The linear image is good to a quarter at 5 and 7 m/s, and some more at headings where tilt and bunching are as strong
+/// as each other; at 3 m/s, where the wake changes the image by half, its harmonics are missing.
+#[test]
+fn the_contrast_is_that_of_the_expected_image() {
+    for heading in [50, 20, 80] {
+        for wind in [3, 5, 7] {
+            let scene = scene(&[
+                &format!("sea.wind_speed={wind}"),
+                &format!("ship.heading={heading}"),
+            ]);
+            let stated = change(visibility(&scene));
+            let seen = rms(&expected_change(&scene), &wedge(&scene, length_m(&scene)));
+            println!("heading {heading} wind {wind}: stated {stated:.4} seen {seen:.4}");
+            let ratio = stated / seen;
+            let limits = if wind > 3 { 0.7..1.3 } else { 0.5..1.5 };
+            assert!(
+                limits.contains(&ratio),
+                "heading {heading} wind {wind}: stated {stated:.4} seen {seen:.4}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_noise_is_that_of_the_simulated_image() {
+    for (wind, looks) in [(3, 4), (5, 4), (7, 4), (5, 1), (5, 100)] {
+        let scene = scene(&[
+            &format!("sea.wind_speed={wind}"),
+            &format!("radar.looks={looks}"),
+        ]);
+        let visibility = visibility(&scene);
+        let stated = change(visibility) / visibility.snr;
+        let mut sum = 0.0;
+        for seed in 0..4 {
+            let image = run(&open_sea(Scene {
+                seed,
+                ..scene.clone()
+            }))
+            .speckled;
+            let mean = image.mean();
+            let square = |f: &Field| {
+                f.values
+                    .iter()
+                    .map(|&v| (f64::from(v) / mean - 1.0).powi(2))
+                    .sum::<f64>()
+            };
+            sum += square(&image) / image.values.len() as f64 / 4.0;
+        }
+        let seen = sum.sqrt();
+        println!("wind {wind} looks {looks}: stated {stated:.4} seen {seen:.4}");
+        // Speckle alone is exact; where there is little of it, the linear image of the sea is left, good to a tenth.
+        let limit = if looks > 10 { 0.1 } else { 0.03 };
+        assert!(
+            (stated / seen - 1.0).abs() < limit,
+            "wind {wind} looks {looks}: stated {stated:.4} seen {seen:.4}"
+        );
+    }
+}
+
+#[test]
+fn visibility_falls_with_wind_and_rises_with_looks() {
+    let snr = |assignments: &[&str]| visibility(&scene(assignments)).snr;
+    let winds = ["3", "5", "7"].map(|wind| snr(&[&format!("sea.wind_speed={wind}")]));
+    assert!(winds[0] > winds[1] && winds[1] > winds[2], "{winds:?}");
+    let looks = ["1", "4", "16"].map(|looks| snr(&[&format!("radar.looks={looks}")]));
+    assert!(looks[0] < looks[1] && looks[1] < looks[2], "{looks:?}");
+}
+
+/// Terms of a sea without the dark line.
+const WITHOUT_DARK_LINE: &str = "model.terms=[\"sea\", \"kelvin\", \"tilt_average\", \"specular\", \"range_bunching\", \"hydrodynamic\", \"bunching\", \"coherence\", \"speckle\"]";
+
+/// Waves of 4 m on pixels of 4 m: none is carried. With a dark line the box holds that alone, without it there is none.
+#[test]
+fn no_wave_and_no_dark_line_have_no_box() {
+    let slow = scene(&["ship.speed=2.5"]);
+    let line = wake(&slow);
+    assert!(line.arms_px.is_empty() && line.box_px.is_some());
+    let across = line.oriented_box_px.unwrap();
+    let width = (across[0][0] - across[1][0]).hypot(across[0][1] - across[1][1]);
+    // Two standard deviations to each side of at most 50 m: the wake's 26 m of beam after a kilometre, and the smear.
+    assert!(width * 4.0 < 200.0, "{width}");
+    let nothing = wake(&slow.with_assignments(&[WITHOUT_DARK_LINE]).unwrap());
+    assert_eq!(
+        (nothing.box_px, nothing.oriented_box_px, nothing.length_px),
+        (None, None, 0.0)
+    );
+    assert!(nothing.arms_px.is_empty() && nothing.centreline_px.is_none());
+    assert_eq!(
+        nothing.visibility,
+        Some(Visibility {
+            contrast_db: 0.0,
+            snr: 0.0
+        })
+    );
+}
+
+/// The farthest window of 16 × 16 pixels in which the expected image differs from the sea by five times the noise of a
+/// pixel, against the length of the label. On the arms contrast falls with the cube root of the distance, so that a quarter
+/// more or less of it is a factor of 2 or 0.4 in the length.
+#[test]
+fn the_box_ends_where_the_wake_fades() {
+    for (wind, heading, filter) in [(5, 50, 2), (7, 50, 3), (7, 300, 2)] {
+        let scene = scene(&[
+            WITHOUT_DARK_LINE,
+            "grid.rows=1024",
+            "grid.columns=1024",
+            "radar.looks=1",
+            "ship.length=80",
+            "ship.beam=12",
+            "ship.draft=4",
+            "ship.speed=8",
+            &format!("ship.filter_depth={filter}"),
+            &format!(
+                "ship.position=[{}, 1500]",
+                if heading < 180 { 1500 } else { -1500 }
+            ),
+            &format!("ship.heading={heading}"),
+            &format!("sea.wind_speed={wind}"),
+        ]);
+        let label = wake(&scene);
+        let noise = change(visibility(&scene)) / visibility(&scene).snr;
+        let (seen, places) = (expected_change(&scene), places(&scene));
+        let mut farthest = 0.0f64;
+        for block in 0..64 * 64 {
+            let [top, left] = [block / 64 * 16, block % 64 * 16];
+            let pixels = (0..256).map(|n| (top + n / 16) * 1024 + left + n % 16);
+            let square: f64 = pixels.map(|n| seen[n] * seen[n]).sum();
+            let middle = places[(top + 8) * 1024 + left + 8];
+            if square.sqrt() >= 5.0 * noise && middle[0] > 0.0 {
+                farthest = farthest.max(middle[0] + 80.0);
+            }
+        }
+        let stated = label.length_px * scene.grid.spacing;
+        println!("wind {wind} heading {heading}: stated {stated} seen {farthest}");
+        let ratio = stated / farthest;
+        assert!(
+            (0.4..2.0).contains(&ratio) && stated < 3500.0,
+            "wind {wind} heading {heading}: stated {stated} seen {farthest}"
+        );
+    }
+}
