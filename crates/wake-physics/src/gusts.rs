@@ -9,7 +9,7 @@
 //! Kolmogorov's. Scale, elongation and strength are chosen. The factor multiplies all of σ⁰; the waves of the sea stay.
 
 use crate::fft::{Synthesis, fast_length, signed_index};
-use crate::random::line_generator;
+use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
 use num_complex::Complex32;
 use rand_distr::{Distribution, StandardNormal};
@@ -21,9 +21,6 @@ const ELONGATION: f64 = 1.5;
 
 /// Period of the field over the extent of the raster: opposite edges are strangers.
 const PERIOD: f64 = 1.25;
-
-/// First random line of the gusts.
-const LINE: u64 = 1 << 42;
 
 /// Exponent n of σ⁰ ∝ `U₁₀`ⁿ.
 ///
@@ -76,7 +73,7 @@ impl Gusts {
             .par_chunks_mut(rows)
             .enumerate()
             .for_each(|(b, line)| {
-                let mut random = line_generator(seed, LINE + b as u64);
+                let mut random = generator(seed, Stream::Gusts, b as u64);
                 let kx = signed_index(b, columns) as f64 * step[1];
                 for (a, value) in line.iter_mut().enumerate() {
                     let ky = signed_index(a, rows) as f64 * step[0];

@@ -6,32 +6,55 @@ use rand::{Rng, SeedableRng};
 /// An odd constant that spreads line numbers over 64 bits, unlike the one that spreads the seed afterwards.
 const LINE_STEP: u64 = 0xD134_2543_DE82_EF95;
 
-/// The generator of one line.
-///
-/// Its numbers are fixed by `seed` and `line` alone, on every platform: lines can be drawn in any order.
-#[must_use]
-pub(crate) fn line_generator(seed: u64, line: u64) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(seed ^ line.wrapping_add(1).wrapping_mul(LINE_STEP))
-}
-
-/// What random numbers of one seed are drawn for. Every use has a stream of its own, here and nowhere else.
+/// What random numbers of one seed are drawn for. Every use has a stream of its own, here and nowhere else: lines of the
+/// same seed from its first line up to the first of the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stream {
     /// Amplitudes of the sea, by lines of its lattice.
     Sea,
-    /// Speckle, by rows of the image.
+    /// Phases of points, by looks.
+    Points,
+    /// Places and strengths of the scatterers of a ship.
+    Scatterers,
+    /// Gusts, by lines of their lattice.
+    Gusts,
+    /// Directions and phases of slicks.
+    Slicks,
+    /// Phases of the swell.
+    Swell,
+    /// Reflectivity of the sea, by looks and rows.
+    Reflectivity,
+    /// Speckle, by rows of the image; its lines are counted from the first number of the seed.
     Speckle,
 }
 
-/// The generator of one line of a stream.
-pub(crate) fn generator(seed: u64, stream: Stream, line: u64) -> Xoshiro256PlusPlus {
-    match stream {
-        Stream::Sea => line_generator(seed, line),
-        Stream::Speckle => {
-            let key = Xoshiro256PlusPlus::seed_from_u64(seed).next_u64();
-            Xoshiro256PlusPlus::seed_from_u64(key.wrapping_add(line))
+impl Stream {
+    fn first_line(self) -> u64 {
+        match self {
+            Self::Sea | Self::Speckle => 0,
+            Self::Points => 1 << 40,
+            Self::Scatterers => 1 << 41,
+            Self::Gusts => 1 << 42,
+            Self::Slicks => 1 << 43,
+            Self::Swell => 1 << 44,
+            Self::Reflectivity => 1 << 45,
         }
     }
+}
+
+/// The generator of one line of a stream.
+///
+/// Its numbers are fixed by `seed`, `stream` and `line` alone, on every platform: lines can be drawn in any order.
+#[must_use]
+pub(crate) fn generator(seed: u64, stream: Stream, line: u64) -> Xoshiro256PlusPlus {
+    let line = stream.first_line() + line;
+    Xoshiro256PlusPlus::seed_from_u64(match stream {
+        Stream::Speckle => {
+            let first = Xoshiro256PlusPlus::seed_from_u64(seed).next_u64();
+            first.wrapping_add(line)
+        }
+        _ => seed ^ line.wrapping_add(1).wrapping_mul(LINE_STEP),
+    })
 }
 
 #[cfg(test)]
@@ -39,40 +62,46 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
+    const ALL: [Stream; 8] = [
+        Stream::Sea,
+        Stream::Points,
+        Stream::Scatterers,
+        Stream::Gusts,
+        Stream::Slicks,
+        Stream::Swell,
+        Stream::Reflectivity,
+        Stream::Speckle,
+    ];
+
+    /// No line of any stream and seed begins as another does, and each begins the same again.
     #[test]
-    fn lines_and_seeds_differ_and_repeat() {
+    fn streams_lines_and_seeds_differ_and_repeat() {
         let mut seen = HashSet::new();
-        for seed in [0, 1, 7, u64::MAX] {
-            for line in 0..1000 {
-                let mut generator = line_generator(seed, line);
-                assert!(seen.insert(generator.next_u64()), "{seed} {line}");
-                assert_eq!(
-                    line_generator(seed, line).next_u64(),
-                    line_generator(seed, line).next_u64()
-                );
+        for seed in [0, 1, 2, 7, 1 << 40, u64::MAX] {
+            for stream in ALL {
+                for line in (0..3000).chain([1 << 20, 1 << 30]) {
+                    let first = generator(seed, stream, line).next_u64();
+                    assert!(seen.insert(first), "{seed} {stream:?} {line}");
+                    assert_eq!(generator(seed, stream, line).next_u64(), first);
+                }
             }
         }
     }
 
-    /// No line of any stream and seed begins as another does.
+    /// The streams have room: the longest, a thousand looks of 2²⁰ rows, ends before another begins.
     #[test]
-    fn streams_do_not_overlap() {
-        let mut seen = HashSet::new();
-        for seed in [0, 1, 2, 7, 1 << 40, u64::MAX] {
-            for stream in [Stream::Sea, Stream::Speckle] {
-                for line in 0..20_000 {
-                    let first = generator(seed, stream, line).next_u64();
-                    assert!(seen.insert(first), "{seed} {stream:?} {line}");
-                }
-            }
-        }
+    fn streams_of_lines_do_not_meet() {
+        let longest = 1000u64 << 20;
+        let mut firsts: Vec<u64> = ALL[..7].iter().map(|s| s.first_line()).collect();
+        firsts.sort_unstable();
+        assert!(firsts.windows(2).all(|pair| pair[1] - pair[0] > longest));
     }
 
     /// Neighbouring lines are uncorrelated: the mean product of their signs is within 5 standard errors of 0.
     #[test]
     fn neighbouring_lines_are_uncorrelated() {
         let count = 20_000;
-        let (mut one, mut two) = (line_generator(3, 10), line_generator(3, 11));
+        let (mut one, mut two) = (generator(3, Stream::Sea, 10), generator(3, Stream::Sea, 11));
         let same = (0..count)
             .filter(|_| (one.next_u64() ^ two.next_u64()) >> 63 == 0)
             .count();

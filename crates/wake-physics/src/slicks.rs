@@ -7,7 +7,7 @@
 //! ψ is a random sum of plane waves of one length, the slicks lie along its zeros: lines that wind and close, at a mean
 //! distance of about half that length. A drawing of what images show; every constant is chosen.
 
-use crate::random::line_generator;
+use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
 use rand::Rng;
 use std::f64::consts::TAU;
@@ -17,9 +17,6 @@ pub const STRONGEST_WIND: f64 = 6.0;
 
 /// Plane waves in ψ: enough that it is close to Gaussian.
 const WAVES: usize = 24;
-
-/// First random line of the slicks.
-const LINE: u64 = 1 << 43;
 
 /// The slicks of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +58,7 @@ impl Slicks {
     }
 
     fn waves(&self, seed: u64) -> Vec<Wave> {
-        let mut random = line_generator(seed, LINE);
+        let mut random = generator(seed, Stream::Slicks, 0);
         let mut turn = || TAU * (random.next_u64() >> 11) as f64 * 2f64.powi(-53);
         let k = TAU / self.scale;
         (0..WAVES)

@@ -7,7 +7,7 @@
 //! with N the Gaussian density. The widths are chosen; a swell's are narrower the farther it has come.
 
 use crate::dispersion::angular_frequency;
-use crate::random::line_generator;
+use crate::random::{Stream, generator};
 use crate::waves::PlaneWaves;
 use num_complex::Complex64;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
@@ -24,9 +24,6 @@ const CUT: f64 = 5.0;
 
 /// Waves along the wavenumber and along the direction.
 const WAVES: usize = 32;
-
-/// Random line of the swell.
-const LINE: u64 = 1 << 44;
 
 /// A swell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +83,7 @@ impl Swell {
     /// - `seed`: the same seed gives the same waves
     #[must_use]
     pub fn waves(&self, (seed, time): (u64, f64), depth: f64, band: f64) -> PlaneWaves {
-        let mut random = line_generator(seed, LINE);
+        let mut random = generator(seed, Stream::Swell, 0);
         let cells = self.cells(band, || StandardUniform.sample(&mut random));
         let mut waves = PlaneWaves::default();
         for ([kx, ky], variance) in cells {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::constants::GRAVITY;
-use crate::random::line_generator;
+use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
 use crate::scene::{Scene, Ship};
 use crate::simulate;
@@ -23,7 +23,7 @@ fn raster() -> Raster {
 fn noise(std: f64, seed: u64) -> Field {
     let mut field = Field::constant(&raster(), 1.0);
     for (i, row) in field.values.chunks_mut(256).enumerate() {
-        let mut random = line_generator(seed, i as u64);
+        let mut random = generator(seed, Stream::Sea, i as u64);
         for v in row {
             let normal: f64 = StandardNormal.sample(&mut random);
             *v = (1.0 + std * normal).max(0.1) as f32;

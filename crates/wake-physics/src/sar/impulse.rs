@@ -10,7 +10,7 @@
 //! its image integrates to σ.
 
 use crate::fft::{self, LowPass};
-use crate::random::line_generator;
+use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
 use crate::surface::vector::{cos_sin, ln};
 use crate::vectorize::vectorized;
@@ -21,14 +21,8 @@ use rand::Rng;
 /// Resolutions between the image and the edge of the sources: sidelobes that come around lie beyond (chosen).
 const GUARD: f64 = 8.0;
 
-/// First random line of the looks.
-const FIRST_LINE: u64 = 1 << 45;
-
 /// Random lines between two looks.
 const LOOK_LINES: u64 = 1 << 20;
-
-/// First random line of the points.
-const POINT_LINES: u64 = 1 << 40;
 
 /// Impulse response along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -242,8 +236,8 @@ impl ImpulseResponse {
         let raster = sources.raster;
         let filter = LowPass::new(view.sizes, view.step, self.bands(&view, raster.spacing));
         for look in numbers {
-            let first = FIRST_LINE + look * LOOK_LINES;
-            let mut phases = line_generator(seed, POINT_LINES + look);
+            let first = look * LOOK_LINES;
+            let mut phases = generator(seed, Stream::Points, look);
             let points: Vec<_> = sources
                 .points
                 .iter()
@@ -376,8 +370,8 @@ fn power_band(band: &fft::Band) -> fft::Band {
 
 /// One row of the reflectivity √(I/2)(g₁ + i g₂): modulus √(−I ln u), phase uniform (Box and Muller 1958).
 fn rough_row(intensity: &[f32], (seed, line): (u64, u64), row: &mut [Complex32]) {
-    let mut generator = line_generator(seed, line);
-    let bits: Vec<u64> = intensity.iter().map(|_| generator.next_u64()).collect();
+    let mut random = generator(seed, Stream::Reflectivity, line);
+    let bits: Vec<u64> = intensity.iter().map(|_| random.next_u64()).collect();
     vectorized(
         #[inline(always)]
         || {

@@ -108,11 +108,11 @@ fn single_look_is_the_sum_over_its_scatterers() {
         .map(|i| {
             let mut row = vec![Complex32::ZERO; raster.columns];
             let values = &intensity.values[i * raster.columns..][..raster.columns];
-            rough_row(values, (seed, FIRST_LINE + i as u64), &mut row);
+            rough_row(values, (seed, i as u64), &mut row);
             row
         })
         .collect();
-    let [cos, sin] = cos_sin((line_generator(seed, POINT_LINES).next_u64() >> 32) as u32);
+    let [cos, sin] = cos_sin((generator(seed, Stream::Points, 0).next_u64() >> 32) as u32);
     let point = Complex32::new(cos, sin) * (900f64.sqrt() / raster.spacing) as f32;
     let columns: Vec<Vec<f64>> = (0..image.columns)
         .map(|j| {

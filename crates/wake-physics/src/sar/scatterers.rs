@@ -2,7 +2,7 @@
 
 use super::geometry::{azimuth_displacement, direction, layover};
 use super::impulse::PointTarget;
-use crate::random::line_generator;
+use crate::random::{Stream, generator};
 use rand::Rng;
 use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 
@@ -17,9 +17,6 @@ const SPREAD_DB: f64 = 3.0;
 
 /// Height of the points over the water, as a share of the beam: chosen.
 const HEIGHT_OF_BEAM: f64 = 0.4;
-
-/// Stream of random numbers of the scatterers.
-const LINE: u64 = 1 << 41;
 
 /// Median radar cross section of ships of a length.
 ///
@@ -77,7 +74,7 @@ impl ShipEcho {
     /// - `seed`: the same seed gives the same ship
     #[must_use]
     pub fn scatterers(&self, view: &Viewing, seed: u64) -> Vec<PointTarget> {
-        let mut random = line_generator(seed, LINE);
+        let mut random = generator(seed, Stream::Scatterers, 0);
         let normal = |random: &mut _| -> f64 { StandardNormal.sample(random) };
         let spread = 10f64.powf(0.1 * SPREAD_DB * normal(&mut random));
         let total = median_cross_section(self.length) * spread;
@@ -208,7 +205,7 @@ mod tests {
     #[test]
     fn shares_are_shares() {
         for seed in 0..200 {
-            let mut random = line_generator(seed, 0);
+            let mut random = generator(seed, Stream::Sea, 0);
             let shares = shares(&mut random);
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             let largest = shares.iter().copied().fold(0.0, f64::max);

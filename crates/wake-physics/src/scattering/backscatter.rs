@@ -14,8 +14,7 @@ pub struct FacetFields<'a> {
     pub slope_x: &'a Field,
     /// Slope ∂ζ/∂y \[1\].
     pub slope_y: &'a Field,
-    /// Factor on the Bragg return by hydrodynamic modulation \[1\], where it counts; see
-    /// [`to_bragg_factors`](crate::scattering::hydrodynamic::to_bragg_factors).
+    /// Factor on the Bragg return by hydrodynamic modulation \[1\], where it counts: exp(m − ½ var m).
     pub modulation: Option<&'a Field>,
     /// Share of the Bragg waves that the turbulent wake leaves, 0 to 1, where it counts.
     pub damping: Option<&'a Field>,

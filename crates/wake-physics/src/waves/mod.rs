@@ -99,7 +99,7 @@ pub struct Transfer {
     pub incidence: f64,
     /// Relaxation rate μ of the Bragg waves [1/s].
     pub relaxation_rate: f64,
-    /// Steepness `m_B` of the spectrum of the Bragg waves \[1\], see [`crate::scattering::hydrodynamic::steepness`].
+    /// Steepness `m_B` of the action spectrum of the Bragg waves \[1\], −∂ln(ωΨ/k)/∂ln k; 4.5 for Ψ ∝ k⁻⁴.
     pub steepness: f64,
 }
 
