@@ -1,5 +1,7 @@
 //! The examples as a user starts them: bad input ends with exit code 2, one sentence, and nothing written.
 
+#[cfg(feature = "train")]
+mod detector;
 #[cfg(feature = "ldm")]
 mod evaluate;
 mod faults;

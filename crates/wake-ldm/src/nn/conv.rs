@@ -5,14 +5,14 @@ use burn::nn::conv::{Conv2d, Conv2dConfig};
 use burn::tensor::{Device, Tensor};
 
 /// A convolution that keeps the size of its image: 3 × 3 with a border of one zero.
-pub(crate) fn conv3x3(channels_in: usize, channels_out: usize, device: &Device) -> Conv2d {
+pub fn conv3x3(channels_in: usize, channels_out: usize, device: &Device) -> Conv2d {
     Conv2dConfig::new([channels_in, channels_out], [3, 3])
         .with_padding(PaddingConfig2d::Explicit(1, 1, 1, 1))
         .init(device)
 }
 
 /// A linear map of the channels of every pixel: a 1 × 1 convolution.
-pub(crate) fn conv1x1(channels_in: usize, channels_out: usize, device: &Device) -> Conv2d {
+pub fn conv1x1(channels_in: usize, channels_out: usize, device: &Device) -> Conv2d {
     Conv2dConfig::new([channels_in, channels_out], [1, 1]).init(device)
 }
 
@@ -21,7 +21,7 @@ pub(crate) fn conv1x1(channels_in: usize, channels_out: usize, device: &Device) 
 /// # Shapes
 ///
 /// `[batch, channels in, rows, columns]` to `[batch, channels out, rows out, columns out]`.
-pub(crate) fn convolve(layer: &Conv2d, x: Tensor<4>) -> Tensor<4> {
+pub fn convolve(layer: &Conv2d, x: Tensor<4>) -> Tensor<4> {
     #[cfg(feature = "flex")]
     if let Some(y) = native::convolve(layer, &x) {
         return y;

@@ -2,7 +2,7 @@
 
 pub mod activation;
 pub mod attention;
-pub(crate) mod conv;
+pub mod conv;
 pub mod feed_forward;
 #[cfg(feature = "flex")]
 mod kernels;

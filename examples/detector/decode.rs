@@ -1,0 +1,359 @@
+//! Maps of the network become wakes.
+
+use super::network::{ANGLE_UNIT, LENGTH_UNIT, Map, OUTPUTS, STRIDE};
+use super::source::{Wake, angle_of, direction};
+
+/// A wake that was found, in pixels of the image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Detection {
+    /// Near 0: sea; near 1: a wake.
+    pub(crate) score: f32,
+    /// Tip, axis, half-angle and visible length; its signal-to-noise is unknown, so infinite.
+    pub(crate) wake: Wake,
+}
+
+/// Half the width of a box at least \[pixels\]: that of the line itself.
+const LEAST_HALF_WIDTH: f32 = 8.0;
+
+impl Detection {
+    /// Corners (column, row) of the box from the tip to the end of what is visible, as wide as the outer edges are
+    /// apart at half the length: to the left of the tip, to its right, and the end.
+    pub(crate) fn oriented_box(&self) -> [[f32; 2]; 4] {
+        oriented_box(&self.wake)
+    }
+}
+
+/// The box of [`Detection::oriented_box`].
+pub(crate) fn oriented_box(wake: &Wake) -> [[f32; 2]; 4] {
+    let opening = wake.half_angle_deg.clamp(0.0, 30.0).to_radians().tan();
+    let half = (0.5 * wake.length * opening).max(LEAST_HALF_WIDTH);
+    let [right, down] = wake.direction();
+    let corner = |along: f32, across: f32| {
+        let [x, y] = wake.at(along);
+        [x - across * down, y + across * right]
+    };
+    [
+        (0.0, -half),
+        (0.0, half),
+        (wake.length, half),
+        (wake.length, -half),
+    ]
+    .map(|(a, c)| corner(a, c))
+}
+
+/// Maps of one image, `[OUTPUTS, rows, columns]`; the first two hold probabilities.
+#[derive(Debug, Clone)]
+pub(crate) struct Maps {
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
+    values: Vec<f32>,
+}
+
+/// Tips below this probability are not looked at.
+const LEAST_TIP: f32 = 0.02;
+/// A tip is the highest within so many cells.
+const APART: usize = 2;
+/// No image has more tips that are looked at.
+const MOST_TIPS: usize = 300;
+/// How far the axis may turn from the direction at the tip, and by which steps [deg].
+const TURN: f32 = 24.0;
+const TURN_STEP: f32 = 1.5;
+/// The ray begins so far from the tip \[cells\]: a ship may lie on its first part.
+const SKIPPED: usize = 2;
+/// Rays shorter than this lose support \[cells\].
+const SHORT: f32 = 5.0;
+/// No ray is followed further \[cells\].
+const LONGEST: usize = 90;
+
+impl Maps {
+    /// Maps of logits and values as the network gives them.
+    ///
+    /// # Panics
+    ///
+    /// When there are not `OUTPUTS · rows · columns` numbers.
+    pub(crate) fn new(rows: usize, columns: usize, mut values: Vec<f32>) -> Self {
+        assert_eq!(
+            values.len(),
+            OUTPUTS * rows * columns,
+            "numbers of all maps"
+        );
+        for logit in &mut values[..2 * rows * columns] {
+            *logit = 1.0 / (1.0 + (-*logit).exp());
+        }
+        Self {
+            rows,
+            columns,
+            values,
+        }
+    }
+
+    /// The upper left of the maps.
+    pub(crate) fn cut_to(&self, rows: usize, columns: usize) -> Self {
+        let lines = self.values.chunks_exact(self.columns).enumerate();
+        let inside = lines.filter(|(i, _)| i % self.rows < rows);
+        let values = inside
+            .flat_map(|(_, line)| &line[..columns])
+            .copied()
+            .collect();
+        Self {
+            rows,
+            columns,
+            values,
+        }
+    }
+
+    fn map(&self, map: Map) -> &[f32] {
+        let area = self.rows * self.columns;
+        &self.values[map as usize * area..][..area]
+    }
+
+    /// The wakes, the surest first.
+    pub(crate) fn detections(&self) -> Vec<Detection> {
+        let mut found: Vec<Detection> = self.tips().into_iter().map(|at| self.wake(at)).collect();
+        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        found
+    }
+
+    /// Cells that are the highest of their neighbourhood; of equal ones the first.
+    fn tips(&self) -> Vec<usize> {
+        let tip = self.map(Map::Tip);
+        let highest = |i: usize| {
+            let (row, column) = (i / self.columns, i % self.columns);
+            let rows = row.saturating_sub(APART)..(row + APART + 1).min(self.rows);
+            let columns = column.saturating_sub(APART)..(column + APART + 1).min(self.columns);
+            rows.flat_map(|r| columns.clone().map(move |c| r * self.columns + c))
+                .all(|j| j == i || tip[j] < tip[i] || (j > i && tip[j] <= tip[i]))
+        };
+        let mut tips: Vec<usize> = (0..tip.len())
+            .filter(|&i| tip[i] > LEAST_TIP && highest(i))
+            .collect();
+        tips.sort_by(|&a, &b| tip[b].total_cmp(&tip[a]));
+        tips.truncate(MOST_TIPS);
+        tips
+    }
+
+    /// The wake that begins in a cell: the ray near its direction that has most support.
+    fn wake(&self, at: usize) -> Detection {
+        let cell = [(at % self.columns) as f32, (at / self.columns) as f32];
+        let first = angle_of([self.map(Map::TipRight)[at], self.map(Map::TipDown)[at]]);
+        let steps = (TURN / TURN_STEP) as i32;
+        let rays = (-steps..=steps).map(|k| first + TURN_STEP * k as f32);
+        let supports: Vec<(f32, [f32; 2])> = rays
+            .map(|angle| (angle, self.support(cell, angle)))
+            .collect();
+        let best = |k: usize| supports.iter().map(|s| s.1[k]).fold(0.0, f32::max);
+        let [support, longest] = [best(0), best(1)];
+        // The axis is the mean of the rays with most line on them: the line as a whole, not its beginning, says where.
+        let (mut pull, mut total) = (0.0, 1e-6);
+        for (angle, [_, whole]) in &supports {
+            let weight = (whole / longest.max(1e-6)).max(0.0).powi(8);
+            pull += weight * (angle - first);
+            total += weight;
+        }
+        let centre = 0.5 * (STRIDE as f32 - 1.0);
+        let length = LENGTH_UNIT * self.map(Map::Length)[at].clamp(-3.0, 2.5).exp();
+        Detection {
+            score: self.map(Map::Tip)[at] * support,
+            wake: Wake {
+                tip: cell.map(|x| STRIDE as f32 * x + centre),
+                axis_deg: (first + pull / total).rem_euclid(360.0),
+                half_angle_deg: (ANGLE_UNIT * self.map(Map::HalfAngle)[at]).clamp(0.0, 30.0),
+                length,
+                snr: f32::INFINITY,
+            },
+        }
+    }
+
+    /// How much of a ray is a line that runs its way: the best mean over its first part, short ones at a loss; and the
+    /// sum over all of it.
+    fn support(&self, [x, y]: [f32; 2], angle: f32) -> [f32; 2] {
+        let [right, down] = direction(angle);
+        let (line, to_right, to_down) = (
+            self.map(Map::Line),
+            self.map(Map::LineRight),
+            self.map(Map::LineDown),
+        );
+        let (mut sum, mut best, mut count) = (0.0, 0.0f32, 0.0);
+        for k in SKIPPED..LONGEST {
+            let (column, row) = (
+                (x + k as f32 * right).round(),
+                (y + k as f32 * down).round(),
+            );
+            if column < 0.0 || row < 0.0 || column >= self.columns as f32 || row >= self.rows as f32
+            {
+                break;
+            }
+            let i = row as usize * self.columns + column as usize;
+            let (dx, dy) = (to_right[i], to_down[i]);
+            let agreement = (dx * right + dy * down) / dx.hypot(dy).max(0.3);
+            sum += line[i] * agreement;
+            count += 1.0;
+            best = best.max(sum / (count + SHORT));
+        }
+        [best, sum]
+    }
+}
+
+/// Wakes that are one are told once: a weaker one goes where a stronger one lies along the same line.
+///
+/// - `near`: tips closer than this are one where the axes agree within [`SAME_AXIS`] \[pixels\]
+pub(crate) fn without_repeats(mut found: Vec<Detection>, near: f32) -> Vec<Detection> {
+    found.sort_by(|a, b| {
+        let places = |d: &Detection| (d.wake.tip[1], d.wake.tip[0]);
+        let ((ra, ca), (rb, cb)) = (places(a), places(b));
+        b.score
+            .total_cmp(&a.score)
+            .then(ra.total_cmp(&rb))
+            .then(ca.total_cmp(&cb))
+    });
+    let mut kept: Vec<Detection> = Vec::new();
+    for one in found {
+        if !kept.iter().any(|other| same(&other.wake, &one.wake, near)) {
+            kept.push(one);
+        }
+    }
+    kept
+}
+
+/// Axes of one wake differ by less [deg].
+const SAME_AXIS: f32 = 30.0;
+/// Lines of one wake lie closer \[pixels\].
+const SAME_LINE: f32 = 16.0;
+/// How far one tip of it may lie behind another, or before it, in units of what is near: further on another ship may
+/// follow.
+const HIDDEN: f32 = 2.5;
+const FOLLOWING: f32 = 5.0;
+
+/// Whether a weaker wake is a stronger one again.
+pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
+    let turn = (strong.axis_deg - weak.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
+    let (dx, dy) = (weak.tip[0] - strong.tip[0], weak.tip[1] - strong.tip[1]);
+    if dx.hypot(dy) < 0.5 * near {
+        return true;
+    }
+    if turn.abs() > SAME_AXIS {
+        return false;
+    }
+    let [right, down] = strong.direction();
+    let (along, across) = (dx * right + dy * down, dy * right - dx * down);
+    // A ship, or a bright beginning, may hide where the line begins.
+    let follows = strong.length.clamp(near, FOLLOWING * near);
+    let beside = across.abs() < SAME_LINE && (-HIDDEN * near..follows).contains(&along);
+    dx.hypot(dy) < near || beside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Maps of some rays, as sure as can be.
+    fn drawn(cells: usize, wakes: &[Wake]) -> Maps {
+        let mut values = vec![0.0; OUTPUTS * cells * cells];
+        values[..2 * cells * cells].fill(-12.0);
+        for wake in wakes {
+            let [right, down] = wake.direction();
+            let mut put = |map: Map, x: f32, y: f32, value: f32| {
+                values[(map as usize * cells + y.round() as usize) * cells + x.round() as usize] =
+                    value;
+            };
+            let [x, y] = wake.tip.map(|t| (t - 1.5) / 4.0);
+            put(Map::Tip, x, y, 6.0);
+            put(Map::TipRight, x, y, right);
+            put(Map::TipDown, x, y, down);
+            put(Map::Length, x, y, (wake.length / LENGTH_UNIT).ln());
+            put(Map::HalfAngle, x, y, wake.half_angle_deg / ANGLE_UNIT);
+            for k in 0..(wake.length / 4.0) as usize {
+                let (x, y) = (x + k as f32 * right, y + k as f32 * down);
+                put(Map::Line, x, y, 6.0);
+                put(Map::LineRight, x, y, right);
+                put(Map::LineDown, x, y, down);
+            }
+        }
+        Maps::new(cells, cells, values)
+    }
+
+    fn wake(tip: [f32; 2], axis_deg: f32) -> Wake {
+        Wake {
+            tip,
+            axis_deg,
+            half_angle_deg: 4.0,
+            length: 120.0,
+            snr: f32::INFINITY,
+        }
+    }
+
+    /// Two wakes that cross are both found where they were drawn, equal ones in a fixed order.
+    #[test]
+    fn crossing_wakes_are_both_found() {
+        let drawn_wakes = [wake([41.5, 61.5], 90.0), wake([101.5, 21.5], 180.0)];
+        let found = without_repeats(drawn(64, &drawn_wakes).detections(), 40.0);
+        assert_eq!(found.len(), 2);
+        for wake in drawn_wakes {
+            let best = found
+                .iter()
+                .find(|d| d.wake.tip == wake.tip)
+                .expect("its tip");
+            let turn = (best.wake.axis_deg - wake.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
+            assert!(turn.abs() < 3.0 && best.score > 0.5, "{best:?}");
+            assert!((best.wake.length - 120.0).abs() < 0.1);
+        }
+    }
+
+    /// A line that runs the other way supports nothing.
+    #[test]
+    fn a_line_of_the_wrong_direction_is_no_support() {
+        let mut maps = drawn(64, &[wake([41.5, 61.5], 90.0)]);
+        let before = maps.detections()[0].score;
+        let area = 64 * 64;
+        let (right, down) = (
+            Map::LineRight as usize * area,
+            Map::LineDown as usize * area,
+        );
+        maps.values[right..right + area]
+            .iter_mut()
+            .for_each(|x| *x = -*x);
+        maps.values[down..down + area]
+            .iter_mut()
+            .for_each(|x| *x = -*x);
+        let after = maps.detections()[0].score;
+        assert!(before > 0.6 && after < 0.05, "{before} {after}");
+    }
+
+    #[test]
+    fn ties_are_told_in_the_order_of_the_image() {
+        let tied = vec![
+            wake([200.0, 90.0], 0.0),
+            wake([20.0, 90.0], 0.0),
+            wake([50.0, 10.0], 120.0),
+        ];
+        let found = |wakes: Vec<Wake>| {
+            let all = wakes
+                .into_iter()
+                .map(|wake| Detection { score: 0.5, wake })
+                .collect();
+            without_repeats(all, 40.0)
+        };
+        let mut turned = tied.clone();
+        turned.reverse();
+        let order = found(tied);
+        assert_eq!(order, found(turned));
+        assert_eq!(order[0].wake.tip, [50.0, 10.0]);
+    }
+
+    #[test]
+    fn a_box_is_as_long_as_the_wake() {
+        let detection = Detection {
+            score: 1.0,
+            wake: wake([10.0, 20.0], 90.0),
+        };
+        let corners = detection.oriented_box();
+        let expected = [[10.0, 12.0], [10.0, 28.0], [130.0, 28.0], [130.0, 12.0]];
+        for (a, b) in corners.iter().zip(expected) {
+            // Half the opening of 4° over 60 pixels is 4.2, below the least half-width of 8.
+            assert!(
+                (a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3,
+                "{corners:?}"
+            );
+        }
+    }
+}

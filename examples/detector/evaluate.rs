@@ -1,0 +1,335 @@
+//! `evaluate`: how well wakes are found in simulated images that were held out, and in real tiles.
+
+use std::error::Error;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use wake_ldm::device_named;
+
+use super::decode::{Detection, oriented_box};
+use super::detect::Finder;
+use super::drawing::{Drawing, sheet};
+use super::find::Search;
+use super::grey::Grey;
+use super::model::Model;
+use super::recipes::Recipe;
+use super::score::{Curve, Found, Judged, Label, Ray, Rule, verdicts};
+use super::source::Wake;
+use super::targets::FOUND;
+use super::{labels, progress};
+
+#[derive(clap::Args, Debug, Clone)]
+pub(crate) struct Options {
+    /// Simulated images of each recipe
+    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    images: u32,
+    /// Folder of real tiles with labels.json, which are then searched, too
+    #[arg(long, value_name = "DIR")]
+    real: Option<PathBuf>,
+    /// Weights of the network, by default those in the repository
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// flex, ndarray, wgpu or cuda, where compiled in
+    #[arg(long, default_value = "flex")]
+    device: String,
+    /// Folder of the results, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/detector")]
+    out: PathBuf,
+}
+
+/// Seed of held-out images: no run trains on it.
+pub(crate) const HELD_OUT: u64 = 900_001;
+/// Rows and columns of a simulated image.
+pub(crate) const SIZE: usize = 512;
+/// False alarms an image at which recall is told.
+const FALSE_ALARMS: f64 = 0.5;
+/// Bounds of the signal-to-noise of wakes that are counted together \[dB\].
+const VISIBILITIES: [f64; 6] = [15.0, 18.0, 21.0, 24.0, 28.0, 40.0];
+
+/// Searches, and writes `report.md`, `report.json` and pictures into the folder.
+pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
+    let model = Model::load(options.weights.as_deref(), device_named(&options.device)?)?;
+    let search = Search {
+        spacing: None,
+        least_score: 0.01,
+    };
+    let finders = [
+        ("network", Finder::Network(Box::new(model), search)),
+        ("Radon", Finder::Radon),
+    ];
+    let mut real = Vec::new();
+    if let Some(folder) = &options.real {
+        let clear = labels::read(folder, false)?;
+        let both = labels::read(folder, true)?;
+        for ((name, clear), (_, both)) in clear.into_iter().zip(both) {
+            real.push((Grey::read(&folder.join(&name))?, [clear, both]));
+        }
+    }
+    std::fs::create_dir_all(&options.out)
+        .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
+    let mut report = Report::default();
+    for recipe in [Recipe::Simulated, Recipe::Painted] {
+        simulated(&finders, recipe, options, &mut report)?;
+    }
+    for (name, finder) in &finders {
+        if !real.is_empty() {
+            judge_real(name, finder, &real, &options.out, &mut report)?;
+        }
+    }
+    let write = |name: &str, text: String| {
+        let path = options.out.join(name);
+        std::fs::write(&path, text)
+            .map_err(|error| format!("cannot write {}: {error}", path.display()))
+    };
+    write(
+        "report.json",
+        format!("{:#}\n", Value::Array(report.rows.clone())),
+    )?;
+    write("report.md", report.text())?;
+    println!("{}", report.text());
+    Ok(())
+}
+
+/// One row a finder and set of images.
+#[derive(Default)]
+struct Report {
+    rows: Vec<Value>,
+    visibility: Vec<String>,
+}
+
+impl Report {
+    /// Adds a row, and gives the curve by the ray rule.
+    fn add(&mut self, set: &str, finder: &str, images: &[Judged]) {
+        let (rays, boxes) = (Curve::new(images, Rule::Ray), Curve::new(images, Rule::Box));
+        let (right, wrong) = rays.totals();
+        let (recall, score) = rays.recall_at(FALSE_ALARMS).unwrap_or_default();
+        self.rows.push(json!({
+            "images": set, "finder": finder, "count": images.len(), "wakes": rays.labels,
+            "average_precision": rays.average_precision(), "average_precision_boxes": boxes.average_precision(),
+            "recall_at_half_false_alarm": recall, "at_score": Some(score).filter(|s| s.is_finite()),
+            "right": right, "false_alarms": wrong,
+        }));
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::from(
+            "<!-- Written by: cargo run --release --example detector -- evaluate --real DIR -->\n\n# Finding wakes\n\n\
+             AP: average precision by the ray rule (axis within 10°; tip within 60 pixels, or axis line within 25 pixels of tip \
+             and middle). AP boxes: oriented boxes from the tip to the end of what is visible, IoU 0.5. Recall: with at most half \
+             a false alarm an image.\n\n\
+             | images | number | wakes | found by | AP | AP boxes | recall | at score |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        );
+        let number = |value: &Value| value.as_f64().map_or("–".to_owned(), |x| format!("{x:.3}"));
+        for row in &self.rows {
+            // Writing into a string cannot fail.
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {} | {} | {} |",
+                row["images"].as_str().unwrap_or_default(),
+                row["count"],
+                row["wakes"],
+                row["finder"].as_str().unwrap_or_default(),
+                number(&row["average_precision"]),
+                number(&row["average_precision_boxes"]),
+                number(&row["recall_at_half_false_alarm"]),
+                number(&row["at_score"]),
+            );
+        }
+        text.push_str("\nRecall of simulated wakes by their visibility (signal over noise of a filter that knows the wake), with at most half a false alarm an image:\n\n");
+        text.push_str("| images | found by |");
+        for bounds in VISIBILITIES.windows(2) {
+            let _ = write!(text, " {:.0} to {:.0} dB |", bounds[0], bounds[1]);
+        }
+        text.push_str("\n| --- | --- |");
+        text.push_str(&" --- |".repeat(VISIBILITIES.len() - 1));
+        text.push('\n');
+        text.push_str(&self.visibility.join(""));
+        text
+    }
+}
+
+/// A wake as the rules see it.
+fn label(wake: &Wake) -> Label {
+    let inside = wake
+        .tip
+        .iter()
+        .all(|x| (-0.5..SIZE as f32 - 0.5).contains(x));
+    Label {
+        ray: ray(wake),
+        length: f64::from(wake.length),
+        counts: wake.snr >= FOUND && inside,
+        ambiguous: !inside,
+    }
+}
+
+fn ray(wake: &Wake) -> Ray {
+    Ray {
+        tip: wake.tip.map(f64::from),
+        axis_deg: f64::from(wake.axis_deg),
+        oriented_box: Some(oriented_box(wake).map(|corner| corner.map(f64::from))),
+    }
+}
+
+fn found(detections: &[Detection]) -> Vec<Found> {
+    let one = |d: &Detection| Found {
+        score: f64::from(d.score),
+        ray: ray(&d.wake),
+    };
+    detections.iter().map(one).collect()
+}
+
+fn simulated(
+    finders: &[(&str, Finder)],
+    recipe: Recipe,
+    options: &Options,
+    report: &mut Report,
+) -> Result<(), Box<dyn Error>> {
+    let source = recipe.source(HELD_OUT, SIZE);
+    let mut judged = vec![Vec::new(); finders.len()];
+    let mut pictures = Vec::new();
+    let mut visible = Vec::new();
+    let mut seconds = 0.0;
+    let bar = progress::bar(u64::from(options.images), recipe.name());
+    for index in 0..u64::from(options.images) {
+        let sample = source.sample(index);
+        let image = Grey::from_levels(SIZE, SIZE, &sample.pixels);
+        visible.push(
+            sample
+                .wakes
+                .iter()
+                .map(|w| 20.0 * f64::from(w.snr).log10())
+                .collect::<Vec<f64>>(),
+        );
+        for ((name, finder), judged) in finders.iter().zip(&mut judged) {
+            let begin = Instant::now();
+            let detections = finder.find(&image);
+            if *name == "network" {
+                seconds += begin.elapsed().as_secs_f64();
+                if pictures.len() < 12 {
+                    pictures.push(picture(&image, &sample.wakes, &detections));
+                }
+            }
+            judged.push(Judged {
+                columns: SIZE as f64,
+                rows: SIZE as f64,
+                labels: sample.wakes.iter().map(label).collect(),
+                found: found(&detections),
+            });
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    for ((name, _), judged) in finders.iter().zip(&judged) {
+        report.add(recipe.name(), name, judged);
+        report
+            .visibility
+            .push(by_visibility(recipe.name(), name, judged, &visible));
+    }
+    let megapixels = f64::from(options.images) * (SIZE * SIZE) as f64 * 1e-6;
+    println!(
+        "{}: {:.2} megapixels a second",
+        recipe.name(),
+        megapixels / seconds
+    );
+    let path = options.out.join(format!("{}.png", recipe.name()));
+    sheet(&pictures, 4).save(path)?;
+    Ok(())
+}
+
+/// Recall by signal over noise, at the score that allows half a false alarm an image.
+fn by_visibility(set: &str, finder: &str, images: &[Judged], visible: &[Vec<f64>]) -> String {
+    let (_, least) = Curve::new(images, Rule::Ray)
+        .recall_at(FALSE_ALARMS)
+        .unwrap_or_default();
+    let mut counts = [[0usize; 2]; VISIBILITIES.len() - 1];
+    let bin = |decibel: f64| {
+        VISIBILITIES
+            .windows(2)
+            .position(|b| (b[0]..b[1]).contains(&decibel))
+    };
+    for (image, visible) in images.iter().zip(visible) {
+        for (label, &decibel) in image.labels.iter().zip(visible) {
+            if let Some(bin) = bin(decibel).filter(|_| label.counts) {
+                counts[bin][1] += 1;
+            }
+        }
+    }
+    for verdict in verdicts(images, Rule::Ray)
+        .iter()
+        .filter(|v| v.score >= least)
+    {
+        if let Some(bin) = verdict
+            .label
+            .and_then(|label| bin(visible[verdict.image][label]))
+        {
+            counts[bin][0] += 1;
+        }
+    }
+    let mut row = format!("| {set} | {finder} |");
+    for [right, all] in counts {
+        let share = if all > 0 {
+            format!("{:.2} of {all}", right as f64 / all as f64)
+        } else {
+            "–".to_owned()
+        };
+        let _ = write!(row, " {share} |");
+    }
+    row + "\n"
+}
+
+/// An image with its wakes in green and what was found in red and yellow.
+pub(crate) fn picture(image: &Grey, wakes: &[Wake], found: &[Detection]) -> image::RgbImage {
+    let mut drawing = Drawing::new(image);
+    for wake in wakes.iter().filter(|wake| wake.snr >= FOUND) {
+        drawing.ray(wake, [0, 200, 0]);
+    }
+    for one in found.iter().filter(|one| one.score >= 0.2).rev() {
+        drawing.ray(
+            &one.wake,
+            [255, (255.0 * (1.0 - one.score.min(1.0))) as u8, 0],
+        );
+    }
+    drawing.into_picture()
+}
+
+fn judge_real(
+    name: &str,
+    finder: &Finder,
+    tiles: &[(Grey, [Judged; 2])],
+    out: &Path,
+    report: &mut Report,
+) -> Result<(), Box<dyn Error>> {
+    let mut judged = [Vec::new(), Vec::new()];
+    let mut pictures = Vec::new();
+    for (image, known) in tiles {
+        let detections = finder.find(image);
+        for (judged, known) in judged.iter_mut().zip(known) {
+            judged.push(Judged {
+                found: found(&detections),
+                ..known.clone()
+            });
+        }
+        let labels: Vec<Wake> = known[1]
+            .labels
+            .iter()
+            .filter(|label| label.counts)
+            .map(|label| Wake {
+                tip: label.ray.tip.map(|x| x as f32),
+                axis_deg: label.ray.axis_deg as f32,
+                half_angle_deg: 0.0,
+                length: label.length as f32,
+                snr: f32::INFINITY,
+            })
+            .collect();
+        pictures.push(picture(image, &labels, &detections));
+    }
+    let [clear, both] = judged;
+    report.add("real, clear wakes", name, &clear);
+    report.add("real, clear and probable wakes", name, &both);
+    for (i, picture) in pictures.iter().enumerate() {
+        picture.save(out.join(format!("real-{}-{:02}.png", name.to_lowercase(), i + 1)))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,376 @@
+//! The search of an image: tiles, scales, network, wakes.
+
+use super::decode::{Detection, Maps, same, without_repeats};
+use super::grey::{Grey, rescaled};
+use super::network::{MULTIPLE, STRIDE};
+use super::normalize;
+use super::source::Wake;
+
+/// Something that gives maps of normalised images.
+pub(crate) trait Mapper: Sync {
+    /// The maps of an image that is normalised; rows and columns are multiples of [`MULTIPLE`].
+    ///
+    /// # Shapes
+    ///
+    /// `inputs`: `[INPUTS, rows, columns]`
+    fn maps(&self, inputs: Vec<f32>, rows: usize, columns: usize) -> Maps;
+}
+
+/// Pixels of the image between which tips are taken from one tile, and what a tile sees beyond them.
+const TILE: usize = 1024;
+const MARGIN: usize = 384;
+/// Scales at which an image is searched, when its own fits the network.
+const SCALES: [f32; 5] = [0.35, 0.5, 0.7, 1.0, 1.4];
+/// Tips closer than this are one, at scale 1 \[pixels\].
+const NEAR: f32 = 40.0;
+/// No more pixels a side are given to the network at once.
+const LARGEST: f32 = 2560.0;
+
+/// How an image is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Search {
+    /// Pixel spacing \[m\], where it is known.
+    pub(crate) spacing: Option<f32>,
+    /// Scores below this are not told.
+    pub(crate) least_score: f32,
+}
+
+/// The wakes of an image, the surest first; tips in pixels (column, row) from the centre of the first one.
+pub(crate) fn find(image: &Grey, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
+    let in_tile = |tile: Tile| in_tile(image, &tile, mapper, search);
+    without_repeats(
+        Tile::all(image).into_iter().flat_map(in_tile).collect(),
+        NEAR,
+    )
+}
+
+/// The wakes of all scales, each told once, its score raised where other scales see it, too.
+///
+/// ```text
+/// score = (max_i s_i + mean_i s_i)/2
+/// ```
+///
+/// with `s_i` the score at scale i, 0 where nothing is found there.
+fn agreed(by_scale: Vec<Vec<Detection>>) -> Vec<Detection> {
+    let count = by_scale.len().max(1) as f32;
+    let kept = without_repeats(by_scale.iter().flatten().copied().collect(), NEAR);
+    let raised = |one: Detection| {
+        let at = |scale: &Vec<Detection>| {
+            let same = scale
+                .iter()
+                .filter(|other| same(&one.wake, &other.wake, NEAR));
+            same.map(|other| other.score).fold(0.0, f32::max)
+        };
+        let mean = by_scale.iter().map(at).sum::<f32>() / count;
+        Detection {
+            score: 0.5 * (one.score + mean),
+            ..one
+        }
+    };
+    kept.into_iter().map(raised).collect()
+}
+
+/// A part of an image whose tips are told together, and its surroundings, that are seen with it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tile {
+    /// First row and column of the part, and the ones behind its last.
+    part: [[usize; 2]; 2],
+    /// The same of what is seen.
+    seen: [[usize; 2]; 2],
+    /// Rows and columns of the image.
+    sides: [usize; 2],
+}
+
+impl Tile {
+    /// The tiles of an image; a small one is one tile.
+    pub(crate) fn all(image: &Grey) -> Vec<Self> {
+        let sides = [image.rows, image.columns];
+        let columns = tiles(image.columns);
+        let places = tiles(image.rows)
+            .into_iter()
+            .flat_map(|r| columns.iter().map(move |&c| [r, c]));
+        let tile = |[(top, rows), (left, columns)]: [(usize, usize); 2]| {
+            let part = [[top, left], [top + rows, left + columns]];
+            Self {
+                part,
+                seen: [
+                    part[0].map(|x| x.saturating_sub(MARGIN)),
+                    [0, 1].map(|a| (part[1][a] + MARGIN).min(sides[a])),
+                ],
+                sides,
+            }
+        };
+        places.map(tile).collect()
+    }
+
+    /// Rows, columns and pixels of what is seen.
+    pub(crate) fn pixels(&self, image: &Grey) -> (usize, usize, Vec<f32>) {
+        let [begin, end] = self.seen;
+        let [rows, columns] = [0, 1].map(|a| end[a] - begin[a]);
+        (
+            rows,
+            columns,
+            image.window(begin[0], begin[1], rows, columns),
+        )
+    }
+
+    /// A wake found in the scaled pixels as it lies in the image; `None` where its tip lies in another tile.
+    pub(crate) fn placed(&self, mut wake: Wake, factor: f32) -> Option<Wake> {
+        wake.tip = [0, 1].map(|a| (wake.tip[a] + 0.5) / factor - 0.5 + self.seen[0][1 - a] as f32);
+        wake.length /= factor;
+        let inside = |a: usize| {
+            let [begin, end] = [self.part[0][a], self.part[1][a]];
+            let low = if begin == 0 { f32::MIN } else { begin as f32 };
+            let high = if end == self.sides[a] {
+                f32::MAX
+            } else {
+                end as f32
+            };
+            (low..high).contains(&(wake.tip[1 - a] + 0.5))
+        };
+        (inside(0) && inside(1)).then_some(wake)
+    }
+}
+
+/// First pixels of the tiles and their sizes: few enough pixels are one tile.
+fn tiles(size: usize) -> Vec<(usize, usize)> {
+    if size <= TILE + 2 * MARGIN {
+        return vec![(0, size)];
+    }
+    let count = size.div_ceil(TILE);
+    let edge = |k: usize| k * size / count;
+    (0..count)
+        .map(|k| (edge(k), edge(k + 1) - edge(k)))
+        .collect()
+}
+
+fn in_tile(image: &Grey, tile: &Tile, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
+    let (rows, columns, pixels) = tile.pixels(image);
+    let at = |factor: f32| -> Vec<Detection> {
+        let maps = at_scale(&pixels, rows, columns, factor, mapper);
+        let sure = maps
+            .detections()
+            .into_iter()
+            .filter(|one| one.score >= search.least_score);
+        sure.filter_map(|one| {
+            Some(Detection {
+                wake: tile.placed(one.wake, factor)?,
+                ..one
+            })
+        })
+        .collect()
+    };
+    let scales = scales(&pixels, rows, columns, search.spacing);
+    agreed(scales.into_iter().map(at).collect())
+}
+
+/// The factors by which an image is scaled before the network sees it.
+fn scales(pixels: &[f32], rows: usize, columns: usize, spacing: Option<f32>) -> Vec<f32> {
+    let native = match spacing {
+        // The images that the network learned from have pixels of about ten metres.
+        Some(metres) => (metres / 10.0).clamp(0.25, 1.0),
+        None => native_scale(pixels, rows, columns),
+    };
+    let longest = rows.max(columns) as f32;
+    let fits = |factor: &f32| longest * factor <= LARGEST;
+    SCALES
+        .iter()
+        .map(|scale| native * scale)
+        .filter(fits)
+        .collect()
+}
+
+/// The scale at which the speckle is correlated as in most of what the network learned from, ½ to 1.
+///
+/// ```text
+/// ρ₁ = exp(−1/4s²),    scale = s₀/s
+/// ```
+///
+/// with ρ₁ the correlation of neighbouring pixels, s the width of the response and s₀ = 0.7 pixels.
+fn native_scale(pixels: &[f32], rows: usize, columns: usize) -> f32 {
+    let contrast = normalize::contrast(pixels, rows, columns);
+    let cut: Vec<f32> = contrast.iter().map(|z| z.clamp(-2.5, 2.5)).collect();
+    let (mut power, mut product, mut count) = (0.0f64, 0.0f64, 0u32);
+    for row in (0..rows.saturating_sub(1)).step_by(2) {
+        for i in row * columns..(row * columns + columns).saturating_sub(1) {
+            let (z, beside, below) = (cut[i], cut[i + 1], cut[i + columns]);
+            power += f64::from(z * z);
+            product += f64::from(z * 0.5 * (beside + below));
+            count += 1;
+        }
+    }
+    if count == 0 || power <= 0.0 {
+        return 1.0;
+    }
+    let correlation = (product / power).clamp(0.01, 0.99);
+    let width = 0.5 / (-correlation.ln()).sqrt();
+    (0.7 / width).clamp(0.5, 1.0) as f32
+}
+
+fn at_scale(pixels: &[f32], rows: usize, columns: usize, factor: f32, mapper: &dyn Mapper) -> Maps {
+    let (rows, columns, scaled) = rescaled(pixels, rows, columns, factor);
+    let contrast = normalize::contrast(&scaled, rows, columns);
+    let [padded_rows, padded_columns] = [rows, columns].map(|n| n.next_multiple_of(MULTIPLE));
+    let area = padded_rows * padded_columns;
+    let nothing = normalize::inputs(0.0);
+    let mut inputs: Vec<f32> = nothing
+        .iter()
+        .flat_map(|&x| std::iter::repeat_n(x, area))
+        .collect();
+    for (row, line) in contrast.chunks_exact(columns).enumerate() {
+        for (column, &z) in line.iter().enumerate() {
+            for (k, x) in normalize::inputs(z).into_iter().enumerate() {
+                inputs[k * area + row * padded_columns + column] = x;
+            }
+        }
+    }
+    let maps = mapper.maps(inputs, padded_rows, padded_columns);
+    maps.cut_to(rows.div_ceil(STRIDE), columns.div_ceil(STRIDE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use crate::network::{INPUTS, Map, OUTPUTS};
+    use crate::recipes::Recipe;
+    use crate::sea::Speckle;
+    use crate::source::Draw;
+    use burn::tensor::Device;
+
+    /// Tips where a pixel is bright, each with a line toward the right.
+    struct Bright;
+
+    impl Mapper for Bright {
+        fn maps(&self, inputs: Vec<f32>, rows: usize, columns: usize) -> Maps {
+            assert!(rows.is_multiple_of(MULTIPLE) && columns.is_multiple_of(MULTIPLE));
+            assert_eq!(inputs.len(), INPUTS * rows * columns);
+            assert!(inputs.iter().all(|x| x.is_finite()), "no missing numbers");
+            let (r, c) = (rows / STRIDE, columns / STRIDE);
+            let mut values = vec![0.0; OUTPUTS * r * c];
+            values[..2 * r * c].fill(-12.0);
+            for (i, _) in inputs[..rows * columns]
+                .iter()
+                .enumerate()
+                .filter(|(_, x)| **x > 2.5)
+            {
+                let (row, column) = (i / columns / STRIDE, i % columns / STRIDE);
+                let mut put = |map: Map, column: usize, value: f32| {
+                    values[(map as usize * r + row) * c + column.min(c - 1)] = value;
+                };
+                put(Map::Tip, column, 8.0);
+                put(Map::TipRight, column, 1.0);
+                for k in 1..20 {
+                    put(Map::Line, column + k, 8.0);
+                    put(Map::LineRight, column + k, 1.0);
+                }
+            }
+            Maps::new(r, c, values)
+        }
+    }
+
+    const SEARCH: Search = Search {
+        spacing: None,
+        least_score: 0.1,
+    };
+
+    /// Speckle of a Gaussian response of 1.2 pixels is native at 0.7/1.2, white noise at 1.
+    #[test]
+    fn the_native_scale_follows_from_the_correlation() {
+        let size = 300;
+        for (filter, expected) in [(0.0, 1.0), (1.2, 0.7 / 1.2)] {
+            let speckle = Speckle {
+                spread: 0.2,
+                filter: [filter; 2],
+            };
+            let pixels = speckle.normals(size, &mut Draw::new(4, 0));
+            // Local medians take out a few hundredths of the correlation.
+            let found = native_scale(&pixels, size, size);
+            assert!((found - expected).abs() < 0.05, "{found} {expected}");
+        }
+    }
+
+    /// Spots on noise, also beside the seams of tiles, are found once each, where they are.
+    #[test]
+    fn tiles_lose_nothing_and_tell_nothing_twice() {
+        let (rows, columns) = (2100, 1900);
+        let noise = |i: usize| ((i * 2_654_435_761) % 1009) as f32 / 1009.0;
+        let mut levels: Vec<f32> = (0..rows * columns)
+            .map(|i| 100.0 + 20.0 * noise(i))
+            .collect();
+        let spots = [
+            [300, 200],
+            [1040, 1061],
+            [955, 60],
+            [945, 700],
+            [30, 2080],
+            [1500, 1397],
+            [1500, 1403 + 300],
+        ];
+        for [x, y] in spots {
+            for (r, c) in (0..12).flat_map(|r| (0..12).map(move |c| (r, c))) {
+                levels[(y - 6 + r) * columns + x - 6 + c] = 255.0;
+            }
+        }
+        assert!(tiles(columns).len() > 1 && tiles(rows).len() > 1);
+        let found = find(&Grey::from_levels(rows, columns, &levels), &Bright, SEARCH);
+        assert_eq!(found.len(), spots.len(), "{found:?}");
+        for [x, y] in spots {
+            let near =
+                |d: &&Detection| (d.wake.tip[0] - x as f32).hypot(d.wake.tip[1] - y as f32) < 14.0;
+            assert_eq!(found.iter().filter(near).count(), 1, "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn tiles_cover_every_size_once() {
+        for size in [1, 17, 1792, 1793, 4096, 20_000] {
+            let tiles = tiles(size);
+            assert_eq!(tiles.iter().map(|t| t.1).sum::<usize>(), size);
+            assert!(tiles.windows(2).all(|t| t[0].0 + t[0].1 == t[1].0));
+            assert!(tiles.len() == 1 || tiles.iter().all(|t| t.1 <= TILE));
+        }
+    }
+
+    /// Whatever the size, the content and the scaling, nothing is told twice and no number is missing.
+    #[test]
+    fn hard_images_are_searched() {
+        let noise = |i: usize| ((i * 2_654_435_761) % 1009) as f32 / 4.0;
+        for (rows, columns) in [(1, 1), (17, 4000), (5, 3), (64, 64)] {
+            let flat = Grey::from_levels(rows, columns, &vec![120.0; rows * columns]);
+            assert!(find(&flat, &Bright, SEARCH).is_empty());
+            let levels: Vec<f32> = (0..rows * columns).map(noise).collect();
+            find(&Grey::from_levels(rows, columns, &levels), &Bright, SEARCH);
+        }
+    }
+
+    /// What is surely found in an image is found in the image turned by a quarter, too, by the shipped network.
+    #[test]
+    fn a_quarter_turn_turns_what_is_found() {
+        let model = Model::load(None, Device::flex()).expect("weights of the repository");
+        let source = Recipe::Painted.source(77, 384);
+        let mut sure = 0;
+        for index in 0..20 {
+            let image = Grey::from_levels(384, 384, &source.sample(index).pixels);
+            let (upright, turned) = (
+                find(&image, &model, SEARCH),
+                find(&image.turned(), &model, SEARCH),
+            );
+            for one in upright.iter().filter(|one| one.score > 0.3) {
+                let [x, y] = one.wake.tip;
+                let again = turned.iter().find(|other| {
+                    let turn = (other.wake.axis_deg - one.wake.axis_deg - 90.0 + 180.0)
+                        .rem_euclid(360.0)
+                        - 180.0;
+                    // (column, row) goes to (383 − row, column); the network's own maps turn only nearly: the ray rule.
+                    let apart = (other.wake.tip[0] - 383.0 + y).hypot(other.wake.tip[1] - x);
+                    turn.abs() < 10.0 && apart < 60.0
+                });
+                let score = again.map_or(0.0, |again| again.score);
+                assert!(score > 0.5 * one.score, "{one:?} in {turned:?}");
+                sure += 1;
+            }
+        }
+        assert!(sure >= 4, "{sure} wakes");
+    }
+}

@@ -1,0 +1,69 @@
+//! Finds ship wakes in radar images with a small network that has seen none but painted and simulated ones.
+//!
+//! ```text
+//! cargo run --release --example detector -- detect FILE|DIR... --json
+//! cargo run --release --example detector -- train --images 40000 --out out/detector
+//! cargo run --release --example detector -- evaluate --real DIR
+//! ```
+//!
+//! `detect` tells every wake by tip, axis, half-angle, visible length and score, and draws each image with its wakes into
+//! `--out`; `--method radon` does the same by the classical transform. `train` makes its images on the fly, and a run
+//! that was killed goes on when it is started again. `evaluate` measures both methods on held-out images and on real
+//! tiles with labels, and writes `report.md`. Without a command, wakes are found in a few simulated images and drawn
+//! into `out/detector/simulated.png`.
+
+mod decode;
+mod detect;
+mod drawing;
+mod evaluate;
+#[path = "../common/exit.rs"]
+mod exit;
+mod find;
+mod grey;
+mod labels;
+mod model;
+mod network;
+mod normalize;
+mod paint;
+#[path = "../common/progress.rs"]
+mod progress;
+mod radon;
+mod recipes;
+mod score;
+mod sea;
+mod show;
+mod simulated;
+mod source;
+mod targets;
+mod train;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Find ship wakes in radar images.
+#[derive(Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Train the network on images made on the fly
+    Train(train::Options),
+    /// Search images for wakes
+    Detect(detect::Options),
+    /// Measure how well wakes are found
+    Evaluate(evaluate::Options),
+}
+
+fn main() -> ExitCode {
+    exit::code(match Arguments::parse().command {
+        Some(Command::Train(options)) => train::train(&options),
+        Some(Command::Detect(options)) => detect::detect(&options),
+        Some(Command::Evaluate(options)) => evaluate::evaluate(&options),
+        None => show::show(Path::new("out/detector")),
+    })
+}

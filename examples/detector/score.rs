@@ -1,0 +1,402 @@
+//! The rules by which detections are right, and what follows: recall, precision, average precision.
+//!
+//! *Ray rule*: the axes differ by at most 10°, and the tips lie within 60 pixels of each other, or the found axis passes
+//! within 25 pixels of the labelled tip and of the middle of the labelled ray. *Box rule*: the boxes, cut to the image,
+//! share at least half of what they cover together. Detections are taken the surest first, one for a label; a second one
+//! on a label is a false alarm. One that fits an ignored label best is neither right nor wrong.
+
+/// Bounds of the rules: degrees, pixels, pixels, share.
+const TURN: f64 = 10.0;
+const TIP: f64 = 60.0;
+const LINE: f64 = 25.0;
+const SHARE: f64 = 0.5;
+
+pub(crate) type Point = [f64; 2];
+
+/// A ray and a box as the rules see them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ray {
+    pub(crate) tip: Point,
+    pub(crate) axis_deg: f64,
+    pub(crate) oriented_box: Option<[Point; 4]>,
+}
+
+/// A wake that is known.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Label {
+    pub(crate) ray: Ray,
+    pub(crate) length: f64,
+    /// Whether it counts; one that does not is ignored.
+    pub(crate) counts: bool,
+    /// Whether either end may be its tip.
+    pub(crate) ambiguous: bool,
+}
+
+/// Something that was found.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Found {
+    pub(crate) score: f64,
+    pub(crate) ray: Ray,
+}
+
+/// An image with what is known and what was found.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Judged {
+    pub(crate) columns: f64,
+    pub(crate) rows: f64,
+    pub(crate) labels: Vec<Label>,
+    pub(crate) found: Vec<Found>,
+}
+
+/// By which rule detections are right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Rule {
+    Ray,
+    Box,
+}
+
+/// Verdict on one detection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Verdict {
+    /// Number of the image and of the detection in it.
+    pub(crate) image: usize,
+    pub(crate) detection: usize,
+    pub(crate) score: f64,
+    /// The label it found, if it is right.
+    pub(crate) label: Option<usize>,
+}
+
+/// The verdicts on all detections that are right or wrong, the surest first.
+pub(crate) fn verdicts(images: &[Judged], rule: Rule) -> Vec<Verdict> {
+    let mut verdicts = Vec::new();
+    for (image, judged) in images.iter().enumerate() {
+        let mut order: Vec<usize> = (0..judged.found.len()).collect();
+        order.sort_by(|&a, &b| judged.found[b].score.total_cmp(&judged.found[a].score));
+        let mut taken = vec![false; judged.labels.len()];
+        for detection in order {
+            let found = &judged.found[detection];
+            let mut fits = Vec::new();
+            let mut ignored = f64::INFINITY;
+            for (i, label) in judged.labels.iter().enumerate() {
+                if label.counts {
+                    fits.extend(cost(rule, judged, &found.ray, label).map(|cost| (cost, i)));
+                } else {
+                    // The other rule counts too, as a worse fit.
+                    let other = match rule {
+                        Rule::Ray => Rule::Box,
+                        Rule::Box => Rule::Ray,
+                    };
+                    let far = || cost(other, judged, &found.ray, label).map(|cost| cost + 10.0);
+                    ignored = cost(rule, judged, &found.ray, label)
+                        .or_else(far)
+                        .unwrap_or(f64::INFINITY)
+                        .min(ignored);
+                }
+            }
+            fits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            if ignored < fits.first().map_or(f64::INFINITY, |fit| fit.0) {
+                continue;
+            }
+            let label = fits.into_iter().map(|(_, i)| i).find(|&i| !taken[i]);
+            if let Some(i) = label {
+                taken[i] = true;
+            }
+            verdicts.push(Verdict {
+                image,
+                detection,
+                score: found.score,
+                label,
+            });
+        }
+    }
+    verdicts.sort_by(|a, b| b.score.total_cmp(&a.score));
+    verdicts
+}
+
+/// Precision and recall of all detections down to each score.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Curve {
+    /// Labels that count.
+    pub(crate) labels: usize,
+    pub(crate) images: usize,
+    /// Score, right ones and false alarms down to it; falling scores.
+    steps: Vec<(f64, usize, usize)>,
+}
+
+impl Curve {
+    pub(crate) fn new(images: &[Judged], rule: Rule) -> Self {
+        let mut steps: Vec<(f64, usize, usize)> = Vec::new();
+        let (mut right, mut wrong) = (0, 0);
+        for verdict in verdicts(images, rule) {
+            if verdict.label.is_some() {
+                right += 1;
+            } else {
+                wrong += 1;
+            }
+            match steps.last_mut() {
+                // Detections of equal score form one step.
+                Some(last) if last.0.total_cmp(&verdict.score).is_eq() => {
+                    (last.1, last.2) = (right, wrong);
+                }
+                _ => steps.push((verdict.score, right, wrong)),
+            }
+        }
+        let counted = |image: &Judged| image.labels.iter().filter(|label| label.counts).count();
+        Self {
+            labels: images.iter().map(counted).sum(),
+            images: images.len(),
+            steps,
+        }
+    }
+
+    /// Area under the largest precision at each recall or more; `None` without labels.
+    ///
+    /// # References
+    ///
+    /// Everingham et al. (2010), "The Pascal Visual Object Classes (VOC) Challenge", in its later form over
+    /// all steps of recall.
+    pub(crate) fn average_precision(&self) -> Option<f64> {
+        let labels = self.labels as f64;
+        let mut best = 0.0f64;
+        let mut area = 0.0;
+        for (k, &(_, right, wrong)) in self.steps.iter().enumerate().rev() {
+            best = best.max(right as f64 / (right + wrong) as f64);
+            let before = if k == 0 { 0 } else { self.steps[k - 1].1 };
+            area += (right - before) as f64 / labels * best;
+        }
+        (self.labels > 0).then_some(area)
+    }
+
+    /// The largest recall with no more false alarms an image, and the score it takes.
+    pub(crate) fn recall_at(&self, false_alarms: f64) -> Option<(f64, f64)> {
+        let allowed = |&&(_, _, wrong): &&(f64, usize, usize)| {
+            wrong as f64 <= false_alarms * self.images as f64
+        };
+        let step = self.steps.iter().rfind(allowed);
+        (self.labels > 0).then(|| {
+            step.map_or((0.0, f64::INFINITY), |s| {
+                (s.1 as f64 / self.labels as f64, s.0)
+            })
+        })
+    }
+
+    /// Right detections and false alarms in all.
+    pub(crate) fn totals(&self) -> (usize, usize) {
+        self.steps.last().map_or((0, 0), |step| (step.1, step.2))
+    }
+}
+
+/// How badly a detection fits a label; `None` where it does not.
+fn cost(rule: Rule, image: &Judged, ray: &Ray, label: &Label) -> Option<f64> {
+    match rule {
+        Rule::Ray => ray_cost(ray, label),
+        Rule::Box => {
+            let (a, b) = (ray.oriented_box.as_ref()?, label.ray.oriented_box.as_ref()?);
+            let share = shared(a, b, [image.columns, image.rows]);
+            (share >= SHARE).then_some(1.0 - share)
+        }
+    }
+}
+
+fn ray_cost(ray: &Ray, label: &Label) -> Option<f64> {
+    let forward = fit(ray, label.ray.tip, label.ray.axis_deg, label.length);
+    if !label.ambiguous {
+        return forward;
+    }
+    let [dx, dy] = unit(label.ray.axis_deg);
+    let end = [
+        label.ray.tip[0] + dx * label.length,
+        label.ray.tip[1] + dy * label.length,
+    ];
+    let backward = fit(ray, end, label.ray.axis_deg + 180.0, label.length);
+    [forward, backward]
+        .into_iter()
+        .flatten()
+        .min_by(f64::total_cmp)
+}
+
+/// The cost of a ray that fits another, smaller where it is nearer.
+fn fit(ray: &Ray, tip: Point, axis_deg: f64, length: f64) -> Option<f64> {
+    let turn = ((ray.axis_deg - axis_deg + 180.0).rem_euclid(360.0) - 180.0).abs();
+    if turn > TURN {
+        return None;
+    }
+    let apart = (ray.tip[0] - tip[0]).hypot(ray.tip[1] - tip[1]);
+    let [dx, dy] = unit(axis_deg);
+    let middle = [tip[0] + dx * length / 2.0, tip[1] + dy * length / 2.0];
+    let beside = |p: Point| {
+        let [dx, dy] = unit(ray.axis_deg);
+        ((p[0] - ray.tip[0]) * -dy + (p[1] - ray.tip[1]) * dx).abs()
+    };
+    let off = beside(tip).max(beside(middle));
+    (apart <= TIP || off <= LINE).then(|| (apart / TIP).min(1.0 + off / LINE) + turn / TURN)
+}
+
+fn unit(degrees: f64) -> Point {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    [sin, -cos]
+}
+
+/// Area that two convex polygons share over the area they cover together, both cut to an image.
+fn shared(a: &[Point; 4], b: &[Point; 4], [columns, rows]: Point) -> f64 {
+    let frame = [[0.0, 0.0], [columns, 0.0], [columns, rows], [0.0, rows]];
+    let (a, b) = (clipped(a, &frame), clipped(b, &frame));
+    if a.len() < 3 || b.len() < 3 {
+        return 0.0;
+    }
+    let common = area(&clipped(&a, &b)).abs();
+    let union = area(&a).abs() + area(&b).abs() - common;
+    if union > 0.0 { common / union } else { 0.0 }
+}
+
+/// Signed area of a polygon, by the shoelace formula.
+fn area(polygon: &[Point]) -> f64 {
+    let corners = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    corners.map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum::<f64>() / 2.0
+}
+
+/// A convex polygon cut by another.
+///
+/// # References
+///
+/// Sutherland & Hodgman (1974), "Reentrant Polygon Clipping".
+fn clipped(polygon: &[Point], cutter: &[Point]) -> Vec<Point> {
+    let turn = area(cutter).signum();
+    let mut left = polygon.to_vec();
+    for (a, b) in cutter.iter().zip(cutter.iter().cycle().skip(1)) {
+        let side =
+            |p: &Point| turn * ((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]));
+        let mut kept = Vec::with_capacity(left.len() + 1);
+        for (i, q) in left.iter().enumerate() {
+            let p = &left[(i + left.len() - 1) % left.len()];
+            let (sp, sq) = (side(p), side(q));
+            if (sp >= 0.0) != (sq >= 0.0) {
+                let t = sp / (sp - sq);
+                kept.push([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]);
+            }
+            if sq >= 0.0 {
+                kept.push(*q);
+            }
+        }
+        left = kept;
+    }
+    left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    #[test]
+    fn boxes_share_what_geometry_says() {
+        let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
+        let frame = [20.0, 20.0];
+        let half = [[5.0, 0.0], [5.0, 10.0], [15.0, 10.0], [15.0, 0.0]];
+        let r = 5.0 * 2f64.sqrt();
+        let turned = [
+            [5.0, 5.0 - r],
+            [5.0 + r, 5.0],
+            [5.0, 5.0 + r],
+            [5.0 - r, 5.0],
+        ];
+        let far = half.map(|[x, y]| [x + 30.0, y]);
+        // A square and itself turned by 45° share an octagon of 2√2 − 2 of its area, where the image cuts nothing off.
+        let inner = |p: [Point; 4]| p.map(|[x, y]| [x + 5.0, y + 5.0]);
+        let octagon = 2.0 * 2f64.sqrt() - 2.0;
+        assert!((shared(&square, &square, frame) - 1.0).abs() < 1e-12);
+        assert!((shared(&square, &half, frame) - 1.0 / 3.0).abs() < 1e-12);
+        assert!(
+            (shared(&inner(square), &inner(turned), frame) - octagon / (2.0 - octagon)).abs()
+                < 1e-12
+        );
+        assert!(shared(&square, &far, [100.0, 100.0]).abs() < 1e-12);
+    }
+
+    fn ray(value: &Value) -> Ray {
+        let number = |v: &Value| v.as_f64().expect("a number");
+        let point = |v: &Value| [number(&v[0]), number(&v[1])];
+        let corners = value["oriented_box"].as_array();
+        Ray {
+            tip: point(&value["tip"]),
+            axis_deg: number(&value["axis_deg"]),
+            oriented_box: corners.map(|c| [0, 1, 2, 3].map(|k| point(&c[k]))),
+        }
+    }
+
+    /// Numbers of the scorer in Python on random labels and detections, ties and ignored ones among them.
+    #[test]
+    fn scores_are_those_of_the_scorer_in_python() {
+        let text = include_str!("../../tests/fixtures/own/detector_scores.json");
+        let cases: Value = serde_json::from_str(text).expect("JSON");
+        let cases = cases["cases"].as_array().expect("cases");
+        assert!(cases.len() >= 8);
+        for (k, case) in cases.iter().enumerate() {
+            for wanted in ["clear", "clear+probable"] {
+                let images = case["images"]
+                    .as_array()
+                    .expect("images")
+                    .iter()
+                    .map(|image| Judged {
+                        columns: image["width"].as_f64().expect("a width"),
+                        rows: image["height"].as_f64().expect("a height"),
+                        labels: image["wakes"]
+                            .as_array()
+                            .expect("wakes")
+                            .iter()
+                            .map(|wake| Label {
+                                ray: ray(wake),
+                                length: wake["length_px"].as_f64().expect("a length"),
+                                counts: wanted.split('+').any(|c| wake["confidence"] == c),
+                                ambiguous: wake["direction_ambiguous"].as_bool().unwrap_or(false),
+                            })
+                            .collect(),
+                        found: image["detections"]
+                            .as_array()
+                            .expect("detections")
+                            .iter()
+                            .map(|found| Found {
+                                score: found["score"].as_f64().expect("a score"),
+                                ray: ray(found),
+                            })
+                            .collect(),
+                    });
+                let images: Vec<Judged> = images.collect();
+                let expected = &case["expected"][wanted];
+                let number = |key: &str| expected[key].as_f64().expect("a number");
+                let rays = Curve::new(&images, Rule::Ray);
+                let boxes = Curve::new(&images, Rule::Box);
+                let found = rays.average_precision().expect("labels");
+                // Sums of some hundred numbers below 1, in another order.
+                assert!(
+                    (found - number("ap")).abs() < 1e-12,
+                    "case {k}, {wanted}: {found}"
+                );
+                assert!(
+                    (boxes.average_precision().expect("labels") - number("ap50")).abs() < 1e-12,
+                    "case {k}, {wanted}"
+                );
+                assert_eq!(
+                    rays.totals(),
+                    (number("right") as usize, number("false_alarms") as usize),
+                    "case {k}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn recall_at_a_rate_is_read_off_the_curve() {
+        let curve = Curve {
+            labels: 4,
+            images: 2,
+            steps: vec![(0.9, 1, 0), (0.8, 2, 1), (0.5, 2, 3), (0.4, 3, 3)],
+        };
+        assert_eq!(curve.recall_at(0.5), Some((0.5, 0.8)));
+        assert_eq!(curve.recall_at(0.0), Some((0.25, 0.9)));
+        assert_eq!(curve.recall_at(2.0), Some((0.75, 0.4)));
+        // Envelope of precision: 1, 2/3, 1/2 over recall ¼, ½, ¾.
+        let area = 0.25 * (1.0 + 2.0 / 3.0 + 0.5);
+        assert!((curve.average_precision().expect("labels") - area).abs() < 1e-12);
+    }
+}

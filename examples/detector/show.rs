@@ -1,0 +1,56 @@
+//! Without a command: wakes are found in a few simulated images, which are drawn.
+
+use std::error::Error;
+use std::path::Path;
+
+use wake_ldm::device_named;
+
+use super::drawing::sheet;
+use super::evaluate::{HELD_OUT, SIZE, picture};
+use super::find::{Search, find};
+use super::grey::Grey;
+use super::model::Model;
+use super::progress;
+use super::recipes::Recipe;
+
+/// Images that are shown.
+const COUNT: u64 = 8;
+
+/// Draws simulated images with their wakes (green) and what is found (red to yellow) into `simulated.png`.
+pub(crate) fn show(out: &Path) -> Result<(), Box<dyn Error>> {
+    let model = Model::load(None, device_named("flex")?)?;
+    std::fs::create_dir_all(out)
+        .map_err(|error| format!("cannot make {}: {error}", out.display()))?;
+    let source = Recipe::Simulated.source(HELD_OUT, SIZE);
+    let bar = progress::bar(COUNT, "images");
+    let mut pictures = Vec::new();
+    for index in 0..COUNT {
+        let sample = source.sample(index);
+        let image = Grey::from_levels(SIZE, SIZE, &sample.pixels);
+        let found = find(
+            &image,
+            &model,
+            Search {
+                spacing: None,
+                least_score: 0.2,
+            },
+        );
+        bar.suspend(|| {
+            println!(
+                "image {index}: {} wakes, {} found",
+                sample.wakes.len(),
+                found.len()
+            );
+        });
+        pictures.push(picture(&image, &sample.wakes, &found));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let path = out.join("simulated.png");
+    sheet(&pictures, 4).save(&path)?;
+    println!(
+        "wakes in green, what was found in red to yellow: {}",
+        path.display()
+    );
+    Ok(())
+}
