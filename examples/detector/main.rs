@@ -60,7 +60,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    exit::code(match Arguments::parse().command {
+    exit::code(|| match Arguments::parse().command {
         Some(Command::Train(options)) => train::train(&options),
         Some(Command::Detect(options)) => detect::detect(&options),
         Some(Command::Evaluate(options)) => evaluate::evaluate(&options),

@@ -114,6 +114,7 @@ pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
                 (report, following)
             })
         };
+        trainer.check()?;
         next = following;
         let [tips, lines, directions, extents] = parts.into_inner().unwrap_or_default();
         let more =
@@ -121,7 +122,7 @@ pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
         metrics.write(trainer.steps(), steps, report, &more)?;
         bar.set_position(trainer.steps() as u64);
         if trainer.steps().is_multiple_of(options.every as usize) || trainer.steps() == steps {
-            trainer.checkpoint(&state).write(&checkpoints)?;
+            trainer.checkpoint(&state)?.write(&checkpoints)?;
             save(
                 &trainer.averaged(),
                 &options.out.join("detector.safetensors"),

@@ -30,7 +30,7 @@ pub use metrics::Metrics;
 pub use optimizer::{AdamOptions, Rate};
 pub use run::{Run, RunOptions, Task, Terms};
 pub use tasks::{FlowTask, PriorTask, WordsTask};
-pub use trainer::{StepReport, TrainerOptions};
+pub use trainer::{StepReport, Trainer, TrainerOptions};
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;
