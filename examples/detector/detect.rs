@@ -11,7 +11,7 @@ use super::drawing::Drawing;
 use super::find::{Search, find};
 use super::grey::Grey;
 use super::model::Model;
-use super::{progress, radon};
+use super::{exit, progress, radon};
 
 /// How wakes are looked for.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -127,7 +127,7 @@ pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
     bar.finish_and_clear();
     let told = json!({ "images": told });
     if options.json {
-        println!("{told:#}");
+        exit::say(&format!("{told:#}"))?;
     }
     Ok(())
 }

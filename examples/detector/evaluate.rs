@@ -18,7 +18,7 @@ use super::recipes::Recipe;
 use super::score::{Curve, Found, Judged, Label, Ray, Rule, verdicts};
 use super::source::Wake;
 use super::targets::FOUND;
-use super::{labels, progress};
+use super::{exit, labels, progress};
 
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
@@ -88,7 +88,7 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
         format!("{:#}\n", Value::Array(report.rows.clone())),
     )?;
     write("report.md", report.text())?;
-    println!("{}", report.text());
+    exit::say(&report.text())?;
     Ok(())
 }
 
