@@ -1,4 +1,4 @@
-//! Finds ship wakes in radar images with a small network that has seen none but painted and simulated ones.
+//! Finds ship wakes in radar images with a small network that has learned from painted ones alone.
 //!
 //! ```text
 //! cargo run --release --example detector -- detect FILE|DIR... --json
