@@ -217,7 +217,7 @@ pub(crate) fn flatten(tree: &UseTree, before: &mut Names, leaves: &mut Vec<(Stri
             .iter()
             .for_each(|tree| flatten(tree, before, leaves)),
         UseTree::Name(name) if name.ident == "self" => {
-            leaves.push((before.last().expect("a module").clone(), before.clone()))
+            leaves.push((before.last().expect("a module").clone(), before.clone()));
         }
         UseTree::Name(name) => leaves.push((
             name.ident.to_string(),
