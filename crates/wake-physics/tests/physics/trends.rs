@@ -210,8 +210,11 @@ fn refinement_changes_neither_mean_nor_contrast() {
         println!("wind {wind}: {fine:?} {middle:?} {coarse:?}");
         for q in 0..2 {
             let error = fine[q][1].hypot(middle[q][1]);
+            // Waves of 2.5 to 5 m, which the second grid lacks, leave up to 3 % of contrast without modulation, on which it
+            // does not act.
+            let lacking = [0.0, 0.03 * (1.0 - fine[1][0])][q];
             assert!(
-                (fine[q][0] - middle[q][0]).abs() < 4.0 * error,
+                (fine[q][0] - middle[q][0]).abs() < 4.0 * error + lacking,
                 "wind {wind}: {fine:?} {middle:?}"
             );
             // A change of the mean by a thousandth is seen, and of the contrast by a fiftieth.
