@@ -26,12 +26,12 @@
 //!
 //! | of | modules |
 //! | --- | --- |
-//! | all | [`constants`], [`output`], [`dispersion`] |
+//! | all | [`constants`], [`output`], [`dispersion`], [`window`] |
 //! | what is asked | [`scene`] |
-//! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`surface`] |
+//! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`swell`], [`surface`] |
 //! | the ship | [`hull`], [`nufft`], [`kelvin`], [`turbulent`] |
-//! | the radar | [`permittivity`], [`scattering`], [`sar`] |
-//! | the image | [`labels`], [`grey`], [`measure`] |
+//! | the radar | [`permittivity`], [`scattering`], [`sar`], [`gusts`], [`slicks`] |
+//! | the image | [`grey`], [`labels`], [`measure`] |
 //!
 //! # Axes and units
 //!
