@@ -243,6 +243,7 @@ pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "places that nothing may change")]
 mod tests {
     use super::*;
 
