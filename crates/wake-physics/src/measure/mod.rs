@@ -30,9 +30,20 @@ pub use inversion::{incidence, mean_sigma0, wind_axis, wind_speed};
 pub use open_sea::{OpenSea, open_sea};
 pub use radial::{Binning, RadialSpectrum, radial_spectrum};
 pub use texture::{Texture, texture};
-pub use wake::{ShipPlace, WakeMeasurement, kelvin_wedge, measure_wake};
+pub use wake::{WakeMeasurement, kelvin_wedge, measure_wake};
 
 use serde::Serialize;
+
+/// What is known of the ship from elsewhere (its echo, a chart, or the labels of the scene).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShipPlace {
+    /// Midship (x, y) \[m\].
+    pub position: [f64; 2],
+    /// Length \[m\]: the arms start at the bow.
+    pub length: f64,
+    /// Depth of the water \[m\], may be infinite: with the speed it sets how far the arms open.
+    pub depth: f64,
+}
 
 /// A measured value, and whether to believe it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -1,22 +1,11 @@
 //! Heading and speed of a ship from the image of its wake.
 
 use super::spectrum::{PowerSpectrum, window};
-use super::{Measured, arms, stationary};
+use super::{Measured, ShipPlace, arms, stationary};
 use crate::kelvin::half_angle;
 use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 use serde::Serialize;
-
-/// What is known of the ship from elsewhere (its echo, a chart, or the labels of the scene).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShipPlace {
-    /// Midship (x, y) \[m\].
-    pub position: [f64; 2],
-    /// Length \[m\]: the arms start at the bow.
-    pub length: f64,
-    /// Depth of the water \[m\], may be infinite: with the speed it sets how far the arms open.
-    pub depth: f64,
-}
 
 /// What the wake in an image tells of its ship.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -95,7 +95,7 @@ impl Stages<'_> {
             sigma0.values[at(source)] = all.values[at(source)];
         }
 
-        let velocity = self.radial_velocity(workspace, &fields);
+        let velocity = fields.radial_velocity(workspace, &self.raster, self.models.incidence);
         let (imaging, lit) = self.imaging(&sigma0, &velocity, &fields);
         let direct = DirectImage::new(&imaging, &lit, image);
         clock.lap();
@@ -120,7 +120,7 @@ impl Stages<'_> {
         self.add_swell(workspace, &mut fields);
         self.add_wake(workspace, &mut fields);
         self.add_edge(&mut fields);
-        let velocity = self.radial_velocity(workspace, &fields);
+        let velocity = fields.radial_velocity(workspace, &self.raster, self.models.incidence);
         let power = Field::constant(&self.raster, 1.0);
         let (imaging, sources) = self.imaging(&power, &velocity, &fields);
         reaching(&imaging, &sources, &self.models.image, pixels)

@@ -1,12 +1,15 @@
 //! From the mean intensity to the image with speckle.
 
+use crate::constants::SEA_WATER_DENSITY;
+use crate::labels::echo_displacement;
 use crate::models::Models;
 use crate::raster::{Field, Raster};
-use crate::sar::ImpulseResponse;
+use crate::sar::echo::ship_cross_section;
 use crate::sar::geometry::ship_radial_velocity;
 use crate::sar::impulse::{Looks, PointTarget, Reflectivity};
 use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::speckle::speckle;
+use crate::sar::{Echo, ImpulseResponse};
 use crate::scene::Scene;
 use crate::scene::sensor::ambiguity_distance;
 use num_complex::Complex32;
@@ -147,4 +150,19 @@ impl Speckling {
             Self::Without | Self::Pixels(..) => None,
         }
     }
+}
+
+/// The ship's own echo where no impulse response images it, if it is asked for.
+pub(super) fn hull_echo(scene: &Scene, models: &Models) -> Option<Echo> {
+    let ship = scene.ship.as_ref().filter(|ship| ship.echo)?;
+    let wake = models.wake.as_ref()?;
+    let displacement = SEA_WATER_DENSITY * wake.hull.volume();
+    Some(Echo {
+        position: wake.track.position,
+        heading: ship.heading,
+        length: ship.length,
+        beam: ship.beam,
+        cross_section: ship_cross_section(scene.radar.frequency, displacement),
+        displacement: echo_displacement(scene, ship),
+    })
 }

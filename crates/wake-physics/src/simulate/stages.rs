@@ -3,18 +3,15 @@
 use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
 use super::simulation::Method;
-use super::speckling::Exposure;
+use super::speckling::{Exposure, hull_echo};
 use super::surface_fields::{SurfaceFields, Wanted, quantities};
-use crate::constants::SEA_WATER_DENSITY;
 use crate::kelvin;
-use crate::labels::echo_displacement;
 use crate::models::{Models, turbulent_wake};
 use crate::nufft;
 use crate::plan::{Plan, SHARES};
 use crate::raster::{Field, Raster};
 use crate::sar::direct::DirectImage;
-use crate::sar::echo::ship_cross_section;
-use crate::sar::{Echo, Imaging, Sources};
+use crate::sar::{Imaging, Sources};
 use crate::scattering::hydrodynamic::to_bragg_factors;
 use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
 use crate::scene::{Scene, Term};
@@ -111,7 +108,8 @@ impl<'a> Stages<'a> {
         self.modulate(&mut sigma0, damping_field);
         damping.into_iter().for_each(|field| workspace.give(field));
         seconds.backscatter = clock.lap();
-        let radial_velocity = self.radial_velocity(workspace, &fields);
+        let radial_velocity =
+            fields.radial_velocity(workspace, &self.raster, self.models.incidence);
         let intensity = self.image(workspace, &sigma0, &radial_velocity, &fields);
         let (intensity, exposure) = match self.models.response {
             None => (intensity, None),
@@ -377,27 +375,6 @@ impl<'a> Stages<'a> {
         sigma0
     }
 
-    /// Velocity toward the radar; without pixels where nobody asked for the velocities.
-    pub(super) fn radial_velocity(
-        &self,
-        workspace: &mut Workspace,
-        fields: &SurfaceFields,
-    ) -> Field {
-        let [vx, vz] = [&fields.velocity_x, &fields.velocity_z];
-        if vx.values.is_empty() {
-            return Field::default();
-        }
-        let incidence = self.models.incidence;
-        let (sin, cos) = (incidence.sin() as f32, incidence.cos() as f32);
-        let mut field = workspace.field(&self.raster);
-        let velocities = vx.values.par_iter().zip(&vz.values);
-        let pixels = field.values.par_iter_mut().zip(velocities);
-        pixels
-            .with_min_len(1 << 14)
-            .for_each(|(radial, (x, z))| *radial = z * cos - x * sin);
-        field
-    }
-
     /// What the radar does, and what it looks at.
     pub(super) fn imaging<'f>(
         &self,
@@ -447,7 +424,7 @@ impl<'a> Stages<'a> {
     /// Adds the ship's own echo, unless an impulse response is to image it, and the radar's noise.
     pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
         if self.models.response.is_none()
-            && let Some(echo) = self.echo()
+            && let Some(echo) = hull_echo(self.scene, self.models)
         {
             let resolution = self.models.resolution_at_rest().nominal;
             echo.add_to(intensity, &self.models.image, resolution);
@@ -457,20 +434,5 @@ impl<'a> Stages<'a> {
             let pixels = intensity.values.par_iter_mut().with_min_len(1 << 14);
             pixels.for_each(|value| *value += noise);
         }
-    }
-
-    /// The ship's own echo, if it is asked for.
-    fn echo(&self) -> Option<Echo> {
-        let ship = self.scene.ship.as_ref().filter(|ship| ship.echo)?;
-        let wake = self.models.wake.as_ref()?;
-        let displacement = SEA_WATER_DENSITY * wake.hull.volume();
-        Some(Echo {
-            position: wake.track.position,
-            heading: ship.heading,
-            length: ship.length,
-            beam: ship.beam,
-            cross_section: ship_cross_section(self.scene.radar.frequency, displacement),
-            displacement: echo_displacement(self.scene, ship),
-        })
     }
 }

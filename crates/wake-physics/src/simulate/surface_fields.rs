@@ -1,9 +1,11 @@
 //! The linear fields of the surface: which a scene needs, and their values.
 
 use crate::plan::Plan;
-use crate::raster::Field;
+use crate::raster::{Field, Raster};
 use crate::scene::Term;
 use crate::waves::Quantity;
+use crate::workspace::Workspace;
+use rayon::prelude::*;
 
 /// The fields that are results.
 const OUTPUTS: [Quantity; 6] = [
@@ -86,5 +88,26 @@ impl SurfaceFields {
             Quantity::RadialAcceleration => &mut self.radial_acceleration,
             Quantity::Hydrodynamic => &mut self.modulation,
         }
+    }
+
+    /// Velocity toward the radar at the incidence θ \[rad\]; without pixels where nobody asked for the velocities.
+    pub(super) fn radial_velocity(
+        &self,
+        workspace: &mut Workspace,
+        raster: &Raster,
+        incidence: f64,
+    ) -> Field {
+        let [vx, vz] = [&self.velocity_x, &self.velocity_z];
+        if vx.values.is_empty() {
+            return Field::default();
+        }
+        let (sin, cos) = (incidence.sin() as f32, incidence.cos() as f32);
+        let mut field = workspace.field(raster);
+        let velocities = vx.values.par_iter().zip(&vz.values);
+        let pixels = field.values.par_iter_mut().zip(velocities);
+        pixels
+            .with_min_len(1 << 14)
+            .for_each(|(radial, (x, z))| *radial = z * cos - x * sin);
+        field
     }
 }
