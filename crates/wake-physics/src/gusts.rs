@@ -48,7 +48,7 @@ pub struct Gusts {
 }
 
 impl Gusts {
-    /// Spectral density Φ of g [m²] at a wavenumber [rad/m].
+    /// Spectral density Φ of g \[m²\] at a wavenumber [rad/m].
     #[must_use]
     pub fn density(&self, [kx, ky]: [f64; 2]) -> f64 {
         let (sin, cos) = self.wind_toward.sin_cos();

@@ -56,7 +56,8 @@ impl Reading {
     ///
     /// # Errors
     ///
-    /// [`Error::Impossible`] for a value that no scene can have, [`Error::Contradiction`] for two different
+    /// [`Impossible`](crate::Error::Impossible) for a value that no scene can have,
+    /// [`Contradiction`](crate::Error::Contradiction) for two different
     /// values of the same thing; both quote the words.
     ///
     /// # Examples

@@ -35,7 +35,7 @@ impl Rate {
     }
 }
 
-/// Constants of [`Adam`].
+/// Constants of `Adam`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdamOptions {
     /// β₁, how long gradients are remembered.

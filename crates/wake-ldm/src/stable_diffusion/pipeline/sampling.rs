@@ -55,7 +55,7 @@ impl Pipeline {
     ///
     /// [`Error::OutOfRange`](crate::Error::OutOfRange) or
     /// [`Error::InvalidOption`](crate::Error::InvalidOption) for a request that makes no sense, or
-    /// not to these models, and what [`SchedulerConfig::scheduler`] reports.
+    /// not to these models, and what [`SchedulerConfig::scheduler`](crate::scheduler::SchedulerConfig::scheduler) reports.
     pub fn sample(&self, request: &Request) -> Result<Sampling<'_>> {
         Sampling::new(self, request)
     }
