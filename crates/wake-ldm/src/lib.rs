@@ -22,6 +22,7 @@ pub mod train;
 #[cfg(feature = "flex")]
 mod self_check;
 
+pub use burn;
 pub use device::device_named;
 pub use error::{Error, Mismatch, Misshapen, Result};
 #[cfg(feature = "flex")]
