@@ -26,8 +26,10 @@ pub(crate) const STAGES: [&str; 5] = ["sea", "kelvin", "backscatter", "bunching"
 const WAVES: usize = 10_000;
 /// Pixels of the oracle where the whole raster takes too long.
 const SAMPLE: usize = 4_096;
+/// Pixels of the quadrature of σ⁰, which takes a millisecond each.
+const QUADRATURES: usize = 1_024;
 /// Largest raster, as pixels along a side, on which the oracles run whole.
-const WHOLE: usize = 256;
+const WHOLE: usize = 128;
 /// Runs of a fast method, and of a short matrix product.
 const RUNS: usize = 5;
 /// Rows of a matrix product on a large raster, scaled up.
@@ -220,8 +222,8 @@ fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
             BackscatterTable::covering(model.clone(), &slopes[0], &slopes[1], tolerance * mean);
         table.sigma0_field(&facets)
     });
-    // Quadrature takes a millisecond a pixel: a sample on every raster, and the same for every tolerance.
-    let pixels = sample(raster, SAMPLE);
+    // A sample on every raster, and the same for every tolerance.
+    let pixels = sample(raster, QUADRATURES);
     let scale = raster.len() as f64 / pixels.len() as f64;
     let oracle = memo.at_size(raster.rows, || {
         let (seconds, exact) = seconds(|| model.sigma0_pixels(&facets, &pixels));
@@ -325,7 +327,7 @@ fn scene(size: usize, tolerance: f64, memo: &mut Memo) -> wake_physics::Result<R
 
 /// Pixels of the oracle of the scene: fewer of a large image, whose sea has more waves.
 fn scene_pixels(size: usize) -> usize {
-    ((1 << 24) / (size * size).max(1 << 18)).max(8)
+    ((1 << 23) / (size * size).max(1 << 18)).max(4)
 }
 
 /// What several rows share, because it is slow.
