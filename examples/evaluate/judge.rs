@@ -2,12 +2,14 @@
 
 use crate::measurements::{MeasurementRow, Reading, raster, rows};
 use crate::pixels::{PixelRow, Tally, blur, constant, grey};
+use crate::rungs::{RungRow, bar_steps, rungs};
 use crate::scenes::{held_out, other_sea, ship};
 use crate::source::{ImageSource, Result, Simulator, Told};
 use crate::statistics::quantile;
 use crate::swaps::{SwapRow, swaps};
 use crate::timing::{TimingRow, timings};
 use crate::wake::{WakeCorrelation, wake_correlation};
+use burn::tensor::Device;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use wake_ldm::metrics::Lpips;
@@ -16,12 +18,14 @@ use wake_physics::sar::speckle::speckle;
 use wake_physics::{Field, Scene};
 
 /// Images drawn at once.
-const BATCH: usize = 8;
+pub(crate) const BATCH: usize = 8;
 
 /// What is judged.
 pub(crate) struct Judged<'a> {
     pub(crate) source: &'a dyn ImageSource,
     pub(crate) name: &'static str,
+    /// Whether it is a model, not the simulator in its place.
+    pub(crate) has_network: bool,
     /// What it can be told besides sentence and numbers together; none for the simulator.
     pub(crate) conditions: Vec<Told>,
 }
@@ -48,7 +52,7 @@ impl Plan {
     /// Steps of the progress bar.
     pub(crate) fn steps(&self, judged: &Judged<'_>) -> usize {
         let conditions = self.condition_scenes * judged.conditions.len();
-        self.scenes + 8 * self.wake_scenes + conditions + 5 * self.pairs + 10
+        self.scenes + 8 * self.wake_scenes + conditions + 5 * self.pairs + 10 + bar_steps(judged)
     }
 }
 
@@ -59,6 +63,7 @@ pub(crate) struct Report {
     pub(crate) judged: &'static str,
     pub(crate) scenes: usize,
     pub(crate) pixels: Vec<PixelRow>,
+    pub(crate) rungs: Vec<RungRow>,
     pub(crate) speckle: Speckle,
     pub(crate) wake_correlation: WakeCorrelation,
     pub(crate) measurements: Vec<MeasurementRow>,
@@ -114,6 +119,7 @@ pub(crate) fn judge(
     plan: &Plan,
     judged: &Judged<'_>,
     lpips: Option<&Lpips>,
+    device: &Device,
     bar: &ProgressBar,
 ) -> Result<Report> {
     let scenes: Vec<Scene> = (0..plan.scenes as u64).map(held_out).collect();
@@ -123,6 +129,8 @@ pub(crate) fn judge(
         sums.add(batch, judged, lpips)?;
         bar.inc(batch.len() as u64);
     }
+    bar.set_message("rungs");
+    let rungs = rungs(&scenes, judged, device, || bar.inc(1))?;
     bar.set_message("wake correlation");
     let model = Some(judged.source);
     let wake = wake_correlation(&scenes[..plan.wake_scenes], model, || bar.inc(8))?;
@@ -147,6 +155,7 @@ pub(crate) fn judge(
             constant.row("constant"),
             blurred.row("blurred simulator"),
         ],
+        rungs,
         speckle: Speckle {
             looks: scenes[0].radar.looks,
             simulator,

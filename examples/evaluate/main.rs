@@ -16,6 +16,7 @@ mod model;
 mod pixels;
 mod plot;
 mod report;
+mod rungs;
 mod scenes;
 mod source;
 mod statistics;
@@ -88,11 +89,13 @@ fn run(arguments: &Arguments) -> Result<()> {
         Some(model) => Judged {
             source: model,
             name: "model",
+            has_network: true,
             conditions: vec![Told::Text, Told::Numbers, Told::Paraphrase],
         },
         None => Judged {
             source: &OtherSea,
             name: "simulator with another random sea",
+            has_network: false,
             conditions: Vec::new(),
         },
     };
@@ -101,7 +104,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     bar.set_style(ProgressStyle::with_template(
         "{msg:20} {bar:30} {pos}/{len}, {eta} left",
     )?);
-    let report = judge(&plan, &judged, lpips.as_ref(), &bar)?;
+    let report = judge(&plan, &judged, lpips.as_ref(), &device, &bar)?;
     bar.finish_and_clear();
     let text = report::markdown(&report);
     output::write_json(&arguments.out.join("report.json"), &report)?;

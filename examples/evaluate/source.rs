@@ -1,6 +1,7 @@
 //! Where images come from: the simulator, or a model that was trained on it.
 
-use wake_physics::{Field, Scene, simulate};
+use wake_ldm::noise::NoiseSource;
+use wake_physics::{Field, LinearSea, Scene, expected_intensity, simulate};
 
 /// Result of what may fail in this example.
 pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -61,5 +62,49 @@ impl ImageSource for OtherSea {
             })
             .collect();
         Simulator.draw(&others, told)
+    }
+}
+
+/// The mean over all seas, by physics: no network, no sea.
+pub(crate) struct Expected;
+
+impl ImageSource for Expected {
+    fn draw(&self, scenes: &[Scene], _: Told) -> Result<Vec<Field>> {
+        let draw = |scene| Ok(expected_intensity(scene)?);
+        scenes.iter().map(draw).collect()
+    }
+}
+
+/// The mean over all seas times the exponential of a Gaussian sea with the linear spectrum of the image: no network.
+pub(crate) struct Gaussian;
+
+impl ImageSource for Gaussian {
+    fn draw(&self, scenes: &[Scene], _: Told) -> Result<Vec<Field>> {
+        let draw = |scene: &Scene| {
+            let mut image = expected_intensity(scene)?;
+            let sea = LinearSea::new(scene)?;
+            let normals = NoiseSource::new(!scene.seed).normal(0, sea.normals());
+            let field = sea.field(&normals);
+            let half_variance = 0.5 * sea.covariance().values[0];
+            for (value, sea) in image.values.iter_mut().zip(&field.values) {
+                *value *= (sea - half_variance).exp();
+            }
+            Ok(image)
+        };
+        scenes.iter().map(draw).collect()
+    }
+}
+
+/// The same value everywhere: the mean of the expected image.
+pub(crate) struct Constant;
+
+impl ImageSource for Constant {
+    fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
+        let mut images = Expected.draw(scenes, told)?;
+        for image in &mut images {
+            let mean = image.mean() as f32;
+            image.values.fill(mean);
+        }
+        Ok(images)
     }
 }

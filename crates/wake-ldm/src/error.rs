@@ -62,7 +62,11 @@ pub enum Error {
 
     /// A weight file breaks the safetensors format, so nothing in it is trusted.
     #[error("{} is not a valid safetensors file: {reason}", path.display())]
-    InvalidSafetensors { path: PathBuf, reason: String },
+    InvalidSafetensors {
+        path: PathBuf,
+        #[source]
+        reason: Box<dyn std::error::Error + Send + Sync>,
+    },
 
     /// A weight that no training gives.
     #[error("{} is damaged: tensor {tensor} holds {value}; all weights must be finite", path.display())]

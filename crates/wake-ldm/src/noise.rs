@@ -44,6 +44,8 @@ pub(crate) mod uniform {
     pub(crate) const PROMPTS: u32 = 1002;
     /// Noise levels of examples.
     pub(crate) const LEVELS: u32 = 2000;
+    /// Places of patches in a two-sample test.
+    pub(crate) const PLACES: u32 = 2002;
     /// Latent pixels of examples.
     pub(crate) const CELLS: u32 = 2001;
     /// Training steps of fine-tuning.

@@ -298,7 +298,7 @@ fn read(
     })?;
     let file = SafeTensors::deserialize(&bytes).map_err(|error| Error::InvalidSafetensors {
         path: path.to_owned(),
-        reason: error.to_string(),
+        reason: error.into(),
     })?;
     let (mut found, mut mismatch) = (Vec::new(), Mismatch::default());
     for (name, shape) in wanted(&file) {

@@ -245,15 +245,15 @@ fn write_part(folder: &Path, number: usize, part: &Part<'_>) -> std::io::Result<
 }
 
 fn read_part(path: &Path, tensors: &mut Tensors) -> Result<()> {
-    let invalid = |reason: String| Error::InvalidSafetensors {
+    let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| Error::InvalidSafetensors {
         path: path.to_owned(),
         reason,
     };
     let bytes = fs::read(path).map_err(|source| io("read", path, source))?;
-    let file = SafeTensors::deserialize(&bytes).map_err(|error| invalid(error.to_string()))?;
+    let file = SafeTensors::deserialize(&bytes).map_err(|error| invalid(error.into()))?;
     for (name, view) in file.tensors() {
         if view.dtype() != Dtype::F32 {
-            return Err(invalid(format!("{name} is no f32")));
+            return Err(invalid(format!("{name} is no f32").into()));
         }
         let (chunks, _) = view.data().as_chunks::<4>();
         let numbers = chunks

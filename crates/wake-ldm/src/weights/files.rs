@@ -162,7 +162,7 @@ impl WeightFiles {
                 if tensors.insert(name.clone(), stored).is_some() {
                     return Err(Error::InvalidSafetensors {
                         path: file.path.clone(),
-                        reason: format!("two tensors are called {name}"),
+                        reason: format!("two tensors are called {name}").into(),
                     });
                 }
             }
@@ -178,7 +178,7 @@ impl WeightFile {
         if !found.is_file() {
             return Err(Error::InvalidSafetensors {
                 path: path.to_owned(),
-                reason: "no regular file".to_owned(),
+                reason: "no regular file".into(),
             });
         }
         let file = File::open(path).map_err(|source| unreadable(path, source))?;

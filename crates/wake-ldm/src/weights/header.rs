@@ -34,28 +34,28 @@ pub(super) struct Header {
 /// - `size`: its length in bytes
 pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header> {
     let io = |source| unreadable(path, source);
-    let invalid = |reason: String| Error::InvalidSafetensors {
+    let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| Error::InvalidSafetensors {
         path: path.to_owned(),
         reason,
     };
     let Some(rest) = size.checked_sub(LENGTH) else {
-        return Err(invalid("too short for a header".to_owned()));
+        return Err(invalid("too short for a header".into()));
     };
     let mut length = [0; LENGTH as usize];
     file.read_exact(&mut length).map_err(io)?;
     let length = u64::from_le_bytes(length);
     if length > rest.min(LONGEST) {
-        return Err(invalid(format!("a header of {length} bytes")));
+        return Err(invalid(format!("a header of {length} bytes").into()));
     }
     let mut text = vec![0; length as usize];
     file.read_exact(&mut text).map_err(io)?;
-    let metadata = parse(&text).map_err(invalid)?;
+    let metadata = parse(&text).map_err(|error| invalid(error.into()))?;
     let found = rest - length;
     if metadata.data_len() as u64 != found {
         let told = metadata.data_len();
-        return Err(invalid(format!(
-            "{told} bytes of data, but {found} are there"
-        )));
+        return Err(invalid(
+            format!("{told} bytes of data, but {found} are there").into(),
+        ));
     }
     Ok(Header {
         metadata,
@@ -64,11 +64,10 @@ pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header
 }
 
 /// The tensors of a header, of which none may occur twice: a reader would take the last in silence.
-fn parse(text: &[u8]) -> Result<Metadata, String> {
+fn parse(text: &[u8]) -> Result<Metadata, serde_json::Error> {
     let mut json = serde_json::Deserializer::from_slice(text);
-    json.deserialize_map(DistinctNames)
-        .map_err(|error| error.to_string())?;
-    serde_json::from_slice(text).map_err(|error| error.to_string())
+    json.deserialize_map(DistinctNames)?;
+    serde_json::from_slice(text)
 }
 
 struct DistinctNames;
@@ -109,7 +108,10 @@ mod tests {
         assert_eq!(parse(good.as_bytes()).unwrap().data_len(), 8);
         let twice = format!(r#"{{"a": {first}, "b": {second}, "a": {third}}}"#);
         let refusal = parse(twice.as_bytes()).unwrap_err();
-        assert!(refusal.contains("the name a occurs twice"), "{refusal}");
+        assert!(
+            refusal.to_string().contains("the name a occurs twice"),
+            "{refusal}"
+        );
     }
 
     /// A million open brackets are skipped without recursion, and refused for having no end.

@@ -66,7 +66,7 @@ impl ShardIndex {
     fn invalid(&self, reason: &str) -> Error {
         Error::InvalidSafetensors {
             path: self.path.clone(),
-            reason: reason.to_owned(),
+            reason: reason.into(),
         }
     }
 }

@@ -17,6 +17,7 @@ mod arms;
 mod inversion;
 mod open_sea;
 mod radial;
+mod shape;
 mod smooth;
 mod spectrum;
 mod stationary;
@@ -29,6 +30,7 @@ mod tests;
 pub use inversion::{incidence, mean_sigma0, wind_axis, wind_speed};
 pub use open_sea::{OpenSea, open_sea};
 pub use radial::{Binning, RadialSpectrum, radial_spectrum};
+pub use shape::{SeaShape, crest_variance, sea_shape};
 pub use texture::{Texture, texture};
 pub use wake::{WakeMeasurement, kelvin_wedge, measure_wake};
 

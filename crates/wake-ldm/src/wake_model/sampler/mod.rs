@@ -10,7 +10,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use wake_physics::labels::Labels;
 use wake_physics::{Field, Scene, labels_of};
-use wake_text::{PartialScene, Wording};
+use wake_text::{Reading, Wording};
 
 use crate::error::{Error, Result, check_range};
 use crate::nn::check_finite;
@@ -29,7 +29,7 @@ const STEPS: usize = 4;
 /// What the model is told about a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Conditioning {
-    /// The numbers that [`wake_text`] reads from the words, and those that only the model reads.
+    /// The numbers that [`wake_text`] reads from the words; where it leaves words unread, also those that the model reads.
     #[default]
     Both,
     /// The words alone, as the model reads them.
@@ -137,17 +137,18 @@ impl WakeSampler {
     pub fn sample_many(&self, prompts: &[&str], seed: u64) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
         let input = |(k, prompt): (u64, &&str)| -> Result<Input> {
-            let said = PartialScene::read(prompt)?;
-            if said.is_empty() {
+            let reading = Reading::of(prompt)?;
+            if reading.states_nothing() {
                 return Err(Error::NothingStated {
                     prompt: (*prompt).to_owned(),
                 });
             }
-            let mut scene = said.onto(&self.base_scene())?;
+            let mut scene = reading.scene.onto(&self.base_scene())?;
             scene.seed = seed.wrapping_add(k);
             Ok(Input {
-                known: Conditions::of_prompt(&said),
+                known: Conditions::of_prompt(&reading.scene),
                 words: (*prompt).to_owned(),
+                unread: !reading.unread.is_empty(),
                 scene,
             })
         };
@@ -191,6 +192,7 @@ impl WakeSampler {
             Ok(Input {
                 known: Conditions::of_scene(scene),
                 words: Wording::Paper.prompt(scene)?,
+                unread: false,
                 scene: scene.clone(),
             })
         };
@@ -244,14 +246,25 @@ impl WakeSampler {
     /// of the base scene.
     fn resolved(&self, inputs: &[Input]) -> Result<Vec<Scene>> {
         let base = Conditions::of_scene(&self.base_scene());
-        let read = match self.conditioning {
-            Conditioning::Numbers => vec![Conditions::default(); inputs.len()],
-            _ => {
-                let prompts: Vec<&str> = inputs.iter().map(|input| input.words.as_str()).collect();
-                self.model.read(&prompts, &self.vocabulary, &self.device)
-            }
+        // Of words that are all understood the model would only add what they do not say.
+        let asked = |input: &Input| match self.conditioning {
+            Conditioning::Both => input.unread,
+            Conditioning::Words => true,
+            Conditioning::Numbers => false,
         };
-        let scene = |(input, read): (&Input, Conditions)| {
+        let prompts = inputs.iter().filter(|input| asked(input));
+        let prompts: Vec<&str> = prompts.map(|input| input.words.as_str()).collect();
+        let mut answers = match prompts.is_empty() {
+            true => Vec::new(),
+            false => self.model.read(&prompts, &self.vocabulary, &self.device),
+        }
+        .into_iter();
+        let mut read = |input: &Input| match asked(input) {
+            true => answers.next().unwrap_or_default(),
+            false => Conditions::default(),
+        };
+        let scene = |input: &Input| {
+            let read = read(input);
             let told = match self.conditioning {
                 Conditioning::Words => read,
                 _ => input.known.or(read),
@@ -260,7 +273,7 @@ impl WakeSampler {
             scene.validate()?;
             Ok(scene)
         };
-        inputs.iter().zip(read).map(scene).collect()
+        inputs.iter().map(scene).collect()
     }
 
     /// Euler's steps along the flow, equal in the angle, from noise to latents.
@@ -282,6 +295,8 @@ impl WakeSampler {
 struct Input {
     known: Conditions,
     words: String,
+    /// Whether some of the words were not understood.
+    unread: bool,
     /// What the numbers are put into, and its seed.
     scene: Scene,
 }

@@ -46,6 +46,23 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
     assert!(seconds.total >= seconds.text.max(seconds.denoise).max(seconds.decode));
 }
 
+/// What words that are all understood leave open is the base scene's, not what the model makes of them.
+#[test]
+fn nothing_is_added_to_words_that_are_understood() {
+    let sampler = sampler();
+    let base = sampler.base_scene();
+    for prompt in [
+        "A ship moving at 8 mps toward 45 degrees.",
+        "wind 6 m/s toward 200 degrees",
+    ] {
+        let scene = sampler.sample(prompt, 3).unwrap().scene;
+        let said = Reading::of(prompt).unwrap().scene;
+        let mut expected = said.onto(&base).unwrap();
+        expected.seed = 3;
+        assert_eq!(scene, expected, "{prompt}");
+    }
+}
+
 /// Seas that differ by their seeds.
 fn scenes(sampler: &WakeSampler, seeds: &[u64]) -> Vec<Scene> {
     let base = sampler.base_scene();
@@ -153,6 +170,7 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
     let mut scene = sampler.base_scene();
     scene.ship = None;
     let mut told = Input {
+        unread: true,
         known: Conditions::of_scene(&sampler.base_scene()),
         words: Wording::Paper.prompt(&scene).unwrap(),
         scene: sampler.base_scene(),
@@ -167,6 +185,7 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
     told = Input {
         known: Conditions::default(),
         words: PROMPT.to_owned(),
+        unread: true,
         scene,
     };
     let with_ship = sampler

@@ -1,0 +1,118 @@
+//! From the dumbest image to the simulator's, rung by rung: what of a sea each has that a judge can see.
+
+use crate::judge::{BATCH, Judged};
+use crate::pixels::grey;
+use crate::scenes::other_sea;
+use crate::source::{Constant, Expected, Gaussian, ImageSource, OtherSea, Result, Simulator, Told};
+use crate::statistics::mean;
+use burn::tensor::Device;
+use serde::Serialize;
+use wake_ldm::metrics::{TwoSample, TwoSampleOptions, two_sample};
+use wake_physics::measure::{SeaShape, crest_variance, sea_shape};
+use wake_physics::{Field, Scene};
+
+/// What one kind of image has of a sea, means over the scenes.
+#[derive(Debug, Serialize)]
+pub(crate) struct RungRow {
+    pub(crate) image: &'static str,
+    /// Shape of the grey that is left when the expected image is subtracted.
+    pub(crate) skewness: Option<f64>,
+    pub(crate) kurtosis: Option<f64>,
+    /// Along range, azimuth, wind.
+    pub(crate) steepness: [Option<f64>; 3],
+    pub(crate) grouping: Option<f64>,
+    /// Variance on crests of the wake over that in its troughs.
+    pub(crate) crest_variance: Option<f64>,
+    /// Against simulated images of the same scenes.
+    pub(crate) two_sample: Option<TwoSample>,
+}
+
+/// Steps of the bar that [`rungs`] makes.
+pub(crate) fn bar_steps(judged: &Judged<'_>) -> usize {
+    sources(judged).len() + 1
+}
+
+/// Kinds of images, dumbest first; the simulator's own last.
+fn sources<'a>(judged: &Judged<'a>) -> Vec<(&'static str, &'a dyn ImageSource)> {
+    let mut sources: Vec<(&'static str, &'a dyn ImageSource)> = vec![
+        ("constant", &Constant),
+        ("expected image", &Expected),
+        ("expected image, Gaussian sea", &Gaussian),
+    ];
+    if judged.has_network {
+        sources.push(("model", judged.source));
+    }
+    sources.push(("simulator, other sea", &OtherSea));
+    sources
+}
+
+/// The figures of every rung, and of the simulated images that they stand against.
+pub(crate) fn rungs(
+    scenes: &[Scene],
+    judged: &Judged<'_>,
+    device: &Device,
+    step: impl Fn(),
+) -> Result<Vec<RungRow>> {
+    let draw = |source: &dyn ImageSource, scenes: &[Scene]| -> Result<Vec<Field>> {
+        let mut images = Vec::with_capacity(scenes.len());
+        for batch in scenes.chunks(BATCH) {
+            images.extend(source.draw(batch, Told::Both)?.iter().map(grey));
+        }
+        Ok(images)
+    };
+    let expected = draw(&Expected, scenes)?;
+    // A third sea: neither the one that pixels are compared with nor that of the last rung.
+    let third: Vec<Scene> = scenes.iter().map(|scene| other_sea(scene, 2)).collect();
+    let simulated = draw(&Simulator, &third)?;
+    step();
+    let mut rows = Vec::new();
+    for (name, source) in sources(judged) {
+        let images = draw(source, scenes)?;
+        let told = match images.len() >= 4 {
+            true => Some(two_sample(
+                &simulated,
+                &images,
+                &TwoSampleOptions::default(),
+                device,
+            )?),
+            false => None,
+        };
+        rows.push(row(name, scenes, &images, &expected, told));
+        step();
+    }
+    rows.push(row("simulator", scenes, &simulated, &expected, None));
+    Ok(rows)
+}
+
+fn row(
+    image: &'static str,
+    scenes: &[Scene],
+    images: &[Field],
+    expected: &[Field],
+    two_sample: Option<TwoSample>,
+) -> RungRow {
+    let mut shapes: Vec<SeaShape> = Vec::new();
+    let mut crests = Vec::new();
+    for ((scene, image), expected) in scenes.iter().zip(images).zip(expected) {
+        let left = image.values.iter().zip(&expected.values);
+        let left = Field {
+            values: left.map(|(a, b)| a - b).collect(),
+            ..*image
+        };
+        shapes.extend(sea_shape(&left, scene.sea.wind_toward.to_radians()));
+        crests.extend(crest_variance(image, expected));
+    }
+    let of = |value: &dyn Fn(&SeaShape) -> f64| {
+        let values: Vec<f64> = shapes.iter().map(value).collect();
+        mean(&values)
+    };
+    RungRow {
+        image,
+        skewness: of(&|s| s.skewness),
+        kurtosis: of(&|s| s.kurtosis),
+        steepness: std::array::from_fn(|n| of(&|s| s.steepness[n])),
+        grouping: of(&|s| s.grouping),
+        crest_variance: mean(&crests),
+        two_sample,
+    }
+}
