@@ -49,7 +49,7 @@ fn answer(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         Some(text) => (
             text.clone(),
             Scene {
-                ship: None,
+                ships: Vec::new(),
                 ..Scene::default()
             },
         ),

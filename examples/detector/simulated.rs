@@ -145,7 +145,7 @@ impl Pass {
     fn amplitude(&self, ship: &Ship, size: usize, edge: bool) -> Option<Vec<f32>> {
         let mut scene = self.scene.clone();
         (scene.grid.rows, scene.grid.columns) = (size * FINE, size * FINE);
-        scene.ship = Some(ship.clone());
+        scene.ships = vec![ship.clone()];
         let field = expected_intensity(&scene).ok()?;
         let mut sorted: Vec<f32> = field.values.iter().step_by(7).copied().collect();
         let middle = sorted.len() / 2;

@@ -21,11 +21,11 @@ pub(crate) fn held_out(index: u64) -> Scene {
         ..Scene::default()
     };
     (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (SIZE, SIZE, SPACING);
-    scene.ship = Some(Ship {
+    scene.ships = vec![Ship {
         speed: 0.1 * whole(60, 120),
         heading: whole(0, 359),
         ..Ship::default()
-    });
+    }];
     scene.sea.wind_speed = 0.1 * whole(30, 70);
     scene.sea.wind_toward = whole(0, 359);
     scene.sea.fetch = 100.0 * whole(100, 700);
@@ -43,5 +43,5 @@ pub(crate) fn other_sea(scene: &Scene, number: u64) -> Scene {
 
 /// The ship of a scene; every held-out scene has one.
 pub(crate) fn ship(scene: &Scene) -> Ship {
-    scene.ship.clone().unwrap_or_default()
+    scene.ships.first().cloned().unwrap_or_default()
 }

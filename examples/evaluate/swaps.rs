@@ -44,7 +44,7 @@ fn swapped(base: &Scene, quantity: Quantity) -> (Scene, f64) {
         Quantity::WindDirection => scene.sea.wind_toward = (before + change).rem_euclid(360.0),
         Quantity::Incidence => scene.radar.incidence = before + change,
     }
-    scene.ship = Some(moved);
+    scene.ships = vec![moved];
     (scene, change)
 }
 

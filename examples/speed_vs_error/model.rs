@@ -84,7 +84,7 @@ fn scenes(sampler: &WakeSampler) -> Vec<Scene> {
     ];
     let scene = |(heading, speed, wind_speed, wind_toward, incidence)| {
         let mut scene = sampler.base_scene();
-        if let Some(ship) = &mut scene.ship {
+        for ship in &mut scene.ships {
             (ship.heading, ship.speed) = (heading, speed);
         }
         (scene.sea.wind_speed, scene.sea.wind_toward) = (wind_speed, wind_toward);

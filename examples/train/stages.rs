@@ -407,7 +407,8 @@ fn trained_scene(options: &Options) -> wake_ldm::Result<Scene> {
 /// What prompts about wakes can contain: the words of every wording, and every digit.
 fn vocabulary() -> Result<Vocabulary, wake_text::Error> {
     let (ship, mut calm) = (Scene::default(), Scene::default());
-    (calm.ship, calm.sea.wind_speed) = (None, 0.0);
+    calm.ships.clear();
+    calm.sea.wind_speed = 0.0;
     let mut ids = tokens("0 1 2 3 4 5 6 7 8 9 .");
     for scene in [ship, calm] {
         for wording in Wording::ALL {

@@ -78,6 +78,7 @@ pub mod gusts;
 pub mod slicks;
 pub mod grey;
 mod modulation;
+mod wakes;
 mod models;
 mod survey;
 mod plan;

@@ -2,31 +2,23 @@
 
 use crate::constants::SPEED_OF_LIGHT;
 use crate::gusts::{Gusts, wind_exponent};
-use crate::hull::Hull;
-use crate::kelvin::KelvinWake;
 use crate::permittivity;
 use crate::raster::Raster;
-use crate::sar::geometry::direction;
 use crate::sar::impulse::Axis;
 use crate::sar::{AzimuthResolution, ImpulseResponse};
 use crate::scattering::breaking;
 use crate::scattering::hydrodynamic::{relaxation_rate, steepness};
 use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale, bragg};
-use crate::scene::{HullForm, Polarization, Radar, Scene, Ship, Term, TermRule, Terms};
+use crate::scene::{Radar, Scene, Term, TermRule, Terms};
 use crate::slicks::{STRONGEST_WIND, Slicks};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
 use crate::swell::Swell;
-use crate::track::Track;
-use crate::turbulent::TurbulentWake;
-use crate::turbulent::current::{WakeCurrent, WakeEdge, response_time};
+use crate::wakes::Wake;
 use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
 use crate::window::Window;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-
-/// Block coefficient of the full hull where the scene names none: a laden tanker.
-const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
 
 /// Correlation of neighbouring pixels up to which each has speckle of its own: chosen.
 const INDEPENDENT: f64 = 0.05;
@@ -58,10 +50,8 @@ pub(crate) struct Models {
     pub(crate) azimuth_resolution: f64,
     /// The swell, if there is one.
     pub(crate) swell: Option<Swell>,
-    /// The ship's wake, if there is a ship.
-    pub(crate) wake: Option<KelvinWake>,
-    /// The current of the turbulent wake, if it is asked for.
-    pub(crate) edge: Option<WakeEdge>,
+    /// The wakes, one a ship.
+    pub(crate) wakes: Vec<Wake>,
     /// Slicks, if the wind leaves them.
     pub(crate) slicks: Option<Slicks>,
     /// σ⁰ of breaking waves, 0 where it is not asked for.
@@ -96,15 +86,10 @@ impl Models {
             ..sea
         })
         .moments(image.nyquist_wavenumber(), f64::INFINITY, incidence);
-        let wake = scene
-            .ship
-            .as_ref()
-            .map(|ship| wake(ship, scene.sea.depth, scene.sea.time));
         Self {
             delivered,
             response,
             swell: swell(scene),
-            edge: wake.as_ref().and_then(|wake| edge(scene, wake)),
             slicks: slicks(scene),
             breaking: if scene.sea.breaking {
                 breaking::backscatter(incidence, scene.sea.wind_speed)
@@ -140,7 +125,7 @@ impl Models {
             permittivity,
             azimuth_resolution: scene.radar.resolution,
             sea: spectrum,
-            wake,
+            wakes: Wake::of(scene),
             unresolved_velocity: unresolved.radial_velocity.sqrt(),
             averaged_slopes: SlopeCovariance::NONE,
             image,
@@ -291,65 +276,4 @@ fn gusts(scene: &Scene) -> Option<(Gusts, f64)> {
         };
         (gusts, wind_exponent(scene.radar.frequency))
     })
-}
-
-/// The current of the wake in the scene's wind; none behind a ship at rest or without wind.
-fn edge(scene: &Scene, wake: &KelvinWake) -> Option<WakeEdge> {
-    let (ship, wind) = (scene.ship.as_ref()?, scene.sea.wind_speed);
-    if !ship.edge || ship.speed <= 0.0 || wind <= 0.0 {
-        return None;
-    }
-    let [wind_x, wind_y] = direction(scene.sea.wind_toward);
-    let [port_x, port_y] = wake.track.port();
-    let to_port = wind * (wind_x * port_x + wind_y * port_y);
-    Some(WakeEdge {
-        current: WakeCurrent::of_wind(ship.speed, ship.beam, ship.edge_outflow, to_port),
-        track: wake.track,
-        length: ship.length,
-        response: ship
-            .edge_time
-            .unwrap_or_else(|| edge_response(&scene.radar, wind, port_x)),
-    })
-}
-
-/// Response of σ⁰ to the convergence of a wake whose track lies across `across` = cos χ of the look direction.
-fn edge_response(radar: &Radar, wind_speed: f64, across: f64) -> f64 {
-    let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
-    let share = match radar.polarization {
-        Polarization::VV => breaking::SHARE[0],
-        Polarization::HH => breaking::SHARE[1],
-    };
-    response_time(
-        breaking::bragg_response(bragg_wavenumber(radar), wind_speed),
-        across,
-        share,
-        breaking::response_time(k_e, wind_speed),
-    )
-}
-
-fn wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
-    let (length, beam, draft) = (ship.length, ship.beam, ship.draft);
-    KelvinWake {
-        hull: match ship.hull {
-            HullForm::Wigley => Hull::wigley(length, beam, draft),
-            HullForm::Full => {
-                let block = ship.block_coefficient.unwrap_or(TANKER_BLOCK_COEFFICIENT);
-                Hull::full(length, beam, draft, block)
-            }
-        },
-        speed: ship.speed,
-        track: Track::new(ship.position, ship.heading, ship.speed * time),
-        depth,
-        filter_depth: ship.filter_depth,
-    }
-}
-
-/// The turbulent wake of the same ship.
-pub(crate) fn turbulent_wake(wake: &KelvinWake) -> TurbulentWake {
-    TurbulentWake {
-        track: wake.track,
-        speed: wake.speed,
-        length: wake.hull.length(),
-        beam: wake.hull.beam(),
-    }
 }

@@ -14,7 +14,7 @@ pub(crate) enum Stream {
     Sea,
     /// Phases of points, by looks.
     Points,
-    /// Places and strengths of the scatterers of a ship.
+    /// Places and strengths of the scatterers of ships, by ships.
     Scatterers,
     /// Gusts, by lines of their lattice.
     Gusts,

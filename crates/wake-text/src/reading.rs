@@ -349,7 +349,7 @@ mod tests {
         ) {
             let prompt = words.join(" ");
             match PartialScene::read(&prompt) {
-                Ok(said) => prop_assert!(said.onto(&Scene { ship: None, ..Scene::default() }).is_ok(), "{}", prompt),
+                Ok(said) => prop_assert!(said.onto(&Scene { ships: Vec::new(), ..Scene::default() }).is_ok(), "{}", prompt),
                 Err(Error::Impossible { words, .. }) => prop_assert!(prompt.contains(&words)),
                 Err(Error::Contradiction { first, second }) => {
                     prop_assert!(prompt.contains(&first) && prompt.contains(&second));

@@ -35,7 +35,7 @@ impl PartialScene {
     ///
     /// Without a ship its speed and heading stay open; without wind its direction and the fetch.
     pub fn of(scene: &Scene) -> Self {
-        let ship = scene.ship.as_ref();
+        let ship = scene.ships.first();
         let wind_speed = tenths(scene.sea.wind_speed);
         let windy = wind_speed > 0.0;
         Self {
@@ -65,9 +65,12 @@ impl PartialScene {
 
     fn set(&self, scene: &mut Scene) {
         if self.ship == Some(false) {
-            scene.ship = None;
+            scene.ships.clear();
         } else if self.ship.is_some() || self.ship_speed.or(self.ship_heading).is_some() {
-            let ship = scene.ship.get_or_insert_with(Ship::default);
+            if scene.ships.is_empty() {
+                scene.ships.push(Ship::default());
+            }
+            let ship = &mut scene.ships[0];
             ship.speed = self.ship_speed.unwrap_or(ship.speed);
             ship.heading = self.ship_heading.unwrap_or(ship.heading);
         }
@@ -312,7 +315,7 @@ mod tests {
             ..PartialScene::default()
         };
         let mut expected = base.clone();
-        expected.ship.as_mut().unwrap().speed = 3.0;
+        expected.ships[0].speed = 3.0;
         expected.sea.fetch = 500.0;
         assert_eq!(said.onto(&base), Ok(expected));
         assert_eq!(PartialScene::default().onto(&base), Ok(base));
@@ -321,7 +324,7 @@ mod tests {
     #[test]
     fn a_ship_comes_and_goes_as_stated() {
         let open_sea = Scene {
-            ship: None,
+            ships: Vec::new(),
             ..Scene::default()
         };
         let said = |ship, ship_heading| PartialScene {
@@ -329,18 +332,18 @@ mod tests {
             ship_heading,
             ..PartialScene::default()
         };
-        assert_eq!(said(None, None).onto(&open_sea).unwrap().ship, None);
+        assert_eq!(said(None, None).onto(&open_sea).unwrap().ships, []);
         assert_eq!(
-            said(Some(true), None).onto(&open_sea).unwrap().ship,
-            Some(Ship::default())
+            said(Some(true), None).onto(&open_sea).unwrap().ships,
+            [Ship::default()]
         );
-        let ship = said(None, Some(7.0)).onto(&open_sea).unwrap().ship.unwrap();
+        let ships = said(None, Some(7.0)).onto(&open_sea).unwrap().ships;
         assert_eq!(
-            ship,
-            Ship {
+            ships,
+            [Ship {
                 heading: 7.0,
                 ..Ship::default()
-            }
+            }]
         );
         assert_eq!(
             said(Some(false), None).onto(&Scene::default()),

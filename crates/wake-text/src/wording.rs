@@ -80,7 +80,7 @@ impl Wording {
 ///
 /// ```
 /// let mut scene = wake_physics::Scene::default();
-/// scene.ship = None;
+/// scene.ships.clear();
 /// assert_eq!(
 ///     wake_text::prompt(&scene)?,
 ///     "Simulated SAR image of open sea without a ship. Ocean waves are shaped by 5 mps wind directing \
@@ -177,11 +177,11 @@ mod tests {
         (ship, wind, angle(), fetch, 5.0..=75.0_f64).prop_map(
             |(ship, wind, toward, fetch, incidence)| {
                 let mut scene = Scene {
-                    ship: ship.map(|(speed, heading)| Ship {
+                    ships: Vec::from_iter(ship.map(|(speed, heading)| Ship {
                         speed,
                         heading,
                         ..Ship::default()
-                    }),
+                    })),
                     ..Scene::default()
                 };
                 (scene.sea.wind_speed, scene.sea.wind_toward) = (wind, toward);
@@ -204,8 +204,8 @@ mod tests {
     }
 
     fn assert_states(said: &PartialScene, scene: &Scene) {
-        assert_eq!(said.ship, Some(scene.ship.is_some()));
-        match &scene.ship {
+        assert_eq!(said.ship, Some(!scene.ships.is_empty()));
+        match scene.ships.first() {
             Some(ship) => {
                 assert!(
                     is_rounded(said.ship_speed.unwrap(), ship.speed, 0.1),
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn the_grid_is_stated_exactly() {
         for scene in paper_grid() {
-            let ship = scene.ship.as_ref().unwrap();
+            let ship = &scene.ships[0];
             let expected = PartialScene {
                 ship: Some(true),
                 ship_speed: Some(ship.speed),
@@ -341,7 +341,7 @@ mod tests {
     #[test]
     fn no_ship_and_no_wind_have_their_own_words() {
         let mut scene = scene(&["sea.wind_speed=0.04"]);
-        scene.ship = None;
+        scene.ships.clear();
         let expected = "Simulated SAR image of open sea without a ship. The ocean is flat without wind. \
                         Captured at 32 degree incidence.";
         assert_eq!(prompt(&scene).unwrap(), expected);

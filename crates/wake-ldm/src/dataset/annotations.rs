@@ -196,9 +196,9 @@ mod tests {
     #[test]
     fn open_sea_and_ships_at_rest_have_no_wake() {
         let mut scene = northward();
-        scene.ship.as_mut().unwrap().speed = 0.0;
+        scene.ships[0].speed = 0.0;
         assert!(boxes(&labels_of(&scene), false).is_empty());
-        scene.ship = None;
+        scene.ships.clear();
         assert!(boxes(&labels_of(&scene), true).is_empty());
     }
 

@@ -94,7 +94,7 @@ impl Ranges {
         if draw(Value::OpenSea) < self.open_sea {
             let scene = self.set(base, draw);
             return Scene {
-                ship: None,
+                ships: Vec::new(),
                 ..scene
             };
         }
@@ -112,8 +112,12 @@ impl Ranges {
             .clamp(self.fetch[0], self.fetch[1]);
         scene.radar.incidence = between(self.incidence, Value::Incidence);
         let length = tenths(between(self.ship_length, Value::ShipLength));
-        let own = base.ship.clone().unwrap_or_default();
-        let ship = scene.ship.insert(with_length(&own, length));
+        if scene.ships.is_empty() {
+            scene.ships.push(Ship::default());
+        }
+        // Of several ships the first is drawn.
+        let ship = &mut scene.ships[0];
+        *ship = with_length(ship, length);
         ship.speed = between(self.ship_speed, Value::ShipSpeed);
         ship.heading = between(self.ship_heading, Value::ShipHeading);
         if self.place == Place::Random {

@@ -139,7 +139,7 @@ mod tests {
             prop_assert!(turned_within(scene.sea.wind_toward, ranges.wind_toward));
             prop_assert!(within(scene.sea.fetch, ranges.fetch, 1.0));
             prop_assert!(within(scene.radar.incidence, ranges.incidence, 1.0));
-            if let Some(ship) = &scene.ship {
+            for ship in &scene.ships {
                 prop_assert!(within(ship.speed, ranges.ship_speed, 0.1));
                 prop_assert!(turned_within(ship.heading, ranges.ship_heading));
                 prop_assert!(within(ship.length, ranges.ship_length, 0.1));
@@ -175,7 +175,7 @@ mod tests {
         let source = simulated(Ranges::default(), 3);
         let n = 4000;
         let scenes: Vec<Scene> = (0..n).map(|i| source.scene(i)).collect();
-        let ships: Vec<_> = scenes.iter().filter_map(|s| s.ship.clone()).collect();
+        let ships: Vec<_> = scenes.iter().flat_map(|s| s.ships.clone()).collect();
         // Five standard deviations of a binomial count.
         let empty = (n as usize - ships.len()) as f64;
         assert!((empty - 0.2 * n as f64).abs() < 5.0 * (0.16 * n as f64).sqrt());
@@ -248,8 +248,8 @@ mod tests {
             values.len()
         };
         let counts = [
-            distinct(|s| s.ship.as_ref().unwrap().speed),
-            distinct(|s| s.ship.as_ref().unwrap().heading),
+            distinct(|s| s.ships[0].speed),
+            distinct(|s| s.ships[0].heading),
             distinct(|s| s.sea.wind_speed),
             distinct(|s| s.sea.wind_toward),
             distinct(|s| s.sea.fetch),

@@ -45,7 +45,7 @@ fn set() -> (LatentSet, PatchTransform) {
     let mut set = LatentSet::default();
     for (i, image) in images.into_iter().enumerate() {
         let mut scene = config().base_scene();
-        let ship = scene.ship.as_mut().unwrap();
+        let ship = &mut scene.ships[0];
         (ship.speed, ship.heading) = (8.0, (i as f64).to_degrees());
         // What is expected shows half of the wave.
         let expected = image.iter().map(|g| 0.5 + 0.5 * (g - 0.5)).collect();

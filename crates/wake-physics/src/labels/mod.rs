@@ -164,13 +164,14 @@ pub struct WakeLabel {
 pub fn labels_of(scene: &Scene) -> Labels {
     let grid = &scene.grid;
     let raster = Raster::image(grid.rows, grid.columns, grid.spacing);
-    let ships = scene.ship.iter().map(|ship| {
+    let (sea, wakes) = Background::new(scene);
+    let ships = scene.ships.iter().zip(&wakes).map(|(ship, wake)| {
         let run = ship.speed * scene.sea.time;
         let position = Track::new(ship.position, ship.heading, run).position;
         let frame = Frame::new(position, ship.heading, &raster);
         let opening = half_angle(ship.speed, scene.sea.depth);
-        let extent = match Background::new(scene) {
-            (Some(sea), Some(wake)) if ship.speed > 0.0 => sea.extent(&wake, opening),
+        let extent = match &sea {
+            Some(sea) if ship.speed > 0.0 => sea.extent(wake, opening),
             _ => Extent::NOTHING,
         };
         LabelledShip {

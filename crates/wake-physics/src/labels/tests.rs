@@ -254,7 +254,7 @@ fn nothing_is_labelled_where_nothing_is() {
         &Raster::image(1, 1, 10.0),
     );
     assert_eq!((one.wake.box_px, one.ship.echo_box_px), (None, None));
-    scene.ship = None;
+    scene.ships.clear();
     assert_eq!(labels_of(&scene), Labels::default());
 }
 

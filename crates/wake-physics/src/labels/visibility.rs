@@ -1,12 +1,13 @@
 //! How far a wake is seen, and how clearly: its expected contrast against sea and speckle, without an image.
 
 use crate::kelvin::{KelvinWake, Ray};
-use crate::models::{Models, turbulent_wake};
+use crate::models::Models;
 use crate::modulation::{ModulationTransfer, smear};
 use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::survey::Survey;
 use crate::turbulent::TurbulentWake;
+use crate::wakes::Wake;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, SQRT_2};
 
@@ -91,14 +92,14 @@ pub(super) struct Background {
 }
 
 impl Background {
-    /// The open sea of a scene, and the wake of its ship; `None` if the image is dark.
-    pub(super) fn new(scene: &Scene) -> (Option<Self>, Option<KelvinWake>) {
+    /// The open sea of a scene, `None` if the image is dark, and the wakes of its ships.
+    pub(super) fn new(scene: &Scene) -> (Option<Self>, Vec<Wake>) {
         let mut models = Models::new(scene);
-        let wake = models.wake.take();
+        let wakes = std::mem::take(&mut models.wakes);
         let drawn = |term| scene.model.terms.allow(term);
         let survey = Survey::new(scene, &models);
         if survey.mean[0] + survey.mean[1] <= 0.0 {
-            return (None, wake);
+            return (None, wakes);
         }
         let [range_resolution, own] = models.response.map_or([0.0; 2], |response| {
             [response.range, response.azimuth].map(|axis| OF_HALF_POWER * axis.resolution)
@@ -139,7 +140,7 @@ impl Background {
             0.0
         };
         background.noise = (sea + speckle).sqrt().max(LEAST_NOISE);
-        (Some(background), wake)
+        (Some(background), wakes)
     }
 
     /// Mean square of the relative change of the image by a wave of unit mean square elevation [1/m²].
@@ -150,10 +151,11 @@ impl Background {
     }
 
     /// How far a wake is seen that opens by `half_angle` \[rad\].
-    pub(super) fn extent(&self, wake: &KelvinWake, half_angle: f64) -> Extent {
+    pub(super) fn extent(&self, wake: &Wake, half_angle: f64) -> Extent {
         let step = WINDOW as f64 * self.raster.spacing;
+        let band = DarkLine::new(self, wake.turbulent);
+        let wake = &wake.kelvin;
         let rays = self.rays(wake);
-        let band = DarkLine::new(self, wake);
         let half_length = 0.5 * wake.hull.length();
         let farthest = wake
             .track
@@ -323,10 +325,9 @@ struct DarkLine {
 }
 
 impl DarkLine {
-    fn new(background: &Background, wake: &KelvinWake) -> Self {
+    fn new(background: &Background, wake: TurbulentWake) -> Self {
         let deviation = background.resolution / (SQRT_2 * PI);
         Self {
-            wake: turbulent_wake(wake),
             share: if background.dark_line_drawn {
                 background.share * background.transfer.bragg_share
             } else {
@@ -334,6 +335,7 @@ impl DarkLine {
             },
             // The track's port side leans on azimuth by its y component.
             smear: deviation * wake.track.port()[1].abs(),
+            wake,
         }
     }
 

@@ -144,7 +144,7 @@ fn inverted(
 /// Brightness \[dB\] over a lattice of values.
 fn curve(scene: &Scene, lattice: &Lattice, set: impl Fn(&mut Scene, f64)) -> Vec<(f64, f64)> {
     let mut scene = scene.clone();
-    scene.ship = None;
+    scene.ships.clear();
     lattice
         .values()
         .map(|value| {

@@ -121,11 +121,11 @@ fn scene(speed: f64, heading: f64, wind: f64, toward: f64, incidence: f64) -> Sc
     let mut scene = Scene::default();
     (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (256, 256, 4.0);
     scene.seed = 4_000_000 + heading as u64;
-    scene.ship = Some(Ship {
+    scene.ships = vec![Ship {
         speed,
         heading,
         ..Ship::default()
-    });
+    }];
     (scene.sea.wind_speed, scene.sea.wind_toward) = (wind, toward);
     scene.radar.incidence = incidence;
     scene
@@ -184,7 +184,7 @@ fn simulated_scenes_give_their_values_back() {
 fn open_sea_has_no_speed() {
     for seed in 0..3 {
         let mut scene = scene(10.0, 45.0, 4.0 + seed as f64, 30.0, 30.0);
-        scene.ship = None;
+        scene.ships.clear();
         scene.seed = 77 + seed;
         let image = simulate(&scene).unwrap().intensity;
         let found = measure_wake(&image, &raster(), &SHIP);

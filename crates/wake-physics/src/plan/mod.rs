@@ -31,7 +31,8 @@ pub struct Plan {
     pub sizes: Sizes,
     /// What a user should know about this scene.
     pub notes: Vec<String>,
-    pub(crate) wake: WakePlan,
+    /// One a ship.
+    pub(crate) wakes: Vec<WakePlan>,
     /// Mean σ⁰ expected \[1\].
     pub(crate) mean_sigma0: f64,
     /// Variance of the hydrodynamic modulation by the resolved sea \[1\].
@@ -49,7 +50,7 @@ pub struct Sizes {
     pub band: f64,
     /// Rows and columns of the periodic lattice of the sea; 0 without a sea.
     pub sea_lattice: [usize; 2],
-    /// Plane waves of the Kelvin wake: transverse and divergent.
+    /// Plane waves of the Kelvin wakes: transverse and divergent.
     pub wake_nodes: [usize; 2],
     /// Ranges of the direction of wake waves to the track \[deg\].
     pub wake_directions: Vec<[f64; 2]>,
@@ -89,11 +90,14 @@ impl Plan {
         let raster = models.image.with_margin(margin[0], margin[1]);
         let needed = FIELDS_IN_MEMORY * 4 * raster.len() as u64;
         memory::check([scene.grid.rows, scene.grid.columns], margin, needed)?;
-        let wake = match &models.wake {
-            Some(wake) if uses(Term::Kelvin) => wake.plan(&raster, SHARES.wake_nodes * tolerance),
-            _ => WakePlan::default(),
-        };
-        let directions = wake.zones.iter().map(|z| z.directions.map(f64::to_degrees));
+        // Each ship's share, so that all of them keep the tolerance together.
+        let share = SHARES.wake_nodes / models.wakes.len().max(1) as f64;
+        let wakes = models.wakes.iter().filter(|_| uses(Term::Kelvin));
+        let wakes = wakes.map(|wake| wake.kelvin.plan(&raster, share * tolerance));
+        let wakes: Vec<WakePlan> = wakes.collect();
+        let zones = wakes.iter().flat_map(|wake| &wake.zones);
+        let directions = zones.map(|z| z.directions.map(f64::to_degrees));
+        let nodes = |of: fn(&WakePlan) -> usize| wakes.iter().map(of).sum();
         Ok(Self {
             sizes: Sizes {
                 margin,
@@ -104,12 +108,12 @@ impl Plan {
                 } else {
                     [0, 0]
                 },
-                wake_nodes: [wake.transverse_nodes, wake.divergent_nodes],
+                wake_nodes: [nodes(|w| w.transverse_nodes), nodes(|w| w.divergent_nodes)],
                 wake_directions: directions.collect(),
             },
             terms,
             notes: survey.notes(scene, models),
-            wake,
+            wakes,
             mean_sigma0: survey.mean[0] + survey.mean[1],
             modulation_variance: survey.modulation_variance,
         })

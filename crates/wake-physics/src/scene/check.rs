@@ -4,6 +4,9 @@ use super::{Grid, HullForm, Radar, Scene, Sea, Ship};
 use crate::error::{Error, Result, finite, in_range};
 use crate::window::Window;
 
+/// Most ships of a scene: chosen; every one costs a wake.
+const MOST_SHIPS: f64 = 100.0;
+
 impl Scene {
     /// Checks every value against its closed range.
     ///
@@ -13,11 +16,23 @@ impl Scene {
     pub fn validate(&self) -> Result<()> {
         self.grid.validate()?;
         self.sea.validate()?;
-        if let Some(ship) = &self.ship {
-            ship.validate()?;
+        let count = self.ships.len();
+        in_range("number of ships", count as f64, 0.0, MOST_SHIPS, "")?;
+        for (n, ship) in self.ships.iter().enumerate() {
+            ship.validate(&Self::ship_name(n, count))?;
         }
         self.radar.validate()?;
         in_range("model.tolerance", self.model.tolerance, 1e-6, 0.1, "")
+    }
+}
+
+impl Scene {
+    /// How a scene of `count` ships names its ship `n`, counted from 0: "ship" where it is alone, else "ship.1" and so on.
+    pub(crate) fn ship_name(n: usize, count: usize) -> String {
+        if count == 1 {
+            return "ship".to_owned();
+        }
+        format!("ship.{}", n + 1)
     }
 }
 
@@ -50,37 +65,46 @@ impl Sea {
 }
 
 impl Ship {
-    fn validate(&self) -> Result<()> {
-        in_range("ship.length", self.length, 1.0, 500.0, "m")?;
-        in_range("ship.beam", self.beam, 0.2, 100.0, "m")?;
-        in_range("ship.draft", self.draft, 0.1, 40.0, "m")?;
-        for (name, value) in [("ship.beam", self.beam), ("ship.draft", self.draft)] {
+    /// - `name`: what errors call it
+    fn validate(&self, name: &str) -> Result<()> {
+        let range = |key: &str, value, [min, max]: [f64; 2], unit| {
+            in_range(&format!("{name}.{key}"), value, min, max, unit)
+        };
+        let number = |key: &str, value, unit| finite(&format!("{name}.{key}"), value, unit);
+        range("length", self.length, [1.0, 500.0], "m")?;
+        range("beam", self.beam, [0.2, 100.0], "m")?;
+        range("draft", self.draft, [0.1, 40.0], "m")?;
+        for (key, value) in [("beam", self.beam), ("draft", self.draft)] {
             if value >= self.length {
                 return Err(Error::Conflict {
-                    name: name.to_owned(),
+                    name: format!("{name}.{key}"),
                     value: format!("{value} m"),
-                    requirement: format!("but must be below ship.length, {} m", self.length),
+                    requirement: format!("but must be below {name}.length, {} m", self.length),
                 });
             }
         }
-        in_range("ship.speed", self.speed, 0.0, 40.0, "m/s")?;
-        finite("ship.heading", self.heading, "degrees")?;
-        finite("ship.position[0]", self.position[0], "m")?;
-        finite("ship.position[1]", self.position[1], "m")?;
-        in_range("ship.filter_depth", self.filter_depth, 0.0, 20.0, "m")?;
-        optional("ship.edge_time", self.edge_time, [0.0, 1000.0], "s")?;
-        in_range("ship.edge_outflow", self.edge_outflow, 0.0, 0.3, "m/s")?;
-        in_range("ship.roll", self.roll, 0.0, 2.0, "m/s")?;
+        range("speed", self.speed, [0.0, 40.0], "m/s")?;
+        number("heading", self.heading, "degrees")?;
+        number("position[0]", self.position[0], "m")?;
+        number("position[1]", self.position[1], "m")?;
+        range("filter_depth", self.filter_depth, [0.0, 20.0], "m")?;
+        optional(
+            &format!("{name}.edge_time"),
+            self.edge_time,
+            [0.0, 1000.0],
+            "s",
+        )?;
+        range("edge_outflow", self.edge_outflow, [0.0, 0.3], "m/s")?;
+        range("roll", self.roll, [0.0, 2.0], "m/s")?;
         match (self.hull, self.block_coefficient) {
             (HullForm::Wigley, Some(value)) => Err(Error::Conflict {
-                name: "ship.block_coefficient".to_owned(),
+                name: format!("{name}.block_coefficient"),
                 value: value.to_string(),
-                requirement: "but the Wigley hull has 4/9; set ship.hull = \"full\" to choose it"
-                    .to_owned(),
+                requirement: format!(
+                    "but the Wigley hull has 4/9; set {name}.hull = \"full\" to choose it"
+                ),
             }),
-            (HullForm::Full, Some(value)) => {
-                in_range("ship.block_coefficient", value, 0.45, 0.9, "")
-            }
+            (HullForm::Full, Some(value)) => range("block_coefficient", value, [0.45, 0.9], ""),
             (_, None) => Ok(()),
         }
     }
@@ -221,7 +245,7 @@ mod tests {
         };
         let mut scene = Scene::default();
         scene.radar.range_resolution = Some(10.0);
-        if let Some(ship) = &mut scene.ship {
+        for ship in &mut scene.ships {
             // A hull on which every single value may take its extremes.
             (ship.length, ship.beam, ship.draft) = (300.0, 0.5, 0.5);
         }

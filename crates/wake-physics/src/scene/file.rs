@@ -57,8 +57,9 @@ impl Scene {
 
     /// The scene with assignments such as `ship.speed=10` made, in order, then checked.
     ///
-    /// The value is TOML; a bare word is a string. Setting a key of a ship where there is none makes the
-    /// default ship first.
+    /// The value is TOML; a bare word is a string. `ship.speed` is that of the only ship; of several the first is
+    /// `ship.1.speed`. Setting a key of a ship where there is none, or of the number after the last, makes a default ship
+    /// first.
     ///
     /// # Errors
     ///
@@ -88,7 +89,10 @@ impl Scene {
         if path == ["radar", "sensor"] {
             forget_radar(&mut root);
         }
-        let mut table = &mut root;
+        let (mut table, tables) = match tables {
+            ["ship", keys @ ..] => table_of_ship(&mut root, keys).map_err(&fail)?,
+            tables => (&mut root, tables),
+        };
         for name in tables {
             let entry = table
                 .entry((*name).to_owned())
@@ -101,6 +105,43 @@ impl Scene {
         root.try_into()
             .map_err(|e: toml::de::Error| fail(e.message().trim().to_owned()))
     }
+}
+
+/// The table of the ship that keys after `ship` name, and the keys after that: a number counts from 1, none is the only
+/// ship.
+fn table_of_ship<'t, 'k>(
+    root: &'t mut toml::Table,
+    keys: &'k [&'k str],
+) -> std::result::Result<(&'t mut toml::Table, &'k [&'k str]), String> {
+    let entry = root
+        .entry("ship".to_owned())
+        .or_insert_with(|| toml::Value::Array(Vec::new()));
+    if entry.is_table() {
+        *entry = toml::Value::Array(vec![entry.clone()]);
+    }
+    let ships = entry.as_array_mut().ok_or("ship is no table")?;
+    let count = ships.len();
+    let number = keys.first().and_then(|key| key.parse::<usize>().ok());
+    let (at, rest) = match number {
+        Some(number @ 1..) if number <= count + 1 => (number - 1, &keys[1..]),
+        Some(_) => {
+            return Err(format!(
+                "of {count} ships the first is ship.1, and ship.{} is one more",
+                count + 1
+            ));
+        }
+        None if count <= 1 => (0, keys),
+        None => {
+            return Err(format!(
+                "there are {count} ships: name one, the first is ship.1"
+            ));
+        }
+    };
+    if at == count {
+        ships.push(toml::Table::new().into());
+    }
+    let table = ships[at].as_table_mut().ok_or("a ship is no table")?;
+    Ok((table, rest))
 }
 
 /// Takes away what a sensor sets.
@@ -156,7 +197,7 @@ mod tests {
     #[test]
     fn an_empty_file_is_an_open_sea_with_defaults() {
         let scene = Scene::from_toml("").unwrap();
-        assert_eq!(scene.ship, None);
+        assert_eq!(scene.ships, []);
         assert_eq!(scene.seed, 7);
         assert_eq!(scene.grid, Grid::default());
         assert_eq!(scene.sea, Sea::default());
@@ -218,7 +259,7 @@ mod tests {
                 "seed=11",
             ])
             .unwrap();
-        let ship = scene.ship.unwrap();
+        let ship = &scene.ships[0];
         assert_eq!((ship.speed, ship.position), (8.0, [10.0, -20.0]));
         assert_eq!(scene.model.terms, Terms::Rule(TermRule::All));
         assert_eq!(scene.seed, 11);
@@ -226,9 +267,65 @@ mod tests {
         assert!(
             open.with_assignments(&["ship.speed=8"])
                 .unwrap()
-                .ship
-                .is_some()
+                .ships
+                .len()
+                == 1
         );
+    }
+
+    #[test]
+    fn several_ships_are_a_list_and_are_counted_from_one() {
+        let two = Scene::default()
+            .with_assignments(&["ship.2.speed=8", "ship.1.speed=6", "ship.1.length=80"])
+            .unwrap();
+        let speeds: Vec<f64> = two.ships.iter().map(|ship| ship.speed).collect();
+        assert_eq!(speeds, [6.0, 8.0]);
+        assert_eq!((two.ships[0].length, two.ships[1].length), (80.0, 195.0));
+        let text = two.to_toml().unwrap();
+        assert_eq!(text.matches("[[ship]]").count(), 2, "{text}");
+        assert_eq!(Scene::from_toml(&text).unwrap(), two);
+        let json = serde_json::to_string(&two).unwrap();
+        assert_eq!(serde_json::from_str::<Scene>(&json).unwrap(), two);
+        // One is a table, whichever way it came.
+        let one = Scene::from_toml("[[ship]]\nspeed = 8").unwrap();
+        assert!(one.to_toml().unwrap().contains("[ship]\n"));
+        assert_eq!(one, Scene::from_toml("[ship]\nspeed = 8").unwrap());
+        let none = Scene::from_toml("ship = []").unwrap();
+        assert_eq!(none, Scene::from_toml("").unwrap());
+    }
+
+    #[test]
+    fn errors_name_the_ship() {
+        let two = Scene::default()
+            .with_assignments(&["ship.2.speed=8"])
+            .unwrap();
+        for (assignment, words) in [
+            ("ship.speed=3", "2 ships: name one, the first is ship.1"),
+            ("ship.4.speed=3", "ship.3 is one more"),
+            ("ship.0.speed=3", "the first is ship.1"),
+            ("ship.2.speed=50", "ship.2.speed is 50"),
+            ("ship.2.beam=300", "ship.2.beam is 300"),
+            ("ship.1.sped=3", "sped"),
+            ("ship.1=3", "ship.1=3"),
+        ] {
+            let message = two.with_assignments(&[assignment]).unwrap_err().to_string();
+            assert!(message.contains(words), "{assignment}: {message}");
+        }
+        let text = "[[ship]]\n[[ship]]\nspeed = \"fast\"";
+        let message = Scene::from_toml(text).unwrap_err().to_string();
+        assert!(
+            message.contains("line 3") && message.contains("speed"),
+            "{message}"
+        );
+        let message = Scene::from_toml("ship = 3").unwrap_err().to_string();
+        assert!(
+            message.contains("a ship as a table, or a list of them"),
+            "{message}"
+        );
+        let many = "[[ship]]\n".repeat(101);
+        let message = Scene::from_toml(&many).unwrap_err().to_string();
+        assert!(message.contains("number of ships is 101"), "{message}");
+        assert!(Scene::from_toml(&"[[ship]]\n".repeat(100)).is_ok());
     }
 
     #[test]

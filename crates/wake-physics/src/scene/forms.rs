@@ -80,6 +80,54 @@ pub(super) mod seed {
     }
 }
 
+/// No ship as nothing, one as a table, several as a list of tables.
+pub(super) mod ships {
+    use super::super::Ship;
+    use super::{Deserialize, Deserializer};
+    use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+    use serde::de::{MapAccess, SeqAccess, Visitor};
+    use serde::{Serialize, Serializer};
+
+    pub(in crate::scene) fn serialize<S: Serializer>(
+        ships: &[Ship],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        match ships {
+            [one] => one.serialize(serializer),
+            several => several.serialize(serializer),
+        }
+    }
+
+    pub(in crate::scene) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Vec<Ship>, D::Error> {
+        deserializer.deserialize_any(OneOrSeveral)
+    }
+
+    /// Hands on what it finds, so that errors name the key and its line.
+    struct OneOrSeveral;
+
+    impl<'de> Visitor<'de> for OneOrSeveral {
+        type Value = Vec<Ship>;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("a ship as a table, or a list of them")
+        }
+
+        fn visit_unit<E>(self) -> Result<Self::Value, E> {
+            Ok(Vec::new())
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+            Ship::deserialize(MapAccessDeserializer::new(map)).map(|ship| vec![ship])
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
+            Vec::deserialize(SeqAccessDeserializer::new(list))
+        }
+    }
+}
+
 /// Exactly two numbers.
 pub(super) fn two<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 2], D::Error> {
     let numbers = Vec::<f64>::deserialize(deserializer)?;

@@ -22,7 +22,12 @@ pub(super) struct SceneKeys {
     grid: GridKeys,
     #[serde(default)]
     sea: Sea,
-    ship: Option<Ship>,
+    #[serde(
+        default,
+        rename = "ship",
+        deserialize_with = "forms::ships::deserialize"
+    )]
+    ships: Vec<Ship>,
     #[serde(default)]
     radar: RadarKeys,
     #[serde(default)]
@@ -86,7 +91,7 @@ impl From<SceneKeys> for Scene {
                 spacing: keys.grid.spacing.or(spacing).unwrap_or(grid.spacing),
             },
             sea: keys.sea,
-            ship: keys.ship,
+            ships: keys.ships,
             radar: keys.radar.with(),
             model: keys.model,
         }

@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 /// A ship, a sea and a radar over a grid of pixels.
 ///
 /// The same type reads and writes scene files (TOML). Unknown keys are errors; an absent table takes its
-/// defaults, except `[ship]`: no table, no ship. [`Scene::default`] has the default ship. Where `radar.sensor` names a
-/// satellite, it sets what no key beside it does, [`Grid::spacing`] too.
+/// defaults, except `[ship]`: no table, no ship. Several ships are a list of tables, `[[ship]]`. [`Scene::default`] has
+/// the default ship. Where `radar.sensor` names a satellite, it sets what no key beside it does, [`Grid::spacing`] too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(from = "keys::SceneKeys")]
 pub struct Scene {
@@ -28,9 +28,13 @@ pub struct Scene {
     pub grid: Grid,
     /// Wind and waves.
     pub sea: Sea,
-    /// The ship, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ship: Option<Ship>,
+    /// The ships, at most 100; a file holds one as a table and several as a list, both named `ship`.
+    #[serde(
+        rename = "ship",
+        serialize_with = "forms::ships::serialize",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub ships: Vec<Ship>,
     /// The radar and its platform.
     pub radar: Radar,
     /// Which terms are computed, and how well.
@@ -47,7 +51,7 @@ impl Default for Scene {
             seed: default_seed(),
             grid: Grid::default(),
             sea: Sea::default(),
-            ship: Some(Ship::default()),
+            ships: vec![Ship::default()],
             radar: Radar::default(),
             model: Model::default(),
         }
@@ -167,7 +171,7 @@ pub enum SpreadingModel {
     Elfouhaily,
 }
 
-/// The ship.
+/// A ship.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ship {

@@ -26,11 +26,11 @@ pub fn paper_grid() -> impl Iterator<Item = Scene> {
         scene.sea.fetch = FETCHES[pick(3)];
         scene.sea.wind_toward = 90.0 * pick(4) as f64;
         scene.sea.wind_speed = WINDS[pick(3)];
-        scene.ship = Some(Ship {
+        scene.ships = vec![Ship {
             heading: 45.0 * pick(8) as f64,
             speed: SPEEDS[pick(4)],
             ..Ship::default()
-        });
+        }];
         scene
     })
 }

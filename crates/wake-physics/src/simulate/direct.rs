@@ -157,14 +157,16 @@ impl Stages<'_> {
             let waves = swell.waves((seed, time), models.transfer.depth, band);
             seconds.sea += add(&waves, &everywhere);
         }
-        let wake = models.wake.as_ref();
-        if let Some(wake) = wake.filter(|_| self.plan.uses(Term::Kelvin)) {
+        let drawn = self.plan.uses(Term::Kelvin);
+        let pairs = models.wakes.iter().zip(&self.plan.wakes);
+        for (wake, plan) in pairs.filter(|_| drawn) {
+            let wake = &wake.kelvin;
             let faded = |&[i, j]: &[usize; 2]| {
                 let place = [raster.x(j), raster.y(i)];
                 fade(wake.track.seen_from_ship(place)[0], wake.hull.length())
             };
             let fades: Vec<f64> = pixels.iter().map(faded).collect();
-            seconds.kelvin = add(&wake.waves(&self.plan.wake), &fades);
+            seconds.kelvin += add(&wake.waves(plan), &fades);
         }
         let mut fields = SurfaceFields::default();
         for (&quantity, sums) in quantities.iter().zip(&sums) {

@@ -51,7 +51,7 @@ impl LinearSea {
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.validate()?;
         let scene = Scene {
-            ship: None,
+            ships: Vec::new(),
             ..scene.clone()
         };
         let [rows, columns] = [scene.grid.rows, scene.grid.columns];

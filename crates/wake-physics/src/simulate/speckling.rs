@@ -10,8 +10,9 @@ use crate::sar::impulse::{Looks, PointTarget, Reflectivity};
 use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::speckle::speckle;
 use crate::sar::{Echo, ImpulseResponse};
-use crate::scene::Scene;
 use crate::scene::sensor::ambiguity_distance;
+use crate::scene::{Scene, Ship};
+use crate::wakes::Wake;
 use num_complex::Complex32;
 
 /// What the radar looks at before its impulse response.
@@ -59,25 +60,26 @@ impl Exposure {
     }
 }
 
-/// The ship as points with its ghosts, for an image with an impulse response.
+/// The ships as points with their ghosts, for an image with an impulse response.
 fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
-    let ship = scene.ship.as_ref().filter(|ship| ship.echo);
-    let (Some(ship), Some(wake)) = (ship, &models.wake) else {
-        return Vec::new();
-    };
-    let echo = ShipEcho {
-        position: wake.track.position,
-        heading: ship.heading,
-        length: ship.length,
-        beam: ship.beam,
-        radial_velocity: ship_radial_velocity(ship.speed, ship.heading, models.incidence),
-        roll_velocity: ship.roll,
-    };
     let view = Viewing {
         incidence: models.incidence,
         range_to_velocity: models.range_to_velocity,
     };
-    let mut points = echo.scatterers(&view, scene.seed);
+    let ships = scene.ships.iter().zip(&models.wakes).enumerate();
+    let drawn = ships.filter(|(_, (ship, _))| ship.echo);
+    let of_ship = |(n, (ship, wake)): (usize, (&Ship, &Wake))| {
+        let echo = ShipEcho {
+            position: wake.kelvin.track.position,
+            heading: ship.heading,
+            length: ship.length,
+            beam: ship.beam,
+            radial_velocity: ship_radial_velocity(ship.speed, ship.heading, models.incidence),
+            roll_velocity: ship.roll,
+        };
+        echo.scatterers(&view, (scene.seed, n))
+    };
+    let mut points: Vec<PointTarget> = drawn.flat_map(of_ship).collect();
     let radar = &scene.radar;
     if let (Some(level), Some(rate)) = (radar.ambiguity, radar.pulse_rate) {
         let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
@@ -152,17 +154,18 @@ impl Speckling {
     }
 }
 
-/// The ship's own echo where no impulse response images it, if it is asked for.
-pub(super) fn hull_echo(scene: &Scene, models: &Models) -> Option<Echo> {
-    let ship = scene.ship.as_ref().filter(|ship| ship.echo)?;
-    let wake = models.wake.as_ref()?;
-    let displacement = SEA_WATER_DENSITY * wake.hull.volume();
-    Some(Echo {
-        position: wake.track.position,
-        heading: ship.heading,
-        length: ship.length,
-        beam: ship.beam,
-        cross_section: ship_cross_section(scene.radar.frequency, displacement),
-        displacement: echo_displacement(scene, ship),
+/// The ships' own echoes where no impulse response images them, as far as they are asked for.
+pub(super) fn hull_echoes(scene: &Scene, models: &Models) -> impl Iterator<Item = Echo> {
+    let ships = scene.ships.iter().zip(&models.wakes);
+    ships.filter(|(ship, _)| ship.echo).map(|(ship, wake)| {
+        let displacement = SEA_WATER_DENSITY * wake.kelvin.hull.volume();
+        Echo {
+            position: wake.kelvin.track.position,
+            heading: ship.heading,
+            length: ship.length,
+            beam: ship.beam,
+            cross_section: ship_cross_section(scene.radar.frequency, displacement),
+            displacement: echo_displacement(scene, ship),
+        }
     })
 }

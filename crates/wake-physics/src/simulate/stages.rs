@@ -3,10 +3,10 @@
 use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
 use super::simulation::Method;
-use super::speckling::{Exposure, hull_echo};
+use super::speckling::{Exposure, hull_echoes};
 use super::surface_fields::{SurfaceFields, Wanted, quantities};
-use crate::kelvin;
-use crate::models::{Models, turbulent_wake};
+use crate::kelvin::{self, KelvinWake, WakePlan};
+use crate::models::Models;
 use crate::nufft;
 use crate::plan::{Plan, SHARES};
 use crate::raster::{Field, Raster};
@@ -16,6 +16,8 @@ use crate::scattering::hydrodynamic::to_bragg_factors;
 use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
 use crate::scene::{Scene, Term};
 use crate::surface::Surface;
+use crate::turbulent::current::WakeEdge;
+use crate::wakes::Wake;
 use crate::waves::{Quantity, harmonic_fields};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
@@ -134,6 +136,12 @@ impl<'a> Stages<'a> {
         (SHARES.fields * self.scene.model.tolerance).max(1e-6)
     }
 
+    /// The same of each wake, so that all keep it together.
+    fn wake_tolerance(&self) -> f64 {
+        let share = SHARES.fields / self.models.wakes.len().max(1) as f64;
+        (share * self.scene.model.tolerance).max(1e-6)
+    }
+
     pub(super) fn sea(&self, workspace: &mut Workspace) -> SurfaceFields {
         let mut fields = SurfaceFields::default();
         if !self.plan.uses(Term::Sea) {
@@ -204,15 +212,33 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// Adds the Kelvin wake, faded over the hull.
+    /// Adds the Kelvin wakes.
     pub(super) fn add_wake(
         &self,
         workspace: &mut Workspace,
         fields: &mut SurfaceFields,
     ) -> Option<Reached> {
-        let wake = self.models.wake.as_ref();
-        let wake = wake.filter(|_| self.plan.uses(Term::Kelvin))?;
-        let waves = wake.waves(&self.plan.wake);
+        if !self.plan.uses(Term::Kelvin) {
+            return None;
+        }
+        let pairs = self.models.wakes.iter().zip(&self.plan.wakes);
+        let reached = pairs
+            .filter_map(|(wake, plan)| self.add_wake_of(workspace, fields, &wake.kelvin, plan));
+        reached.reduce(|a, b| Reached {
+            reached: a.reached.max(b.reached),
+            ..a
+        })
+    }
+
+    /// Adds the Kelvin wake of one ship, faded over its hull.
+    fn add_wake_of(
+        &self,
+        workspace: &mut Workspace,
+        fields: &mut SurfaceFields,
+        wake: &KelvinWake,
+        plan: &WakePlan,
+    ) -> Option<Reached> {
+        let waves = wake.waves(plan);
         let transfer = &self.models.transfer;
         let raster = &self.raster;
         let mut fade = workspace.field(raster);
@@ -220,7 +246,7 @@ impl<'a> Stages<'a> {
         let mut add = |quantity, wake: &mut Field| fields.of(quantity).add_product(wake, &fade);
         let reached = match self.method {
             Method::Fast => {
-                let asked = self.field_tolerance();
+                let asked = self.wake_tolerance();
                 let mut reached = 0.0f64;
                 for group in &self.quantities {
                     let sum = (&waves, transfer, &group[..], raster);
@@ -255,32 +281,51 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// What the turbulent wake and slicks leave of the short waves.
+    /// What turbulent wakes and slicks leave of the short waves.
     pub(super) fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
         let uses = |term| self.plan.uses(term);
-        let wake = self.models.wake.as_ref().filter(|_| uses(Term::Turbulent));
         let slicks = self.models.slicks.filter(|_| uses(Term::Slicks));
         let slicks = slicks
             .map(|slicks| slicks.field(&self.raster, self.scene.sea.wind_speed, self.scene.seed));
-        let Some(wake) = wake else { return slicks };
-        let mut field = workspace.field(&self.raster);
-        turbulent_wake(wake).fill_damping(&mut field, &self.raster);
-        field
-            .values
-            .par_iter_mut()
-            .with_min_len(1 << 14)
-            .for_each(|damping| *damping = 1.0 - *damping);
-        if let Some(slicks) = slicks {
-            let left = field.values.par_iter_mut().zip(&slicks.values);
-            left.with_min_len(1 << 14)
-                .for_each(|(left, slick)| *left *= slick);
+        let wakes: &[Wake] = if uses(Term::Turbulent) {
+            &self.models.wakes
+        } else {
+            &[]
+        };
+        let mut left = slicks;
+        for wake in wakes {
+            let mut field = workspace.field(&self.raster);
+            wake.turbulent.fill_damping(&mut field, &self.raster);
+            let damping = field.values.par_iter_mut().with_min_len(1 << 14);
+            match &mut left {
+                None => {
+                    damping.for_each(|damping| *damping = 1.0 - *damping);
+                    left = Some(field);
+                }
+                Some(left) => {
+                    let pairs = left.values.par_iter_mut().zip(damping);
+                    pairs.for_each(|(left, damping)| *left *= 1.0 - *damping);
+                    workspace.give(field);
+                }
+            }
         }
-        Some(field)
+        left
     }
 
-    /// Adds the current at the turbulent wake's edges.
+    /// The edges that are drawn.
+    fn edges(&self) -> impl Iterator<Item = &WakeEdge> {
+        let drawn = self.plan.uses(Term::Edge);
+        let edges = self
+            .models
+            .wakes
+            .iter()
+            .filter_map(|wake| wake.edge.as_ref());
+        edges.filter(move |_| drawn)
+    }
+
+    /// Adds the currents at the edges of turbulent wakes.
     pub(super) fn add_edge(&self, fields: &mut SurfaceFields) {
-        if let Some(edge) = self.models.edge.filter(|_| self.plan.uses(Term::Edge)) {
+        for edge in self.edges() {
             let SurfaceFields {
                 velocity_x,
                 velocity_y,
@@ -293,7 +338,7 @@ impl<'a> Stages<'a> {
     /// What breaking waves, the wake's edges and gusts do to σ⁰.
     pub(super) fn modulate(&self, sigma0: &mut Field, damping: Option<&Field>) {
         self.add_breaking(sigma0, damping);
-        if let Some(edge) = self.models.edge.filter(|_| self.plan.uses(Term::Edge)) {
+        for edge in self.edges() {
             edge.modulate(sigma0, &self.raster);
         }
         self.add_gusts(sigma0);
@@ -421,13 +466,13 @@ impl<'a> Stages<'a> {
         intensity
     }
 
-    /// Adds the ship's own echo, unless an impulse response is to image it, and the radar's noise.
+    /// Adds the ships' own echoes, unless an impulse response is to image it, and the radar's noise.
     pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
-        if self.models.response.is_none()
-            && let Some(echo) = hull_echo(self.scene, self.models)
-        {
+        if self.models.response.is_none() {
             let resolution = self.models.resolution_at_rest().nominal;
-            echo.add_to(intensity, &self.models.image, resolution);
+            for echo in hull_echoes(self.scene, self.models) {
+                echo.add_to(intensity, &self.models.image, resolution);
+            }
         }
         if self.plan.uses(Term::Noise) {
             let noise = self.models.noise as f32;

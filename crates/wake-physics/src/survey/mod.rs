@@ -3,12 +3,14 @@
 mod waves;
 
 use crate::kelvin::KelvinWake;
-use crate::models::{Models, turbulent_wake};
+use crate::models::Models;
 use crate::modulation::{ModulationTransfer, WaveSample, rms};
 use crate::raster::Raster;
 use crate::sar::AzimuthResolution;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::{Scene, Term};
+use crate::turbulent::current::WakeEdge;
+use crate::wakes::Wake;
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity};
 use std::f64::consts::{PI, SQRT_2};
 
@@ -79,12 +81,14 @@ impl Survey {
         let no_wind_waves = wind_waves.is_empty();
         let mut sea = wind_waves;
         sea.extend_from_slice(&swell);
-        let (wake, crowding) = match &models.wake {
-            Some(wake) => sampled_wake(wake, &models.image),
-            None => (Vec::new(), 1.0),
-        };
+        let (mut wake, mut wake_slopes) = (Vec::new(), SlopeCovariance::NONE);
+        for one in &models.wakes {
+            let (waves, crowding) = sampled_wake(&one.kelvin, &models.image);
+            wake_slopes = wake_slopes.plus(&slopes(&waves).times(crowding));
+            wake.extend(waves);
+        }
         let backscatter = models.backscatter(true, true);
-        let resolved = slopes(&sea).plus(&slopes(&wake).times(crowding));
+        let resolved = slopes(&sea).plus(&wake_slopes);
         let sensitivity = backscatter.sensitivity(&resolved);
         let (tilt, curvature) = slope_of_ln_sigma(&backscatter);
         let total = sensitivity.mean[0] + sensitivity.mean[1];
@@ -136,22 +140,16 @@ impl Survey {
     fn absent_terms(&self, models: &Models, no_wind_waves: bool) -> Vec<(Term, &'static str)> {
         let no_waves = self.sea.is_empty() && self.wake.is_empty();
         let no_bragg = models.short_waves_vanish();
-        let ship = models.wake.as_ref();
-        let kelvin = match ship {
-            None => Some("there is no ship"),
-            Some(w) if w.speed == 0.0 => Some("the ship is at rest"),
-            Some(_) if self.wake.is_empty() => {
-                Some("no wave that a pixel carries reaches the image")
-            }
-            Some(_) => None,
+        let no_wake = match &models.wakes[..] {
+            [] => Some("there is no ship"),
+            [wake] if wake.kelvin.speed == 0.0 => Some("the ship is at rest"),
+            wakes if wakes.iter().all(|w| w.kelvin.speed == 0.0) => Some("all ships are at rest"),
+            _ => None,
         };
-        let turbulent = match ship {
-            None => Some("there is no ship"),
-            Some(w) if w.speed == 0.0 => Some("the ship is at rest"),
-            Some(_) if no_bragg => Some("there are no short waves to damp"),
-            Some(_) if self.damping == 0.0 => Some("it does not reach the image"),
-            Some(_) => None,
-        };
+        let unseen = self.wake.is_empty();
+        let kelvin = unseen.then_some("no wave that a pixel carries reaches the image");
+        let outside = (self.damping == 0.0).then_some("it does not reach the image");
+        let undamped = no_bragg.then_some("there are no short waves to damp");
         let sea = no_wind_waves.then_some("no wind wave that a pixel carries");
         let flat = no_waves.then_some("there are no resolved waves");
         let still = (models.range_to_velocity == 0.0).then_some("R/V is 0");
@@ -160,8 +158,8 @@ impl Survey {
             .then_some("no wave between pixel and Bragg waves");
         [
             (Term::Sea, sea),
-            (Term::Kelvin, kelvin),
-            (Term::Turbulent, turbulent),
+            (Term::Kelvin, no_wake.or(kelvin)),
+            (Term::Turbulent, no_wake.or(undamped).or(outside)),
             (Term::TiltAverage, bragg.or(tilt)),
             (Term::RangeBunching, flat),
             (Term::Hydrodynamic, flat.or(bragg)),
@@ -215,12 +213,13 @@ impl Survey {
                 scene.sea.wind_speed
             ));
         }
-        if let Some(wake) = &models.wake {
-            let froude = wake.hull.froude_number(wake.speed);
-            if froude > 0.0 && 2.0 * models.image.spacing > wake.transverse_wavelength() {
+        let count = models.wakes.len();
+        for (n, wake) in models.wakes.iter().enumerate() {
+            let wavelength = wake.kelvin.transverse_wavelength();
+            if wake.kelvin.speed > 0.0 && 2.0 * models.image.spacing > wavelength {
                 notes.push(format!(
-                    "the transverse waves are {:.2} m long: a pixel of {} m carries none of them",
-                    wake.transverse_wavelength(),
+                    "the transverse waves of the {} are {wavelength:.2} m long: a pixel of {} m carries none of them",
+                    Scene::ship_name(n, count),
                     models.image.spacing
                 ));
             }
@@ -231,13 +230,15 @@ impl Survey {
 
 /// Terms that a scene has only where it asks for them.
 fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, &'static str)> {
-    let ship = scene.ship.as_ref();
-    let edge = match ship {
-        None => Some("there is no ship"),
-        Some(ship) if !ship.edge => Some("not asked for"),
-        Some(_) if models.edge.is_none() => Some("the ship is at rest, or there is no wind"),
-        Some(_) if survey.edge.iter().all(|v| *v == 0.0) => Some("it does not reach the image"),
-        Some(_) => None,
+    let edge = if scene.ships.is_empty() {
+        Some("there is no ship")
+    } else if !scene.ships.iter().any(|ship| ship.edge) {
+        Some("not asked for")
+    } else if models.wakes.iter().all(|wake| wake.edge.is_none()) {
+        Some("the ship is at rest, or there is no wind")
+    } else {
+        let unseen = survey.edge.iter().all(|v| *v == 0.0);
+        unseen.then_some("it does not reach the image")
     };
     let asked = |asked: bool| (!asked).then_some("not asked for");
     let swell = match &models.swell {
@@ -341,20 +342,28 @@ fn slope_of_ln_sigma(backscatter: &Backscatter) -> ([f64; 2], [f64; 2]) {
     (first, second)
 }
 
-/// Root of the mean square of the turbulent wake's damping over the image.
+/// Root of the mean square of the damping by all turbulent wakes over the image.
 fn damping(models: &Models) -> f64 {
-    let Some(wake) = models.wake.as_ref().filter(|w| w.speed > 0.0) else {
+    if models.wakes.iter().all(|wake| wake.turbulent.speed == 0.0) {
         return 0.0;
-    };
-    let turbulent = turbulent_wake(wake);
+    }
     rms_over(&models.image, |place| {
-        turbulent.damping(wake.track.seen_from_ship(place))
+        let of = |wake: &Wake| {
+            let seen = wake.turbulent.track.seen_from_ship(place);
+            wake.turbulent.damping(seen)
+        };
+        // What is left is the product: 1 − (1 − a)(1 − b) = a + b (1 − a).
+        models
+            .wakes
+            .iter()
+            .map(of)
+            .fold(0.0, |all, one| all + one * (1.0 - all))
     })
 }
 
 /// What the current of the wake changes over the image, see [`Survey::edge`].
 fn edge(models: &Models) -> [f64; 2] {
-    models.edge.map_or([0.0; 2], |edge| {
+    let of = |edge: &WakeEdge| {
         let [port_x, port_y] = edge.track.port().map(f64::abs);
         let along_sight = port_x * models.incidence.sin();
         // Velocity bunching gathers by R/V times the slope of the velocity along azimuth.
@@ -368,7 +377,12 @@ fn edge(models: &Models) -> [f64; 2] {
             rms_over(&models.image, change),
             rms_over(&models.image, velocity),
         ]
-    })
+    };
+    let edges = models.wakes.iter().filter_map(|wake| wake.edge.as_ref());
+    // Where wakes cross their changes add, at most.
+    edges
+        .map(of)
+        .fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
 }
 
 /// Root of the mean square of a function of the place (x, y) over the image, looked at on a coarse raster.

@@ -67,7 +67,7 @@ prop_compose! {
         terms in terms(),
         tolerance in prop_oneof![Just(0.1), Just(0.01), Just(1e-3)],
     ) -> Scene {
-        let mut scene = Scene { seed, grid, ship, ..Scene::default() };
+        let mut scene = Scene { seed, grid, ships: Vec::from_iter(ship), ..Scene::default() };
         let sea = &mut scene.sea;
         (sea.wind_speed, sea.wind_toward, sea.fetch) = (wind_speed, wind_toward, fetch);
         (sea.depth, sea.time) = (depth, time);
@@ -177,7 +177,7 @@ fn corners_that_were_found_stay_mended() {
         ],
     ] {
         let scene = Scene {
-            ship: None,
+            ships: Vec::new(),
             ..Scene::default()
         }
         .with_assignments(assignments)

@@ -78,7 +78,7 @@ fn the_mean_over_seas_is_the_expected_image() {
             .map(|i| 0.5 * (halves[0][i] + halves[1][i]))
             .collect();
         let expected = expected_intensity(&scene).unwrap();
-        let ship = scene.ship.as_ref().unwrap();
+        let ship = &scene.ships[0];
         let place = ShipPlace {
             position: ship.position,
             length: ship.length,
@@ -100,7 +100,7 @@ fn the_mean_over_seas_is_the_expected_image() {
             "{assignments:?}: {correlation} {slope} {level}"
         );
         let mut faster = scene.clone();
-        faster.ship.as_mut().unwrap().speed *= 1.1;
+        faster.ships[0].speed *= 1.1;
         let other = numbers(&expected_intensity(&faster).unwrap());
         let other = Moments::new(&other, &whole, &inside).correlation();
         assert!(other < 0.8 * correlation, "{assignments:?}: {other}");

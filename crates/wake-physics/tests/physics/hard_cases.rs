@@ -233,7 +233,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
             10f64.powf(sea.5)
         };
         s.sea.time = shape.3;
-        let vessel = s.ship.as_mut().unwrap();
+        let vessel = &mut s.ships[0];
         vessel.length = ship.0;
         vessel.beam = (ship.0 * ship.1).clamp(0.2, 100.0).min(0.9 * ship.0);
         vessel.draft = (ship.0 * ship.2).clamp(0.1, 40.0).min(0.9 * ship.0);

@@ -13,6 +13,7 @@ mod hard_cases;
 mod methods;
 mod plan;
 mod satellite;
+mod ships;
 mod simulator;
 mod trends;
 mod visibility;
@@ -28,7 +29,7 @@ fn small(rows: usize, columns: usize, assignments: &[&str]) -> Scene {
 }
 
 fn open_sea(mut scene: Scene) -> Scene {
-    scene.ship = None;
+    scene.ships.clear();
     scene
 }
 

@@ -30,6 +30,17 @@ fn the_tolerance_is_met_at_every_level() {
             ],
         ),
         (
+            1e-4,
+            &[
+                "ship.position=[30, 30]",
+                "ship.2.position=[-20, 30]",
+                "ship.2.heading=350",
+                "ship.2.speed=6",
+                "ship.2.edge=true",
+                "radar.range_to_velocity=30",
+            ],
+        ),
+        (
             1e-5,
             &["ship.position=[30, 30]", "radar.range_to_velocity=20"],
         ),

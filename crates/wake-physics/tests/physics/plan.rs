@@ -40,7 +40,7 @@ fn scenes() -> Vec<Scene> {
         let refs: Vec<&str> = assignments.iter().map(String::as_str).collect();
         let mut scene = small(96, 88, &refs);
         if n % 6 == 5 {
-            scene.ship = None;
+            scene.ships.clear();
         }
         scenes.push(scene);
     }

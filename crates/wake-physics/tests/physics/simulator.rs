@@ -16,7 +16,7 @@ fn scenes() -> Vec<Scene> {
         small(64, 80, &["radar.range_to_velocity=0"]),
         small(64, 80, &["model.terms=[\"sea\"]"]),
     ];
-    scenes[2].ship = None;
+    scenes[2].ships.clear();
     scenes
 }
 

@@ -44,7 +44,7 @@ fn fluctuation(scene: &Scene, ship: &Ship) -> f64 {
 /// Fluctuation in the wedge with the ship over that of the same seas without it.
 fn contrast(assignments: &[&str]) -> f64 {
     let scene = Scene::default().with_assignments(assignments).unwrap();
-    let ship = scene.ship.clone().unwrap();
+    let ship = scene.ships[0].clone();
     let with = fluctuation(&scene, &ship);
     with / fluctuation(&open_sea(scene), &ship)
 }

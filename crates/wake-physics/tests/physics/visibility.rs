@@ -49,7 +49,7 @@ fn expected_change(scene: &Scene) -> Vec<f64> {
 
 /// Distance astern of the stern and off the track of every pixel.
 fn places(scene: &Scene) -> Vec<[f64; 2]> {
-    let (raster, ship) = (raster(scene), scene.ship.as_ref().unwrap());
+    let (raster, ship) = (raster(scene), &scene.ships[0]);
     let (sin, cos) = ship.heading.to_radians().sin_cos();
     (0..raster.len())
         .map(|n| {
@@ -65,7 +65,7 @@ fn places(scene: &Scene) -> Vec<[f64; 2]> {
 
 /// Pixels of the wedge astern of the stern, up to the end of what the label calls visible.
 fn wedge(scene: &Scene, length: f64) -> Vec<bool> {
-    let ship = scene.ship.as_ref().unwrap();
+    let ship = &scene.ships[0];
     let tan = half_angle(ship.speed, scene.sea.depth).tan();
     let inside = |[astern, aside]: [f64; 2]| {
         let from_bow = astern + ship.length;

@@ -48,7 +48,7 @@ impl Conditions {
 
     /// All numbers of a scene that the model knows.
     pub fn of_scene(scene: &Scene) -> Self {
-        let ship = scene.ship.as_ref();
+        let ship = scene.ships.first();
         let windy = scene.sea.wind_speed > 0.0;
         Self {
             ship: Some(ship.is_some()),
@@ -69,9 +69,9 @@ impl Conditions {
     pub fn onto(&self, scene: &Scene) -> Scene {
         let mut scene = scene.clone();
         match self.ship {
-            Some(false) => scene.ship = None,
-            Some(true) => scene.ship = Some(scene.ship.unwrap_or_default()),
-            None => {}
+            Some(false) => scene.ships.clear(),
+            Some(true) if scene.ships.is_empty() => scene.ships.push(Ship::default()),
+            _ => {}
         }
         if let Some(Ship {
             speed,
@@ -79,7 +79,7 @@ impl Conditions {
             position,
             length,
             ..
-        }) = &mut scene.ship
+        }) = scene.ships.first_mut()
         {
             *speed = self.ship_speed.unwrap_or(*speed);
             *heading = self.ship_heading.unwrap_or(*heading);
@@ -111,7 +111,7 @@ mod tests {
     fn conditions_of_a_scene_make_the_scene_again() {
         let mut scene = Scene::default();
         for with_ship in [true, false] {
-            scene.ship = scene.ship.filter(|_| with_ship);
+            scene.ships.retain(|_| with_ship);
             scene.sea.wind_speed = 4.5;
             let again = Conditions::of_scene(&scene).onto(&Scene::default());
             assert_eq!(again, scene);
@@ -123,6 +123,7 @@ mod tests {
             ship_speed: Some(7.0),
             ..open
         };
-        assert_eq!(ship.onto(&scene).ship.map(|ship| ship.speed), Some(7.0));
+        let speeds: Vec<f64> = ship.onto(&scene).ships.iter().map(|s| s.speed).collect();
+        assert_eq!(speeds, [7.0]);
     }
 }

@@ -145,6 +145,14 @@ impl WakeModelConfig {
                 expected: format!("{size} × {size} pixels of {spacing} m, as the model draws them"),
             });
         }
+        if scene.ships.len() > 1 {
+            return Err(Error::InvalidOption {
+                option: "ship".to_owned(),
+                value: format!("a list of {} ships", scene.ships.len()),
+                expected: "one ship or none, as in all images that the model was trained with"
+                    .to_owned(),
+            });
+        }
         let expected = as_json(&self.as_trained(scene))?;
         match first_difference("", &as_json(scene)?, &expected) {
             None => Ok(()),
@@ -159,13 +167,14 @@ impl WakeModelConfig {
     /// The training scene with what the model is told of a scene, or need not know.
     fn as_trained(&self, scene: &Scene) -> Scene {
         let mut same = self.base_scene();
-        let ship = same.ship.take().unwrap_or_default();
-        same.ship = scene.ship.as_ref().map(|told| Ship {
+        let ship = same.ships.first().cloned().unwrap_or_default();
+        let told = |told: &Ship| Ship {
             speed: told.speed,
             heading: told.heading,
             position: told.position,
-            ..ship
-        });
+            ..ship.clone()
+        };
+        same.ships = scene.ships.iter().map(told).collect();
         (same.seed, same.grid, same.model) = (scene.seed, scene.grid.clone(), scene.model.clone());
         (same.sea.wind_speed, same.sea.wind_toward) = (scene.sea.wind_speed, scene.sea.wind_toward);
         (same.sea.fetch, same.sea.time) = (scene.sea.fetch, scene.sea.time);
@@ -245,14 +254,14 @@ mod tests {
             config.check_scene(&scene).err().map(|e| e.to_string())
         };
         let told = refused(&|scene| {
-            let ship = scene.ship.as_mut().unwrap();
+            let ship = &mut scene.ships[0];
             (ship.speed, ship.heading, ship.position) = (7.0, 200.0, [50.0, -20.0]);
             (scene.sea.wind_speed, scene.sea.fetch) = (7.0, 2e4);
             (scene.radar.incidence, scene.radar.looks, scene.seed) = (25.0, 9, 77);
             scene.model.tolerance = 1e-2;
         });
         assert_eq!(told, None);
-        assert_eq!(refused(&|scene| scene.ship = None), None);
+        assert_eq!(refused(&|scene| scene.ships.clear()), None);
         let named = |name: &str, change: &dyn Fn(&mut Scene)| {
             let message = refused(change).unwrap_or_default();
             let start = format!("{name} is ");
@@ -267,8 +276,9 @@ mod tests {
         });
         named("radar.frequency", &|scene| scene.radar.frequency = 1.27e9);
         named("sea.depth", &|scene| scene.sea.depth = 10.0);
+        named("ship", &|scene| scene.ships.push(Ship::default()));
         named("ship.length", &|scene| {
-            scene.ship.as_mut().unwrap().length = 80.0;
+            scene.ships[0].length = 80.0;
         });
     }
 

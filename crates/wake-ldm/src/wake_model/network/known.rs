@@ -60,7 +60,7 @@ impl Known {
 /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
 pub fn expected_grey(scene: &Scene) -> Result<Vec<f32>> {
     scene.validate()?;
-    if scene.ship.is_none() {
+    if scene.ships.is_empty() {
         return Ok(vec![0.5; scene.grid.rows * scene.grid.columns]);
     }
     let scale = GreyScale::default();
@@ -124,9 +124,9 @@ mod tests {
         let mut scene = Scene::default();
         (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (64, 64, 4.0);
         let mut other = scene.clone();
-        other.ship.as_mut().unwrap().heading += 90.0;
+        other.ships[0].heading += 90.0;
         let calm = Scene {
-            ship: None,
+            ships: Vec::new(),
             ..scene.clone()
         };
         let images = [&scene, &other].map(|scene| expected_grey(scene).unwrap());

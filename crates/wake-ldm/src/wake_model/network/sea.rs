@@ -131,7 +131,7 @@ mod tests {
         let mut scene = Scene::default();
         (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (128, 128, 4.0);
         scene.sea.wind_speed = 5.0;
-        scene.ship = None;
+        scene.ships.clear();
         scene.seed = seed;
         scene
     }

@@ -25,7 +25,7 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
     let image = sampler.sample(PROMPT, 7).unwrap();
     assert_eq!([image.grey.rows, image.grey.columns], [256, 256]);
     assert!(image.grey.values.iter().all(|g| (0.0..=1.0).contains(g)));
-    let ship = image.scene.ship.as_ref().unwrap();
+    let ship = &image.scene.ships[0];
     assert!((ship.speed - 10.0).abs() < 1e-12 && (ship.heading - 135.0).abs() < 1e-12);
     assert_eq!(image.labels, labels_of(&image.scene));
     let looks = f64::from(image.scene.radar.looks);
@@ -124,10 +124,10 @@ fn image_labels_and_scene_are_one() {
     let sampler = sampler();
     let only_in_words = "a ship steaming at 8 mps due north, 4 mps wind toward 90 degrees";
     let mut open = sampler.base_scene();
-    open.ship = None;
+    open.ships.clear();
     let no_ship = Wording::Paper.prompt(&open).unwrap();
     let mut elsewhere = sampler.base_scene();
-    elsewhere.ship.as_mut().unwrap().position = [150.0, -100.0];
+    elsewhere.ships[0].position = [150.0, -100.0];
     for conditioning in [
         Conditioning::Both,
         Conditioning::Words,
@@ -152,14 +152,14 @@ fn image_labels_and_scene_are_one() {
             assert_eq!(image.labels, labels_of(&image.scene));
             assert_eq!(image.scene, again.scene);
         }
-        let [x, y] = drawn[0].ship.as_ref().unwrap().position;
+        let [x, y] = drawn[0].ships[0].position;
         let expected = match conditioning {
             Conditioning::Words => [0.0, 0.0],
             _ => [150.0, -100.0],
         };
         let far = (x - expected[0]).hypot(y - expected[1]);
         assert!(far < 1e-9, "{conditioning:?}: {far} m");
-        assert!(drawn[3].ship.is_none(), "{conditioning:?}");
+        assert!(drawn[3].ships.is_empty(), "{conditioning:?}");
     }
 }
 
@@ -168,7 +168,7 @@ fn image_labels_and_scene_are_one() {
 fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
     let sampler = sampler().with_conditioning(Conditioning::Words);
     let mut scene = sampler.base_scene();
-    scene.ship = None;
+    scene.ships.clear();
     let mut told = Input {
         unread: true,
         known: Conditions::of_scene(&sampler.base_scene()),
@@ -180,7 +180,7 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
         .unwrap()
         .images()
         .remove(0);
-    assert!(open.scene.ship.is_none());
+    assert!(open.scene.ships.is_empty());
     assert_eq!(open.labels, labels_of(&open.scene));
     told = Input {
         known: Conditions::default(),
@@ -193,7 +193,7 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
         .unwrap()
         .images()
         .remove(0);
-    assert!(with_ship.scene.ship.is_some());
+    assert!(!with_ship.scene.ships.is_empty());
     assert_eq!(with_ship.labels, labels_of(&with_ship.scene));
 }
 

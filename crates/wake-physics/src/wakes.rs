@@ -1,0 +1,97 @@
+//! The wakes of a scene's ships: Kelvin waves, turbulent wake and edges, with the scene's numbers.
+
+use crate::constants::SPEED_OF_LIGHT;
+use crate::hull::Hull;
+use crate::kelvin::KelvinWake;
+use crate::scattering::{bragg, breaking};
+use crate::scene::{HullForm, Polarization, Radar, Scene, Ship};
+use crate::track::{Track, direction};
+use crate::turbulent::TurbulentWake;
+use crate::turbulent::current::{WakeCurrent, WakeEdge, response_time};
+use std::f64::consts::TAU;
+
+/// Block coefficient of the full hull where the scene names none: a laden tanker.
+const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
+
+/// What one ship leaves on the water.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wake {
+    /// Its waves.
+    pub(crate) kelvin: KelvinWake,
+    /// The dark band along its track.
+    pub(crate) turbulent: TurbulentWake,
+    /// The current of that band, if it is asked for.
+    pub(crate) edge: Option<WakeEdge>,
+}
+
+impl Wake {
+    /// The wakes of all ships, in their order.
+    pub(crate) fn of(scene: &Scene) -> Vec<Self> {
+        let one = |ship: &Ship| {
+            let kelvin = kelvin(ship, scene.sea.depth, scene.sea.time);
+            Self {
+                turbulent: TurbulentWake {
+                    track: kelvin.track,
+                    speed: kelvin.speed,
+                    length: kelvin.hull.length(),
+                    beam: kelvin.hull.beam(),
+                },
+                edge: edge(scene, ship, kelvin.track),
+                kelvin,
+            }
+        };
+        scene.ships.iter().map(one).collect()
+    }
+}
+
+fn kelvin(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
+    let (length, beam, draft) = (ship.length, ship.beam, ship.draft);
+    KelvinWake {
+        hull: match ship.hull {
+            HullForm::Wigley => Hull::wigley(length, beam, draft),
+            HullForm::Full => {
+                let block = ship.block_coefficient.unwrap_or(TANKER_BLOCK_COEFFICIENT);
+                Hull::full(length, beam, draft, block)
+            }
+        },
+        speed: ship.speed,
+        track: Track::new(ship.position, ship.heading, ship.speed * time),
+        depth,
+        filter_depth: ship.filter_depth,
+    }
+}
+
+/// The current of the wake in the scene's wind; none behind a ship at rest or without wind.
+fn edge(scene: &Scene, ship: &Ship, track: Track) -> Option<WakeEdge> {
+    let wind = scene.sea.wind_speed;
+    if !ship.edge || ship.speed <= 0.0 || wind <= 0.0 {
+        return None;
+    }
+    let [wind_x, wind_y] = direction(scene.sea.wind_toward);
+    let [port_x, port_y] = track.port();
+    let to_port = wind * (wind_x * port_x + wind_y * port_y);
+    Some(WakeEdge {
+        current: WakeCurrent::of_wind(ship.speed, ship.beam, ship.edge_outflow, to_port),
+        track,
+        length: ship.length,
+        response: ship
+            .edge_time
+            .unwrap_or_else(|| edge_response(&scene.radar, wind, port_x)),
+    })
+}
+
+/// Response of σ⁰ to the convergence of a wake whose track lies across `across` = cos χ of the look direction.
+fn edge_response(radar: &Radar, wind_speed: f64, across: f64) -> f64 {
+    let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
+    let share = match radar.polarization {
+        Polarization::VV => breaking::SHARE[0],
+        Polarization::HH => breaking::SHARE[1],
+    };
+    let bragg = bragg::wavenumber(k_e, radar.incidence.to_radians());
+    response_time(
+        breaking::bragg_response(bragg, wind_speed),
+        across,
+        share,
+        breaking::response_time(k_e, wind_speed),
+    )
+}
