@@ -33,7 +33,8 @@ impl PartialScene {
     /// What the prompt of a scene states: speeds rounded to 0.1 m/s, the others to 1, directions within
     /// 0 up to 360; halves away from zero.
     ///
-    /// Without a ship its speed and heading stay open; without wind its direction and the fetch.
+    /// Without a ship its speed and heading stay open; without wind its direction and the fetch. Of several ships the
+    /// first is meant.
     pub fn of(scene: &Scene) -> Self {
         let ship = scene.ships.first();
         let wind_speed = tenths(scene.sea.wind_speed);
@@ -51,7 +52,8 @@ impl PartialScene {
 
     /// `base` with the stated values in place of its own.
     ///
-    /// A stated speed or heading brings a ship, the default one if `base` has none.
+    /// A stated speed or heading brings a ship, the default one if `base` has none. Of several ships the first gets them,
+    /// and "no ship" takes all away.
     ///
     /// # Errors
     ///

@@ -8,6 +8,9 @@ use wake_physics::Scene;
 ///
 /// All state the same values, and [`PartialScene::read`] reads all of them back. Different words for the
 /// same scene keep a text encoder from learning one sentence by heart.
+///
+/// Of several ships they state how many there are, and speed and heading of the first: "wakes from 2 ships, the first
+/// moving at 10 mps toward 135 degrees". The number stays unread when the prompt is read back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Wording {
     /// The words of Kamirul, Pappas and Achim:
@@ -57,6 +60,11 @@ impl Wording {
         scene.validate()?;
         let said = PartialScene::of(scene);
         let ship = said.ship_speed.zip(said.ship_heading);
+        let ship = ship.map(|(speed, heading)| Ships {
+            count: scene.ships.len(),
+            speed,
+            heading,
+        });
         let wind = said.wind_toward.zip(said.fetch);
         let wind = said.wind_speed.zip(wind);
         let wind = wind.map(|(speed, (toward, fetch))| [speed, toward, fetch]);
@@ -92,15 +100,34 @@ pub fn prompt(scene: &Scene) -> Result<String> {
     Wording::Paper.prompt(scene)
 }
 
-/// Speed and heading, if there is a ship.
-type Ship = Option<(f64, f64)>;
+/// How many ships there are, at least one; speed and heading of the first.
+struct Ships {
+    count: usize,
+    speed: f64,
+    heading: f64,
+}
+
+impl Ships {
+    /// What to call the first ship: `alone`, or as one of several.
+    fn first(&self, alone: &str, of_several: impl Fn(usize) -> String) -> String {
+        match self.count {
+            1 => alone.to_owned(),
+            count => of_several(count),
+        }
+    }
+}
+
+/// The ships, if there are any.
+type Ship = Option<Ships>;
 /// Speed, direction and fetch, if there is wind.
 type Wind = Option<[f64; 3]>;
 
 fn paper(ship: Ship, wind: Wind, incidence: f64) -> String {
     let ship = match ship {
-        Some((speed, heading)) => {
-            format!("wakes from a ship moving at {speed} mps toward {heading} degrees")
+        Some(ships) => {
+            let first = ships.first("a ship", |n| format!("{n} ships, the first"));
+            let Ships { speed, heading, .. } = ships;
+            format!("wakes from {first} moving at {speed} mps toward {heading} degrees")
         }
         None => "open sea without a ship".to_owned(),
     };
@@ -121,8 +148,10 @@ fn wind_first(ship: Ship, wind: Wind, incidence: f64) -> String {
         None => "No wind blows".to_owned(),
     };
     let ship = match ship {
-        Some((speed, heading)) => {
-            format!("A ship moves toward {heading} degrees at {speed} mps and leaves a wake")
+        Some(ships) => {
+            let first = ships.first("A ship", |n| format!("The first of {n} ships"));
+            let Ships { speed, heading, .. } = ships;
+            format!("{first} moves toward {heading} degrees at {speed} mps and leaves a wake")
         }
         None => "Open sea without a ship".to_owned(),
     };
@@ -131,8 +160,10 @@ fn wind_first(ship: Ship, wind: Wind, incidence: f64) -> String {
 
 fn radar_first(ship: Ship, wind: Wind, incidence: f64) -> String {
     let ship = match ship {
-        Some((speed, heading)) => {
-            format!("The wake of a ship with speed {speed} mps and heading {heading} degrees")
+        Some(ships) => {
+            let first = ships.first("a ship", |n| format!("the first of {n} ships"));
+            let Ships { speed, heading, .. } = ships;
+            format!("The wake of {first} with speed {speed} mps and heading {heading} degrees")
         }
         None => "Open sea without a ship".to_owned(),
     };
@@ -147,8 +178,12 @@ fn radar_first(ship: Ship, wind: Wind, incidence: f64) -> String {
 
 fn brief(ship: Ship, wind: Wind, incidence: f64) -> String {
     let ship = match ship {
-        Some((speed, heading)) => {
-            format!("SAR ship wake, ship {speed} mps toward {heading} degrees")
+        Some(ships) => {
+            let first = ships.first("ship wake, ship", |n| {
+                format!("wakes of {n} ships, the first")
+            });
+            let Ships { speed, heading, .. } = ships;
+            format!("SAR {first} {speed} mps toward {heading} degrees")
         }
         None => "SAR open sea, no ship".to_owned(),
     };
@@ -261,6 +296,31 @@ mod tests {
             let again = said.onto(&Scene::default()).unwrap();
             assert_eq!(PartialScene::of(&again), said, "{prompt}");
         }
+    }
+
+    /// Two ships do not become one in silence: the number stays unread, and is all that does.
+    #[test]
+    fn of_several_ships_the_number_and_the_first_are_stated() {
+        for count in [2, 17, 100] {
+            let mut scene = Scene::default();
+            scene.ships[0].heading = 359.0;
+            scene.ships[0].speed = 12.3;
+            scene.sea.fetch = 123_456.0;
+            scene.ships.resize(count, Ship::default());
+            for wording in Wording::ALL {
+                let prompt = wording.prompt(&scene).unwrap();
+                let tokens = Tokenizer::clip().encode(&prompt).token_count;
+                assert!(tokens <= TOKENS, "{tokens} tokens: {prompt}");
+                let reading = Reading::of(&prompt).unwrap();
+                assert_eq!(reading.scene, PartialScene::of(&scene), "{prompt}");
+                let unread: Vec<&str> = reading.unread.iter().map(|u| u.text.as_str()).collect();
+                assert_eq!(unread, [count.to_string()], "{prompt}");
+                // The others stay as they are.
+                assert_eq!(reading.scene.onto(&scene).unwrap(), scene, "{prompt}");
+            }
+        }
+        let two = Reading::of("two ships at 8 mps").unwrap();
+        assert_eq!(two.unread[0].text, "two");
     }
 
     #[test]
