@@ -3,7 +3,7 @@
 //! ```text
 //! cargo run --release --example make_dataset
 //! cargo run --release --example make_dataset -- --grid paper --out out/paper
-//! cargo run --release --example make_dataset -- --grid ranges.toml --count 100000 --shard 3/16
+//! cargo run --release --example make_dataset -- --grid detector --count 100000 --shard 3/16
 //! cargo run --release --example make_dataset -- --merge
 //! ```
 //!
@@ -29,7 +29,8 @@ const PAPER_COUNT: u64 = 3456;
 /// Simulate a labelled data set of ship wakes.
 #[derive(Parser)]
 struct Arguments {
-    /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), or a TOML file of ranges
+    /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), detector (what satellites
+    /// deliver), or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "ranges")]
     grid: String,
     /// Change one value of the recipe, such as speckle=true; may be repeated; keys: see docs/dataset.md
@@ -98,10 +99,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
     let (recipe, default_count) = match arguments.grid.as_str() {
         "paper" => (Recipe::paper(), PAPER_COUNT),
-        "ranges" => (Recipe::default(), 100),
         file if Path::new(file).is_file() => (Recipe::read(Path::new(file))?, 100),
-        other => {
-            return Err(format!("--grid is {other}, expected paper, ranges or a TOML file").into());
+        name => {
+            let told =
+                |_| format!("--grid is {name}, expected paper, ranges, detector or a TOML file");
+            (Recipe::named(name).map_err(told)?, 100)
         }
     };
     let count = arguments.count.unwrap_or(default_count);

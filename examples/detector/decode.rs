@@ -1,7 +1,7 @@
 //! Maps of the network become wakes.
 
 use super::network::{ANGLE_UNIT, LENGTH_UNIT, Map, OUTPUTS, STRIDE};
-use super::source::{Wake, angle_of, direction};
+use super::sample::{Wake, angle_of, direction};
 
 /// A wake that was found, in pixels of the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,6 +160,7 @@ impl Maps {
                 half_angle_deg: (ANGLE_UNIT * self.map(Map::HalfAngle)[at]).clamp(0.0, 30.0),
                 length,
                 snr: f32::INFINITY,
+                contrast_db: None,
             },
         }
     }
@@ -280,6 +281,7 @@ mod tests {
             half_angle_deg: 4.0,
             length: 120.0,
             snr: f32::INFINITY,
+            contrast_db: None,
         }
     }
 

@@ -36,7 +36,7 @@ pub(crate) struct Options {
     /// Weights of the network, by default those in the repository
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Least score that is told, 0 to 1; 0.3 draws few false alarms
+    /// Least score that is told, 0 to 1; from 0.25 on there are few false alarms
     #[arg(long, default_value_t = 0.03, value_parser = score)]
     least_score: f32,
     /// Print the wakes as JSON, and nothing else
@@ -50,8 +50,8 @@ pub(crate) struct Options {
     out: PathBuf,
 }
 
-/// Wakes with a score above this are drawn.
-const DRAWN: f32 = 0.3;
+/// The operating point: wakes with a score from here on are drawn and printed. Half a false alarm an image on real tiles.
+pub(crate) const OPERATING_POINT: f32 = 0.25;
 
 fn bounded(text: &str, low: f32, high: f32, unit: &str) -> Result<f32, String> {
     let number: f32 = text
@@ -182,7 +182,7 @@ fn draw(
     let mut drawing = Drawing::new(image);
     for one in found.iter().rev() {
         // Radon's score has no upper end; all that it tells is above its threshold.
-        if options.method == Method::Radon || one.score >= DRAWN {
+        if options.method == Method::Radon || one.score >= OPERATING_POINT {
             drawing.ray(
                 &one.wake,
                 [255, (255.0 * (1.0 - one.score.min(1.0))) as u8, 0],
@@ -201,9 +201,12 @@ fn draw(
 fn print(name: &str, found: &[Detection]) {
     println!(
         "{name}: {} wakes",
-        found.iter().filter(|one| one.score >= DRAWN).count()
+        found
+            .iter()
+            .filter(|one| one.score >= OPERATING_POINT)
+            .count()
     );
-    for one in found.iter().filter(|one| one.score >= DRAWN) {
+    for one in found.iter().filter(|one| one.score >= OPERATING_POINT) {
         let (wake, [column, row]) = (&one.wake, one.wake.tip);
         println!(
             "  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",

@@ -3,7 +3,7 @@
 use image::{Rgb, RgbImage};
 
 use super::grey::{Grey, rescaled};
-use super::source::Wake;
+use super::sample::Wake;
 
 /// No picture has longer sides \[pixels\].
 const LARGEST: usize = 2048;
@@ -111,6 +111,7 @@ mod tests {
             half_angle_deg: 0.0,
             length: 500.0,
             snr: 9.0,
+            contrast_db: None,
         };
         drawing.ray(&wake, [255, 0, 0]);
         let picture = drawing.into_picture();

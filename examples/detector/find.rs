@@ -4,7 +4,7 @@ use super::decode::{Detection, Maps, same, without_repeats};
 use super::grey::{Grey, rescaled};
 use super::network::{MULTIPLE, STRIDE};
 use super::normalize;
-use super::source::Wake;
+use super::sample::Wake;
 
 /// Something that gives maps of normalised images.
 pub(crate) trait Mapper: Sync {
@@ -233,9 +233,9 @@ mod tests {
     use super::*;
     use crate::model::Model;
     use crate::network::{INPUTS, Map, OUTPUTS};
-    use crate::recipes::Recipe;
+    use crate::paint::Painted;
+    use crate::sample::Draw;
     use crate::sea::Speckle;
-    use crate::source::Draw;
     use burn::tensor::Device;
 
     /// Tips where a pixel is bright, each with a line toward the right.
@@ -348,7 +348,10 @@ mod tests {
     #[test]
     fn a_quarter_turn_turns_what_is_found() {
         let model = Model::load(None, Device::flex()).expect("weights of the repository");
-        let source = Recipe::Painted.source(77, 384);
+        let source = Painted {
+            seed: 77,
+            size: 384,
+        };
         let mut sure = 0;
         for index in 0..20 {
             let image = Grey::from_levels(384, 384, &source.sample(index).pixels);

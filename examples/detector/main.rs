@@ -1,4 +1,4 @@
-//! Finds ship wakes in radar images with a small network that has learned from painted ones alone.
+//! Finds ship wakes in radar images with a small network that has never seen a real one.
 //!
 //! ```text
 //! cargo run --release --example detector -- detect FILE|DIR... --json
@@ -32,8 +32,7 @@ mod recipes;
 mod score;
 mod sea;
 mod show;
-mod simulated;
-mod source;
+mod sample;
 mod targets;
 mod train;
 

@@ -128,7 +128,7 @@ pub(crate) fn inputs(contrast: f32) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::Draw;
+    use crate::sample::Draw;
 
     fn noise(rows: usize, columns: usize) -> Vec<f32> {
         let mut draw = Draw::new(2, 0);

@@ -1,7 +1,13 @@
 //! Painted images: a dark line, a bright streak beside it, a blob, correlated noise. No physics at all.
 
+use super::decode::oriented_box;
+use super::sample::{Draw, Sample, Wake, direction, pixel_snr};
 use super::sea::{Echoes, Speckle, border, clutter, mottle, quick_look};
-use super::source::{Draw, Sample, Source, Wake, direction};
+use rayon::prelude::*;
+use std::ops::Range;
+use wake_ldm::dataset::{Grey, Pair, Source};
+use wake_physics::Scene;
+use wake_physics::labels::{LabelledShip, Labels, ShipLabel, Visibility, WakeLabel};
 
 /// Images painted from a seed.
 #[derive(Debug, Clone, Copy)]
@@ -12,7 +18,71 @@ pub(crate) struct Painted {
 }
 
 impl Source for Painted {
-    fn sample(&self, index: u64) -> Sample {
+    fn size(&self) -> [usize; 2] {
+        [self.size, self.size]
+    }
+
+    fn items(&self, positions: Range<u64>) -> wake_ldm::Result<Vec<Pair>> {
+        let pair = |index| {
+            let Sample { pixels, wakes, .. } = self.sample(index);
+            let levels: Vec<u8> = pixels.iter().map(|&p| p as u8).collect();
+            let mut scene = Scene {
+                ship: None,
+                seed: index,
+                ..Scene::default()
+            };
+            (scene.grid.rows, scene.grid.columns) = (self.size, self.size);
+            Pair {
+                index,
+                image: Grey::of_levels(&levels, self.size, self.size),
+                prompt: String::new(),
+                scene,
+                labels: Labels {
+                    ships: wakes.iter().map(|wake| label(wake, self.size)).collect(),
+                },
+            }
+        };
+        Ok(positions.into_par_iter().map(pair).collect())
+    }
+}
+
+/// The label of a wake without a ship.
+fn label(wake: &Wake, size: usize) -> LabelledShip {
+    let corners = oriented_box(wake).map(|corner| corner.map(f64::from));
+    let inside = wake
+        .tip
+        .iter()
+        .all(|x| (0.0..size as f32 - 1.0).contains(x));
+    let [low, high] = [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| {
+        [0, 1].map(|a| {
+            corners
+                .iter()
+                .map(|c| c[a])
+                .reduce(pick)
+                .unwrap_or_default()
+        })
+    });
+    LabelledShip {
+        ship: ShipLabel::default(),
+        wake: WakeLabel {
+            tip_px: inside.then(|| wake.tip.map(f64::from)),
+            axis_deg: Some(f64::from(wake.axis_deg)),
+            half_angle_deg: Some(f64::from(wake.half_angle_deg)),
+            length_px: f64::from(wake.length),
+            visibility: Some(Visibility {
+                contrast_db: 0.0,
+                snr: pixel_snr(wake.snr, wake.length),
+            }),
+            box_px: Some([low[0], low[1], high[0] - low[0], high[1] - low[1]]),
+            oriented_box_px: Some(corners),
+            ..WakeLabel::default()
+        },
+    }
+}
+
+impl Painted {
+    /// Image number `index`, always the same one.
+    pub(crate) fn sample(&self, index: u64) -> Sample {
         let draw = &mut Draw::new(self.seed, index);
         let size = self.size;
         let speckle = Speckle::draw(draw);
@@ -214,6 +284,7 @@ fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &
         half_angle_deg: half_angle.atan().to_degrees(),
         length: reach.max(20.0),
         snr: (power / speckle.correlated_pixels()).sqrt(),
+        contrast_db: None,
     }
 }
 
@@ -235,6 +306,30 @@ mod tests {
             source.sample(3).pixels,
             Painted { seed: 6, size: 96 }.sample(3).pixels
         );
+    }
+
+    /// What a loader gives of a painted image is what was painted.
+    #[test]
+    fn pairs_keep_the_wakes() {
+        let source = Painted { seed: 5, size: 96 };
+        for index in 0..20 {
+            let (sample, pair) = (
+                source.sample(index),
+                &source.items(index..index + 1).expect("a pair")[0],
+            );
+            let again = Sample::of_pair(pair);
+            assert_eq!(again.pixels, sample.pixels);
+            assert_eq!(again.wakes.len(), sample.wakes.len());
+            for (a, b) in again.wakes.iter().zip(&sample.wakes) {
+                // Corners, directions and roots in single precision, of numbers up to some hundred.
+                let apart = (a.tip[0] - b.tip[0]).hypot(a.tip[1] - b.tip[1]);
+                assert!(
+                    apart < 1e-3 && (a.axis_deg - b.axis_deg).abs() < 1e-3,
+                    "{a:?} {b:?}"
+                );
+                assert!((a.length - b.length).abs() < 1e-3 && (a.snr / b.snr - 1.0).abs() < 1e-4);
+            }
+        }
     }
 
     /// The dark line lies where the label says: pixels along the ray are darker than those beside it.

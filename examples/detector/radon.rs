@@ -21,7 +21,7 @@ use super::decode::{Detection, without_repeats};
 use super::find::Tile;
 use super::grey::{Grey, rescaled};
 use super::normalize;
-use super::source::{Wake, direction};
+use super::sample::{Wake, direction};
 
 /// Expected false alarms an image, from the rays around targets and from all others each, at the threshold.
 pub(crate) const FALSE_ALARMS: f64 = 0.25;
@@ -275,6 +275,7 @@ fn in_sea(sea: &Sea, tiles: usize) -> Vec<Detection> {
                         half_angle_deg: 0.0,
                         length: (SKIPPED + LENGTHS[n]) as f32,
                         snr: f32::INFINITY,
+                        contrast_db: None,
                     };
                     // A line that ends at a target, or somewhat before it, begins there.
                     let onward = [0.0, NEAR_TARGET, 2.0 * NEAR_TARGET];
@@ -310,7 +311,7 @@ fn log_tail(t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::Draw;
+    use crate::sample::Draw;
 
     /// Values of the two-sided normal tail: 0.3173105, 0.0455003, 5.7330e-7, 1.9732e-9 at 1, 2, 5, 6.
     #[test]

@@ -1,69 +1,97 @@
 //! What images show, by name.
 
+use std::sync::Arc;
+
+use burn::tensor::Device;
+use wake_ldm::WakeSampler;
+use wake_ldm::dataset::{Mixture, Recipe as SceneRecipe, Sampled, Simulated, Source};
+
 use super::paint::Painted;
-use super::simulated::Simulated;
-use super::source::{Sample, Source};
 
 /// What the images of a training run, or of an evaluation, show.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Recipe {
     /// Painted lines, streaks and blobs, no physics
     Painted,
-    /// The simulator's wakes without the edge of the turbulent wake
+    /// Simulated: X band over an open sea with at most one ship, at satellite pixels
     Plain,
-    /// The simulator's wakes with it
-    Simulated,
-    /// Painted and simulated images in turn
+    /// Simulated: several sensors with their response and noise, and the ship's echo
+    Echo,
+    /// The same, and the edges of the turbulent wake
+    Edge,
+    /// The recipe detector: all that, gusts, swell, slicks, shallow water, several ships
+    Detector,
+    /// Drawn by the wake model
+    Sampled,
+    /// Painted and simulated images (detector) in turn
     Mixed,
 }
+
+/// What the recipe detector is without gusts, swell, slicks, shallow water and a second ship.
+const CALM: [&str; 5] = [
+    "draw.count = { one_of = [0, 1], weights = [1, 4] }",
+    "draw.sea.gust_strength = 0",
+    "draw.sea.swell_height = 0",
+    "draw.sea.slick_damping = 0",
+    "draw.sea.depth = \"infinite\"",
+];
+/// And without edges.
+const NO_EDGE: [&str; 1] = ["scene.ship.edge = false"];
+/// And without echo, breaking waves, sensors, responses and noise.
+const PLAIN: [&str; 5] = [
+    "scene.ship.echo = false",
+    "scene.sea.breaking = false",
+    "draw.together = [{ \"grid.spacing\" = [5, 25], \"radar.incidence\" = [20, 45] }]",
+    "draw.radar.noise_floor = -60",
+    "draw.radar.looks = [1, 8]",
+];
+/// What the wake model draws, as a quick-look shows it.
+const SAMPLED: [&str; 3] = [
+    "speckle = true",
+    "draw.quick_look.gain = { log = [0.09, 0.43] }",
+    "draw.quick_look.offset = [-0.03, 0.05]",
+];
 
 impl Recipe {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Painted => "painted",
             Self::Plain => "plain",
-            Self::Simulated => "simulated",
+            Self::Echo => "echo",
+            Self::Edge => "edge",
+            Self::Detector => "detector",
+            Self::Sampled => "sampled",
             Self::Mixed => "mixed",
         }
     }
 
     /// Images of `size` rows and columns.
-    pub(crate) fn source(self, seed: u64, size: usize) -> Box<dyn Source> {
-        match self {
-            Self::Painted => Box::new(Painted { seed, size }),
-            Self::Plain => Box::new(Simulated {
-                seed,
-                size,
-                edge: false,
-            }),
-            Self::Simulated => Box::new(Simulated {
-                seed,
-                size,
-                edge: true,
-            }),
-            Self::Mixed => Box::new(Mixed {
-                painted: Painted { seed, size },
-                simulated: Simulated {
-                    seed,
-                    size,
-                    edge: true,
-                },
-            }),
-        }
-    }
-}
-
-/// Three painted images, then a simulated one.
-struct Mixed {
-    painted: Painted,
-    simulated: Simulated,
-}
-
-impl Source for Mixed {
-    fn sample(&self, index: u64) -> Sample {
-        match index % 4 {
-            3 => self.simulated.sample(index),
-            _ => self.painted.sample(index),
-        }
+    ///
+    /// # Errors
+    ///
+    /// Of the recipe or the model; the wake model draws 256 rows and columns alone.
+    pub(crate) fn source(self, seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
+        let simulated = |changes: &[&[&str]]| -> wake_ldm::Result<Arc<dyn Source>> {
+            let pixels = ["rows", "columns"].map(|side| format!("scene.grid.{side} = {size}"));
+            let recipe = SceneRecipe::detector()?.with_assignments(&pixels)?;
+            let recipe = recipe.with_assignments(&changes.concat())?;
+            Ok(Arc::new(Simulated::new(recipe, seed)?))
+        };
+        Ok(match self {
+            Self::Painted => Arc::new(Painted { seed, size }),
+            Self::Plain => simulated(&[&CALM, &NO_EDGE, &PLAIN])?,
+            Self::Echo => simulated(&[&CALM, &NO_EDGE])?,
+            Self::Edge => simulated(&[&CALM])?,
+            Self::Detector => simulated(&[])?,
+            Self::Sampled => {
+                let sampler = WakeSampler::pretrained(&Device::flex())?;
+                let recipe = SceneRecipe::default().with_assignments(&SAMPLED)?;
+                Arc::new(Sampled::new(sampler, Simulated::new(recipe, seed)?)?)
+            }
+            Self::Mixed => Arc::new(Mixture::new(vec![
+                (1.0, Self::Painted.source(seed, size)?),
+                (1.0, Self::Detector.source(seed, size)?),
+            ])?),
+        })
     }
 }

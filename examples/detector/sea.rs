@@ -1,6 +1,6 @@
 //! What satellite images add to the mean of a scene: mottle, fronts, correlated speckle, ships, clutter, eight bits.
 
-use super::source::{Draw, direction};
+use super::sample::{Draw, direction};
 
 /// Speckle of an image: relative spread, and how far it is correlated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -245,14 +245,6 @@ impl Echoes {
                 false => 0.0,
             },
             brightness: draw.scale(2.0, 30.0),
-        }
-    }
-
-    /// The same for images whose azimuth runs along the columns; displacements are the scene's.
-    pub(crate) fn upright(draw: &mut Draw) -> Self {
-        Self {
-            vertical: true,
-            ..Self::draw(draw)
         }
     }
 

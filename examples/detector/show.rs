@@ -5,6 +5,7 @@ use std::path::Path;
 
 use wake_ldm::device_named;
 
+use super::detect::OPERATING_POINT;
 use super::drawing::sheet;
 use super::evaluate::{HELD_OUT, SIZE, picture};
 use super::find::{Search, find};
@@ -12,6 +13,7 @@ use super::grey::Grey;
 use super::model::Model;
 use super::progress;
 use super::recipes::Recipe;
+use super::sample::Sample;
 
 /// Images that are shown.
 const COUNT: u64 = 8;
@@ -21,18 +23,19 @@ pub(crate) fn show(out: &Path) -> Result<(), Box<dyn Error>> {
     let model = Model::load(None, device_named("flex")?)?;
     std::fs::create_dir_all(out)
         .map_err(|error| format!("cannot make {}: {error}", out.display()))?;
-    let source = Recipe::Simulated.source(HELD_OUT, SIZE);
+    let source = Recipe::Detector.source(HELD_OUT, SIZE)?;
     let bar = progress::bar(COUNT, "images");
     let mut pictures = Vec::new();
     for index in 0..COUNT {
-        let sample = source.sample(index);
+        let pair = &source.items(index..index + 1)?[0];
+        let sample = Sample::of_pair(pair);
         let image = Grey::from_levels(SIZE, SIZE, &sample.pixels);
         let found = find(
             &image,
             &model,
             Search {
                 spacing: None,
-                least_score: 0.2,
+                least_score: OPERATING_POINT,
             },
         );
         bar.suspend(|| {

@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 
 use super::network::{ANGLE_UNIT, INPUTS, LENGTH_UNIT, Map, STRIDE};
 use super::normalize;
-use super::source::{Sample, Wake};
+use super::sample::{Sample, Wake};
 
 /// Wakes above this signal-to-noise are to be found; those below neither are, nor are they mistakes.
 pub(crate) const FOUND: f32 = 5.5;
@@ -246,6 +246,7 @@ mod tests {
             half_angle_deg: 5.0,
             length: 60.0,
             snr,
+            contrast_db: None,
         }
     }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde_json::json;
 use std::sync::Mutex;
+use wake_ldm::dataset::{Batches, Loader};
 use wake_ldm::device_named;
 use wake_ldm::train::{AdamOptions, Checkpoint, Metrics, Rate, Trainer, TrainerOptions};
 use wake_ldm::weights::{Layout, Precision, load, save_as};
@@ -13,7 +14,7 @@ use wake_ldm::weights::{Layout, Precision, load, save_as};
 use super::network::Network;
 use super::progress;
 use super::recipes::Recipe;
-use super::source::Source;
+use super::sample::{Draw, Sample};
 use super::targets::{Batch, Prepared};
 
 /// Images of a step.
@@ -80,11 +81,16 @@ pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     std::fs::create_dir_all(&options.out)
         .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
-    let source = options.recipe.source(options.seed, SIZE);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut batches = Loader::new(options.recipe.source(options.seed, SIZE)?)
+        .batch(BATCH)
+        .threads(threads)
+        .start(trainer.steps() as u64)
+        .on(&device_named("flex")?)?;
     let mut metrics = Metrics::open(&options.out.join("train.jsonl"), trainer.steps())?;
     let bar = progress::bar(steps as u64, "steps");
-    let prepare = |step: usize| prepared(source.as_ref(), step);
-    let mut next = prepare(trainer.steps());
+    let mut prepare = |step: usize| prepared(&mut batches, step, options.seed);
+    let mut next = prepare(trainer.steps())?;
     while trainer.steps() < steps {
         let samples = std::mem::take(&mut next);
         let parts = Mutex::new([0.0f32; 4]);
@@ -92,12 +98,9 @@ pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
         let (report, following) = {
             let step = trainer.steps() + 1;
             std::thread::scope(|scope| {
-                let maker = scope.spawn(|| {
-                    if step < steps {
-                        prepare(step)
-                    } else {
-                        Vec::new()
-                    }
+                let maker = scope.spawn(|| match step < steps {
+                    true => prepare(step),
+                    false => Ok(Vec::new()),
                 });
                 let report = trainer.step(|model, device, _| {
                     let batch = Batch::new(&samples, device);
@@ -115,7 +118,7 @@ pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
             })
         };
         trainer.check()?;
-        next = following;
+        next = following?;
         let [tips, lines, directions, extents] = parts.into_inner().unwrap_or_default();
         let more =
             json!({"tips": tips, "lines": lines, "directions": directions, "extents": extents});
@@ -139,11 +142,15 @@ fn save(network: &Network, path: &Path) -> wake_ldm::Result<()> {
     save_as(network, Layout::Diffusers, path, Precision::F16)
 }
 
-/// The images of a step.
-fn prepared(source: &dyn Source, step: usize) -> Vec<Prepared> {
-    let first = (step * BATCH) as u64;
-    (first..first + BATCH as u64)
-        .into_par_iter()
-        .map(|index| Prepared::new(&source.sample(index)))
-        .collect()
+/// The images of a step, turned and mirrored as the geometry of other passes would.
+fn prepared(batches: &mut Batches, step: usize, seed: u64) -> wake_ldm::Result<Vec<Prepared>> {
+    let Some(batch) = batches.next().transpose()? else {
+        return Ok(Vec::new());
+    };
+    let samples = Sample::of_batch(batch).into_par_iter().enumerate();
+    let prepare = |(k, sample): (usize, Sample)| {
+        let draw = &mut Draw::new(seed ^ 0x5151, (step * BATCH + k) as u64);
+        Prepared::new(&sample.turned(draw))
+    };
+    Ok(samples.map(prepare).collect())
 }

@@ -45,10 +45,10 @@ const FLOW: &str = "flow.safetensors";
 const SHEET: &str = "sheet.png";
 /// Ranges that prompts to read are drawn from, beyond those of images.
 const PROMPT_RANGES: [&str; 4] = [
-    "draw.ranges.ship_speed = [1.0, 15.0]",
-    "draw.ranges.wind_speed = [1.0, 12.0]",
-    "draw.ranges.fetch = [1e3, 1e6]",
-    "draw.ranges.incidence = [10.0, 40.0]",
+    "draw.ship.speed = [1.0, 15.0]",
+    "draw.sea.wind_speed = [1.0, 12.0]",
+    "draw.sea.fetch = { log = [1e3, 1e6] }",
+    "draw.radar.incidence = [10.0, 40.0]",
 ];
 
 pub(crate) fn autoencoder(options: &Options) -> Outcome<()> {

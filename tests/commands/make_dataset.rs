@@ -21,7 +21,7 @@ fn make(arguments: &[&str], out: &Path) -> String {
 #[test]
 fn wrong_recipes_shares_and_numbers_are_named() {
     for (arguments, words) in [
-        (["--grid", "papper"], ["--grid", "papper", "ranges"]),
+        (["--grid", "papper"], ["--grid", "papper", "detector"]),
         (["--set", "speckel=true"], ["recipe", "speckel", "speckle"]),
         (
             ["--set", "scene.sea.wind_sped=3"],
@@ -32,8 +32,8 @@ fn wrong_recipes_shares_and_numbers_are_named() {
             ["radar.looks", "is 0", "1 to"],
         ),
         (
-            ["--set", "draw.ranges.ship_speed=[12,6]"],
-            ["draw.ranges.ship_speed", "[12, 6]", "lower first"],
+            ["--set", "draw.ship.speed=[12,6]"],
+            ["draw.ship.speed", "[12, 6]", "lower first"],
         ),
         (["--shard", "5/3"], ["--shard", "5/3", "from 0 to n"]),
         (["--shard", "half"], ["--shard", "half", "such as 0/4"]),

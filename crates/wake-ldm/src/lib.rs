@@ -15,7 +15,7 @@ pub mod weights;
 mod stable_diffusion;
 mod wake_model;
 
-#[cfg(feature = "train")]
+#[cfg(feature = "dataset")]
 pub mod dataset;
 #[cfg(feature = "train")]
 pub mod train;

@@ -32,10 +32,10 @@ pub(crate) const FINE_TUNE_STREAM: u32 = 3;
 pub const STEP_STREAM: u32 = 16;
 
 /// Streams of uniform numbers; they never meet the normal ones, which have another counter.
-#[cfg(feature = "train")]
+#[cfg(feature = "dataset")]
 pub(crate) mod uniform {
-    /// The values of a data set's scene: value v has stream v, below 16.
-    pub(crate) const VALUES: u32 = 0;
+    /// The values of a data set's scene: each key has one of the streams from here on.
+    pub(crate) const VALUES: u32 = 1 << 31;
     /// Seeds of scenes.
     pub(crate) const SEEDS: u32 = 1000;
     /// Wordings of scenes.
@@ -43,12 +43,15 @@ pub(crate) mod uniform {
     /// Prompts without images.
     pub(crate) const PROMPTS: u32 = 1002;
     /// Noise levels of examples.
+    #[cfg(feature = "train")]
     pub(crate) const LEVELS: u32 = 2000;
     /// Places of patches in a two-sample test.
     pub(crate) const PLACES: u32 = 2002;
     /// Latent pixels of examples.
+    #[cfg(feature = "train")]
     pub(crate) const CELLS: u32 = 2001;
     /// Training steps of fine-tuning.
+    #[cfg(feature = "train")]
     pub(crate) const STEPS: u32 = 2100;
     /// The order of examples; round i of the shuffle has `ORDER + i`.
     pub(crate) const ORDER: u32 = 1 << 20;
@@ -190,7 +193,7 @@ mod tests {
             (STEP_STREAM, u32::MAX - STEP_STREAM),
         ];
         let uniform = [
-            (uniform::VALUES, 16),
+            (uniform::VALUES, 1 << 31),
             one(uniform::SEEDS),
             one(uniform::WORDINGS),
             one(uniform::PROMPTS),

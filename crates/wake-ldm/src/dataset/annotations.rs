@@ -18,6 +18,7 @@ fn boxes(labels: &Labels, echo: bool) -> Vec<(u32, Box2)> {
         .into_iter()
         .filter(|object| echo || object.class != Class::Ship)
         .map(|object| (object.class.number(), cornered(object.box_px)))
+        .filter(|(_, [_, _, width, height])| *width > 0.0 && *height > 0.0)
         .collect()
 }
 

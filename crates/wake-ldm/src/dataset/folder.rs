@@ -121,6 +121,11 @@ impl Epochs {
         Self { folder, seed }
     }
 
+    /// The folder that is walked through.
+    pub(super) fn folder(&self) -> &Folder {
+        &self.folder
+    }
+
     /// The pair at a position.
     ///
     /// # Errors

@@ -23,7 +23,7 @@ pub struct Grey {
 pub struct Pair {
     /// Its number in the data set.
     pub index: u64,
-    /// The image, in the grey of [`GreyScale::default`].
+    /// The image, in the grey of [`GreyScale::default`], or as the quick-look that the recipe draws.
     pub image: Grey,
     /// The scene in words.
     pub prompt: String,
@@ -46,7 +46,7 @@ impl Simulated {
     ///
     /// [`Error::Scene`](crate::Error::Scene) if the grid does not fit in memory.
     pub fn pair(&self, index: u64) -> Result<Pair> {
-        let scene = self.scene(index);
+        let scene = self.scene(index)?;
         let mut simulator = idle().pop().unwrap_or_default();
         let image = simulator.image(&scene);
         idle().push(simulator);
@@ -57,9 +57,17 @@ impl Simulated {
             image.intensity
         };
         Ok(Pair {
-            image: Grey::of_power(&power, &GreyScale::default()),
+            image: self.grey(&power, index),
             ..self.pair_without_image(index)?
         })
+    }
+
+    /// The intensities of image number `index` as its recipe shows them.
+    pub(super) fn grey(&self, power: &Field, index: u64) -> Grey {
+        match self.quick_look(index) {
+            Some([gain, offset]) => Grey::quick_look(power, gain, offset),
+            None => Grey::of_power(power, &GreyScale::default()),
+        }
     }
 
     /// Pair number `index` with an image of no pixels: quick, for it is not simulated.
@@ -68,7 +76,7 @@ impl Simulated {
     ///
     /// [`Error::Text`](crate::Error::Text) if the scene is not valid.
     pub fn pair_without_image(&self, index: u64) -> Result<Pair> {
-        let scene = self.scene(index);
+        let scene = self.scene(index)?;
         Ok(Pair {
             index,
             image: Grey {
@@ -91,6 +99,37 @@ impl Grey {
             rows: power.rows,
             columns: power.columns,
             pixels: power.values.iter().map(grey).collect(),
+        }
+    }
+
+    /// The grey of intensities as a quick-look shows them: amplitude stretched by an unknown factor, cut to 8 bits.
+    ///
+    /// ```text
+    /// grey = offset + gain · a / median(a),   a = √intensity,   in steps of 1/255 from 0 to 1
+    /// ```
+    ///
+    /// An image without power is of the grey of `offset`.
+    pub fn quick_look(power: &Field, gain: f64, offset: f64) -> Self {
+        let mut pixels: Vec<f32> = power.values.iter().map(|&p| p.max(0.0).sqrt()).collect();
+        let mut sorted = pixels.clone();
+        let middle = sorted.len() / 2;
+        let median = match sorted.is_empty() {
+            true => 0.0,
+            false => *sorted.select_nth_unstable_by(middle, f32::total_cmp).1,
+        };
+        let factor = if median > 0.0 {
+            gain as f32 / median
+        } else {
+            0.0
+        };
+        for a in &mut pixels {
+            let grey = (offset as f32 + factor * *a).clamp(0.0, 1.0);
+            *a = (255.0 * grey).round() / 255.0;
+        }
+        Self {
+            rows: power.rows,
+            columns: power.columns,
+            pixels,
         }
     }
 

@@ -34,7 +34,7 @@ impl Prompts {
         let random = NoiseSource::new(self.scenes.seed());
         let draw = |i: u64| random.uniform(uniform::PROMPTS, position * DRAWS + i);
         let wording = Wording::ALL[(draw(0) * Wording::ALL.len() as f64) as usize];
-        let text = wording.prompt(&self.scenes.scene(position))?;
+        let text = wording.prompt(&self.scenes.scene(position)?)?;
         let text = if draw(1) < MOVED {
             rearranged(&text, |i| draw(2 + i))
         } else {

@@ -1,24 +1,27 @@
-//! What a data set is made of: the paper's grid, or ranges to draw from.
+//! What a data set is made of: the paper's grid, or values that are drawn.
 
-use super::ranges::Ranges;
+use super::draws::Draws;
 use crate::error::{Error, Result};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::path::Path;
 use wake_physics::scene::Grid;
 use wake_physics::{Scene, sentence};
 
 /// Which scenes a data set has, and how they become images and prompts.
 ///
-/// As a TOML file, keys that are absent keep their defaults and unknown ones are errors:
+/// As a TOML file, keys that are absent come from the recipe that `base` names, `ranges` where it is absent too, and
+/// unknown ones are errors:
 ///
 /// ```toml
+/// base = "detector"         # paper, ranges or detector
 /// speckle = true            # false: the image before speckle
 /// paraphrase = false        # true: four wordings in turn, false: the paper's
 /// [scene.grid]              # [scene] is a scene file: what is not drawn
 /// rows = 128
-/// [draw.ranges]
-/// open_sea = 0.2
-/// ship_speed = [6.0, 12.0]
+/// [draw]                    # see Draws
+/// count = [0, 2]
+/// "ship.speed" = [6.0, 12.0]
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -29,22 +32,61 @@ pub struct Recipe {
     pub paraphrase: bool,
     /// How scenes are chosen.
     pub draw: Draw,
-    /// The values that are not drawn: grid, radar, size of the ship, tolerance.
+    /// The values that are not drawn.
     pub scene: Scene,
 }
 
 /// How scenes are chosen.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
-    /// The 3,456 scenes of the paper's grid in a fixed mixed order, then again with other seas.
+    /// The 3,456 scenes of the paper's grid in a fixed mixed order, then again with other seas: `"paper-grid"`.
     PaperGrid,
-    /// Independent values from closed ranges.
-    Ranges(Ranges),
+    /// Values drawn on their own.
+    Values(Draws),
+}
+
+impl Draw {
+    const PAPER: &str = "paper-grid";
+
+    /// This with what a recipe says of it.
+    fn with(self, change: &toml::Value) -> Result<Self> {
+        match (self, change) {
+            (_, toml::Value::String(name)) if name == Self::PAPER => Ok(Self::PaperGrid),
+            (Self::PaperGrid, toml::Value::Table(table)) => {
+                Ok(Self::Values(Draws::default().with(table)?))
+            }
+            (Self::Values(draws), toml::Value::Table(table)) => {
+                Ok(Self::Values(draws.with(table)?))
+            }
+            (_, other) => Err(Error::InvalidOption {
+                option: "draw".to_owned(),
+                value: sentence(&other.to_string()),
+                expected: "\"paper-grid\", or a table of keys with what they are drawn from"
+                    .to_owned(),
+            }),
+        }
+    }
+}
+
+impl Serialize for Draw {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::PaperGrid => serializer.serialize_str(Self::PAPER),
+            Self::Values(draws) => draws.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Draw {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        Self::PaperGrid.with(&value).map_err(D::Error::custom)
+    }
 }
 
 impl Default for Recipe {
-    /// The recipe of a small model: [`Ranges::default`], 256 × 256 pixels of 4 m, no speckle, tolerance 1e-2.
+    /// The recipe of a small model, `ranges`: the span of the paper's grid, all directions, one ship size, the ship
+    /// anywhere, a fifth open sea; 256 × 256 pixels of 4 m, no speckle, tolerance 1e-2.
     fn default() -> Self {
         let mut scene = Scene {
             grid: Grid {
@@ -58,7 +100,7 @@ impl Default for Recipe {
         Self {
             speckle: false,
             paraphrase: false,
-            draw: Draw::Ranges(Ranges::default()),
+            draw: Draw::Values(Draws::ranges()),
             scene,
         }
     }
@@ -75,13 +117,50 @@ impl Recipe {
         }
     }
 
+    /// The recipe of a detector: what satellites deliver, see docs/dataset.md.
+    ///
+    /// # Errors
+    ///
+    /// None, unless a sensor or a range was changed without the recipe.
+    pub fn detector() -> Result<Self> {
+        let empty = Self {
+            draw: Draw::Values(Draws::default()),
+            scene: Scene::from_toml("")?,
+            ..Self::default()
+        };
+        empty.merged(include_str!("detector.toml"))
+    }
+
+    /// A recipe that is built in, by its name: paper, ranges or detector.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidOption`] for another name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "paper" => Ok(Self::paper()),
+            "ranges" => Ok(Self::default()),
+            "detector" => Self::detector(),
+            _ => Err(Error::InvalidOption {
+                option: "recipe".to_owned(),
+                value: sentence(name),
+                expected: "paper, ranges or detector".to_owned(),
+            }),
+        }
+    }
+
     /// Reads a recipe from the text of a TOML file and checks it.
     ///
     /// # Errors
     ///
-    /// [`Error::Recipe`] with the key or line at fault, [`Error::Scene`] for a value out of its range.
+    /// [`Error::Recipe`] with the key or line at fault, [`Error::InvalidOption`] for something that is no distribution,
+    /// [`Error::Scene`] for a value out of its range.
     pub fn from_toml(text: &str) -> Result<Self> {
-        Self::default().merged(text)
+        let base = toml::from_str::<toml::Table>(text).ok();
+        match base.as_ref().and_then(|table| table.get("base")?.as_str()) {
+            Some(name) => Self::named(name)?.merged(text),
+            None => Self::default().merged(text),
+        }
     }
 
     /// Reads a recipe file and checks it.
@@ -120,12 +199,19 @@ impl Recipe {
         let fail = |message: String| Error::Recipe {
             message: sentence(&message),
         };
-        let changes: toml::Table = toml::from_str(text).map_err(|e| fail(one_line(text, &e)))?;
+        let mut changes: toml::Table =
+            toml::from_str(text).map_err(|e| fail(one_line(text, &e)))?;
+        changes.remove("base");
+        let draw = match changes.remove("draw") {
+            Some(change) => self.draw.clone().with(&change)?,
+            None => self.draw.clone(),
+        };
         let mut table = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
         merge(&mut table, changes);
         let recipe: Self = table
             .try_into()
             .map_err(|e: toml::de::Error| fail(one_line(text, &e)))?;
+        let recipe = Self { draw, ..recipe };
         recipe.validate()?;
         Ok(recipe)
     }
@@ -139,7 +225,7 @@ impl Recipe {
         self.scene.validate()?;
         match &self.draw {
             Draw::PaperGrid => Ok(()),
-            Draw::Ranges(ranges) => ranges.validate(&self.scene),
+            Draw::Values(draws) => draws.validate(&self.scene),
         }
     }
 }

@@ -47,16 +47,30 @@ impl Simulated {
     }
 
     /// Scene number `index`.
-    pub fn scene(&self, index: u64) -> Scene {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`](crate::Error::Scene) or [`Error::Recipe`](crate::Error::Recipe) for values within their ranges
+    /// that no scene can have together.
+    pub fn scene(&self, index: u64) -> Result<Scene> {
         let (base, random) = (&self.recipe.scene, NoiseSource::new(self.seed));
         let drawn = match &self.recipe.draw {
             Draw::PaperGrid => paper_scene(index, base),
-            Draw::Ranges(ranges) => ranges.scene(base, random, index),
+            Draw::Values(draws) => draws.scene(base, random, index)?,
         };
+        drawn.validate()?;
         let mut scene = PartialScene::of(&drawn).onto(&drawn).unwrap_or(drawn);
         // 52 bits: every reader of JSON takes them for a whole number.
         scene.seed = (random.uniform(uniform::SEEDS, index) * (1u64 << 52) as f64) as u64;
-        scene
+        Ok(scene)
+    }
+
+    /// Gain and offset of image number `index` as a quick-look, if it is one.
+    pub(super) fn quick_look(&self, index: u64) -> Option<[f64; 2]> {
+        match &self.recipe.draw {
+            Draw::PaperGrid => None,
+            Draw::Values(draws) => draws.quick_look(NoiseSource::new(self.seed), index),
+        }
     }
 
     /// The words for scene number `index`.
@@ -82,15 +96,11 @@ fn paper_scene(index: u64, base: &Scene) -> Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::{Place, Ranges};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    fn simulated(ranges: Ranges, seed: u64) -> Simulated {
-        let recipe = Recipe {
-            draw: Draw::Ranges(ranges),
-            ..Recipe::default()
-        };
+    fn simulated(changes: &[String], seed: u64) -> Simulated {
+        let recipe = Recipe::default().with_assignments(changes).unwrap();
         Simulated::new(recipe, seed).unwrap()
     }
 
@@ -99,22 +109,55 @@ mod tests {
         (min..=max, min..=max).prop_map(|(a, b)| [a.min(b), a.max(b)])
     }
 
+    /// Ranges of some values of a scene.
+    #[derive(Debug)]
+    struct Ranges {
+        speed: [f64; 2],
+        heading: [f64; 2],
+        length: [f64; 2],
+        wind: [f64; 2],
+        fetch: [f64; 2],
+        incidence: [f64; 2],
+        anywhere: bool,
+    }
+
     prop_compose! {
         fn ranges()(
-            open_sea in 0.0..=1.0_f64,
-            random in any::<bool>(),
-            ship_speed in range(0.0, 40.0),
-            ship_heading in range(-400.0, 400.0),
-            ship_length in range(30.0, 500.0),
-            wind_speed in range(0.0, 30.0),
-            wind_toward in range(-400.0, 400.0),
+            speed in range(0.0, 40.0),
+            heading in range(-400.0, 400.0),
+            length in range(30.0, 500.0),
+            wind in range(0.0, 30.0),
             fetch in range(100.0, 1e7),
             incidence in range(5.0, 75.0),
+            anywhere in any::<bool>(),
         ) -> Ranges {
-            let place = if random { Place::Random } else { Place::Fixed };
-            Ranges {
-                open_sea, place, ship_speed, ship_heading, ship_length, wind_speed, wind_toward, fetch, incidence,
-            }
+            Ranges { speed, heading, length, wind, fetch, incidence, anywhere }
+        }
+    }
+
+    impl Ranges {
+        fn simulated(&self, seed: u64) -> Simulated {
+            let place = if self.anywhere {
+                "\"anywhere\""
+            } else {
+                "[0, 0]"
+            };
+            let fetch = format!("{{ log = {:?} }}", self.fetch);
+            let changes = [
+                format!("draw.ship.speed = {:?}", self.speed),
+                format!("draw.ship.heading = {:?}", self.heading),
+                format!("draw.ship.length = {:?}", self.length),
+                format!("draw.sea.wind_speed = {:?}", self.wind),
+                format!("draw.sea.fetch = {fetch}"),
+                format!("draw.radar.incidence = {:?}", self.incidence),
+                format!("draw.ship.position = {place}"),
+            ];
+            let changes = if self.anywhere {
+                &changes[..]
+            } else {
+                &changes[..6]
+            };
+            simulated(changes, seed)
         }
     }
 
@@ -132,23 +175,19 @@ mod tests {
     proptest! {
         #[test]
         fn drawn_values_lie_in_their_ranges(ranges in ranges(), seed in any::<u64>(), index in any::<u64>()) {
-            let source = simulated(ranges.clone(), seed);
-            let scene = source.scene(index);
+            let scene = ranges.simulated(seed).scene(index).unwrap();
             prop_assert!(scene.validate().is_ok());
-            prop_assert!(within(scene.sea.wind_speed, ranges.wind_speed, 0.1));
-            prop_assert!(turned_within(scene.sea.wind_toward, ranges.wind_toward));
+            prop_assert!(within(scene.sea.wind_speed, ranges.wind, 0.1));
             prop_assert!(within(scene.sea.fetch, ranges.fetch, 1.0));
             prop_assert!(within(scene.radar.incidence, ranges.incidence, 1.0));
-            for ship in &scene.ships {
-                prop_assert!(within(ship.speed, ranges.ship_speed, 0.1));
-                prop_assert!(turned_within(ship.heading, ranges.ship_heading));
-                prop_assert!(within(ship.length, ranges.ship_length, 0.1));
-                // Half a step of 0.1 mm on a length of 30 m or more, and rounding.
+            if let Some(ship) = &scene.ship {
+                prop_assert!(within(ship.speed, ranges.speed, 0.1));
+                prop_assert!(turned_within(ship.heading, ranges.heading));
+                prop_assert!(within(ship.length, ranges.length, 0.1));
                 prop_assert!((ship.beam / ship.length - 26.0 / 195.0).abs() < 0.5e-4 / 30.0 + 1e-12);
                 // 256 pixels of 4 m around pixel 128.
                 for coordinate in [ship.position[0], -ship.position[1]] {
-                    let reach = if ranges.place == Place::Random { [-512.0, 508.0] } else { [0.0, 0.0] };
-                    prop_assert!(within(coordinate, reach, 0.1));
+                    prop_assert!(within(coordinate, [-512.0, 508.0], 0.1));
                 }
             }
         }
@@ -156,10 +195,10 @@ mod tests {
         /// A scene depends on nothing but recipe, seed and index; every wording states all that was drawn.
         #[test]
         fn scenes_repeat_and_are_fully_stated(ranges in ranges(), seed in any::<u64>(), index in any::<u64>()) {
-            let source = simulated(ranges.clone(), seed);
-            let scene = source.scene(index);
+            let source = ranges.simulated(seed);
+            let scene = source.scene(index).unwrap();
             let _others: Vec<_> = (0..3).map(|i| source.scene(i)).collect();
-            prop_assert_eq!(&simulated(ranges, seed).scene(index), &scene);
+            prop_assert_eq!(&ranges.simulated(seed).scene(index).unwrap(), &scene);
             // A line of JSON gives it back to the bit.
             let line = serde_json::to_string(&scene).unwrap();
             prop_assert_eq!(&serde_json::from_str::<Scene>(&line).unwrap(), &scene);
@@ -172,10 +211,10 @@ mod tests {
 
     #[test]
     fn draws_are_independent_and_even() {
-        let source = simulated(Ranges::default(), 3);
+        let source = simulated(&[], 3);
         let n = 4000;
-        let scenes: Vec<Scene> = (0..n).map(|i| source.scene(i)).collect();
-        let ships: Vec<_> = scenes.iter().flat_map(|s| s.ships.clone()).collect();
+        let scenes: Vec<Scene> = (0..n).map(|i| source.scene(i).unwrap()).collect();
+        let ships: Vec<_> = scenes.iter().filter_map(|s| s.ship.clone()).collect();
         // Five standard deviations of a binomial count.
         let empty = (n as usize - ships.len()) as f64;
         assert!((empty - 0.2 * n as f64).abs() < 5.0 * (0.16 * n as f64).sqrt());
@@ -220,8 +259,62 @@ mod tests {
 
     #[test]
     fn other_seeds_make_other_scenes() {
-        let [one, two] = [1, 2].map(|seed| simulated(Ranges::default(), seed));
-        assert!((0..50).all(|i| one.scene(i) != two.scene(i)));
+        let [one, two] = [1, 2].map(|seed| simulated(&[], seed));
+        assert!((0..50).all(|i| one.scene(i).unwrap() != two.scene(i).unwrap()));
+    }
+
+    /// A key that is added, or drawn otherwise, changes nothing but its own value.
+    #[test]
+    fn keys_are_drawn_apart() {
+        let changes = ["draw.ship.speed = [1, 2]", "draw.radar.looks = [1, 9]"];
+        let other = simulated(&changes.map(str::to_owned), 3);
+        for index in 0..40 {
+            let (one, mut scene) = (
+                simulated(&[], 3).scene(index).unwrap(),
+                other.scene(index).unwrap(),
+            );
+            if let (Some(ship), Some(own)) = (&mut scene.ship, &one.ship) {
+                assert!(ship.speed <= 2.0);
+                ship.speed = own.speed;
+            }
+            scene.radar.looks = one.radar.looks;
+            assert_eq!(scene, one);
+        }
+    }
+
+    /// Sensors come in their weights, each with its own pixels and what else belongs to it; the radar is as a scene file
+    /// has it that names them.
+    #[test]
+    fn values_that_belong_together_come_together() {
+        let text = r#"
+            [draw]
+            together = [
+                { weight = 3, "radar.sensor" = "sentinel-1-iw", "radar.incidence" = [33, 33] },
+                { "radar.sensor" = "ers-2-pri", "grid.spacing" = 25, "radar.incidence" = 23 },
+            ]
+        "#;
+        let source = Simulated::new(Recipe::from_toml(text).unwrap(), 4).unwrap();
+        let scenes: Vec<Scene> = (0..400).map(|i| source.scene(i).unwrap()).collect();
+        let written = |text: &str| Scene::from_toml(text).unwrap();
+        let [sentinel, ers] = [
+            written("[radar]\nsensor = \"sentinel-1-iw\"\nincidence = 33"),
+            written("[grid]\nspacing = 25\n[radar]\nsensor = \"ers-2-pri\"\nincidence = 23"),
+        ];
+        let count = scenes.iter().filter(|s| s.radar == sentinel.radar).count();
+        for scene in &scenes {
+            let expected = if scene.radar == sentinel.radar {
+                &sentinel
+            } else {
+                &ers
+            };
+            assert_eq!(scene.radar, expected.radar);
+            assert_eq!(
+                scene.grid.spacing.to_bits(),
+                expected.grid.spacing.to_bits()
+            );
+        }
+        // Five standard deviations of a binomial count of 400 at 3/4.
+        assert!(count.abs_diff(300) < 44, "{count}");
     }
 
     /// Every scene of the grid once, all other values at their defaults; the next round differs in its seas.
@@ -236,10 +329,12 @@ mod tests {
             .to_toml()
             .unwrap()
         };
-        let walked: Vec<Scene> = (0..PAPER_SCENES).map(|i| source.scene(i)).collect();
+        let walked: Vec<Scene> = (0..PAPER_SCENES)
+            .map(|i| source.scene(i).unwrap())
+            .collect();
         let all: BTreeSet<String> = walked.iter().map(text).collect();
         assert_eq!(all, paper_grid().map(|s| text(&s)).collect());
-        let again = source.scene(PAPER_SCENES + 17);
+        let again = source.scene(PAPER_SCENES + 17).unwrap();
         assert_eq!(text(&again), text(&walked[17]));
         assert_ne!(again.seed, walked[17].seed);
         // The first 24 already have every speed, heading, wind, direction, fetch and incidence.
@@ -248,8 +343,8 @@ mod tests {
             values.len()
         };
         let counts = [
-            distinct(|s| s.ships[0].speed),
-            distinct(|s| s.ships[0].heading),
+            distinct(|s| s.ship.as_ref().unwrap().speed),
+            distinct(|s| s.ship.as_ref().unwrap().heading),
             distinct(|s| s.sea.wind_speed),
             distinct(|s| s.sea.wind_toward),
             distinct(|s| s.sea.fetch),
@@ -260,11 +355,7 @@ mod tests {
 
     #[test]
     fn paraphrases_take_every_wording() {
-        let recipe = Recipe {
-            paraphrase: true,
-            ..Recipe::default()
-        };
-        let source = Simulated::new(recipe, 1).unwrap();
+        let source = simulated(&["paraphrase = true".to_owned()], 1);
         let count = |wording| (0..400).filter(|&i| source.wording(i) == wording).count();
         // Five standard deviations of a binomial count of 400 at 1/4.
         assert!(Wording::ALL.iter().all(|&w| count(w).abs_diff(100) < 44));
@@ -272,40 +363,44 @@ mod tests {
 
     #[test]
     fn a_recipe_file_changes_what_it_names() {
-        let text = "speckle = true\n[scene.grid]\nrows = 96\n[draw.ranges]\nship_speed = [8, 9]\nplace = \"fixed\"";
+        let text = "speckle = true\n[scene.grid]\nrows = 96\n[draw.ship]\nspeed = [8, 9]\nposition = \"anywhere\"";
         let recipe = Recipe::from_toml(text).unwrap();
-        let expected = Ranges {
-            ship_speed: [8.0, 9.0],
-            place: Place::Fixed,
-            ..Ranges::default()
-        };
-        assert_eq!(recipe.draw, Draw::Ranges(expected));
+        let same = Recipe::from_toml("[draw]\n\"ship.speed\" = [8.0, 9.0]").unwrap();
+        assert_eq!(recipe.draw, same.draw);
+        assert_ne!(recipe.draw, Recipe::default().draw);
         assert!(recipe.speckle);
         let grid = &recipe.scene.grid;
         assert_eq!((grid.rows, grid.columns), (96, 256));
         assert_eq!(Recipe::from_toml("").unwrap(), Recipe::default());
         let paper = Recipe::from_toml("draw = \"paper-grid\"").unwrap();
         assert_eq!(paper.draw, Draw::PaperGrid);
-        let json = serde_json::to_string(&recipe).unwrap();
-        assert_eq!(serde_json::from_str::<Recipe>(&json).unwrap(), recipe);
+        assert_eq!(
+            Recipe::from_toml("base = \"paper\"").unwrap(),
+            Recipe::paper()
+        );
+        for recipe in [recipe, paper, Recipe::detector().unwrap()] {
+            let json = serde_json::to_string(&recipe).unwrap();
+            assert_eq!(serde_json::from_str::<Recipe>(&json).unwrap(), recipe);
+        }
     }
 
     #[test]
     fn assignments_take_toml_values_and_bare_words() {
         let changes = [
             "speckle=true",
-            "draw.ranges.place = fixed",
-            "draw.ranges.fetch=[1e4, 2e4]",
+            "draw.sea.fetch=[1e4, 2e4]",
             "scene.ship.hull=full",
+            "draw.ship.echo = { one_of = [true, false] }",
         ];
         let recipe = Recipe::default().with_assignments(&changes).unwrap();
-        let expected = Ranges {
-            place: Place::Fixed,
-            fetch: [1e4, 2e4],
-            ..Ranges::default()
-        };
-        assert_eq!(recipe.draw, Draw::Ranges(expected));
         assert!(recipe.speckle);
+        let source = Simulated::new(recipe, 1).unwrap();
+        let fetches = (0..50).map(|i| source.scene(i).unwrap().sea.fetch);
+        assert!(
+            fetches
+                .into_iter()
+                .all(|fetch| (1e4..=2e4).contains(&fetch))
+        );
         assert_eq!(
             Recipe::default()
                 .with_assignments(&["draw=paper-grid"])
@@ -313,7 +408,7 @@ mod tests {
                 .draw,
             Draw::PaperGrid
         );
-        for bad in ["speckle", "=3", "speckle=maybe", "scene.sea"] {
+        for bad in ["speckle", "=3", "speckle=maybe", "scene.sea", "draw=fast"] {
             assert!(Recipe::default().with_assignments(&[bad]).is_err(), "{bad}");
         }
     }
@@ -323,30 +418,41 @@ mod tests {
         for (text, word) in [
             ("speckles = true", "speckles"),
             ("draw = \"papers\"", "papers"),
-            ("[draw.ranges]\nspeed = [1, 2]", "speed"),
-            ("[draw.ranges]\nship_speed = [9, 8]", "ship_speed"),
-            ("[draw.ranges]\nship_speed = [1, nan]", "ship_speed"),
+            ("base = \"papers\"", "paper, ranges or detector"),
+            ("[draw.ship]\nsped = [1, 2]", "sped"),
+            ("[draw]\nseed = [1, 2]", "seed of its own"),
+            ("[draw.grid]\nrows = [16, 32]", "one size"),
+            ("[draw.ship]\nspeed = [9, 8]", "draw.ship.speed is [9, 8]"),
+            ("[draw.ship]\nspeed = [1, nan]", "draw.ship.speed"),
             (
-                "[draw.ranges]\nship_speed = [1, 41]",
+                "[draw.ship]\nspeed = [1, 41]",
                 "ship.speed is 41, outside 0 to 40",
             ),
+            ("[draw.ship]\nlength = [0.5, 20]", "ship.length is 0.5"),
+            ("[draw.ship]\nposition = \"left\"", "left"),
+            ("[draw.sea]\nfetch = { log = [1, 1e4] }", "sea.fetch"),
             (
-                "[draw.ranges]\nship_length = [0.5, 20]",
-                "ship.length is 0.5",
+                "[draw.sea]\nfetch = { log = [0, 1] }",
+                "two positive numbers",
             ),
-            ("[draw.ranges]\nfetch = [1, 1e4]", "sea.fetch"),
+            ("[draw.radar]\nlooks = [0, 4]", "radar.looks"),
+            ("[draw.radar]\nsensor = \"sputnik\"", "sputnik"),
             (
-                "[draw.ranges]\nfetch = [0, 1]",
-                "sea.fetch is 0, outside 100",
+                "[draw.radar]\nwindow = \"uniform\"",
+                "radar.range_resolution",
             ),
+            ("[draw]\ncount = [0, 1.5]", "whole numbers from 0 to 100"),
+            ("[draw]\ncount = -1", "whole numbers from 0 to 100"),
             (
-                "[draw.ranges]\nfetch = [-1, 1e4]",
-                "sea.fetch is -1, outside 100",
+                "[draw]\n\"quick_look.gain\" = [0, 1]",
+                "draw.quick_look.gain",
             ),
-            ("[draw.ranges]\nship_speed = [6, 8, 12]", "3 numbers"),
+            ("[draw]\ntogether = [{ weight = 0 }]", "weight"),
+            (
+                "[draw]\ntogether = [{ \"sea.depth\" = 0.5 }]",
+                "sea.depth is 0.5",
+            ),
             ("[scene.ship]\nposition = [1, 2, 3]", "3 numbers"),
-            ("[draw.ranges]\nopen_sea = 1.5", "open_sea is 1.5"),
-            ("[draw.ranges]\nplace = \"left\"", "left"),
             ("[scene.sea]\nwind = 3", "wind"),
             ("[scene.grid]\nrows = 0", "grid.rows"),
             ("speckle = [", "line 1"),
@@ -357,5 +463,34 @@ mod tests {
         }
         let message = Recipe::read(std::path::Path::new("no/such.toml")).unwrap_err();
         assert!(message.to_string().contains("no/such.toml"), "{message}");
+    }
+
+    /// The recipe for a detector has what it promises: every sensor of its list, no ship and several, look-alikes.
+    #[test]
+    fn the_recipe_of_a_detector_covers_what_satellites_deliver() {
+        let source = Simulated::new(Recipe::detector().unwrap(), 9).unwrap();
+        let scenes: Vec<Scene> = (0..300).map(|i| source.scene(i).unwrap()).collect();
+        let sensors: BTreeSet<String> = scenes
+            .iter()
+            .map(|s| format!("{:?}", s.radar.sensor))
+            .collect();
+        assert_eq!(sensors.len(), 7, "{sensors:?}");
+        let some = |is: &dyn Fn(&Scene) -> bool| scenes.iter().filter(|s| is(s)).count();
+        assert!(
+            scenes
+                .iter()
+                .all(|s| (5.0..=25.0).contains(&s.grid.spacing))
+        );
+        assert!(scenes.iter().all(|s| s.radar.noise_floor.is_some()));
+        for count in [
+            some(&|s| s.ship.is_none() && s.sea.slick_damping > 0.0),
+            some(&|s| s.ship.is_none() && s.sea.swell_height > 0.0),
+            some(&|s| s.sea.depth < 100.0),
+            some(&|s| s.sea.gust_strength > 0.1),
+            some(&|s| s.ship.as_ref().is_some_and(|ship| ship.length < 60.0)),
+            some(&|s| s.ship.as_ref().is_some_and(|ship| ship.length > 200.0)),
+        ] {
+            assert!(count > 3, "{count}");
+        }
     }
 }

@@ -16,9 +16,9 @@ fn manifest() -> Manifest {
         "scene.grid.columns = 20",
         "scene.grid.spacing = 20",
         "scene.ship.echo = true",
-        "draw.ranges.open_sea = 0.4",
+        "draw.count = { one_of = [0, 1], weights = [2, 3] }",
         "speckle = true",
-        "draw.ranges.ship_length = [20, 300]",
+        "draw.ship.length = [20, 300]",
     ];
     let recipe = Recipe::default().with_assignments(&changes).unwrap();
     Manifest::new(recipe, 11, COUNT).unwrap()
@@ -155,8 +155,8 @@ fn a_killed_run_continues() {
 #[test]
 fn a_set_with_awkward_numbers_continues() {
     let changes = [
-        "scene.ship.position = [65.43210987654321, 1.2345678901234567e-23]",
-        "draw.ranges.place = \"fixed\"",
+        "draw.sea.depth = 65.43210987654321",
+        "draw.ship.roll = 1.2345678901234567e-23",
     ];
     let recipe = manifest().recipe.with_assignments(&changes).unwrap();
     let manifest = Manifest::new(recipe, 3, 4).unwrap();
@@ -307,7 +307,7 @@ fn other_sets_are_refused() {
     let folder = TempDir::new().unwrap();
     plant(folder.path(), &whole());
     let other_recipe = Recipe {
-        draw: Draw::Ranges(Ranges::default()),
+        draw: Draw::Values(Draws::default()),
         ..manifest().recipe
     };
     for other in [

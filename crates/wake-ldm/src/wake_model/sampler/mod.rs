@@ -114,6 +114,15 @@ impl WakeSampler {
         self.config.base_scene()
     }
 
+    /// Checks that a scene is one that the model can draw.
+    ///
+    /// # Errors
+    ///
+    /// As [`WakeModelConfig::check_scene`].
+    pub fn check_scene(&self, scene: &Scene) -> Result<()> {
+        self.config.check_scene(scene)
+    }
+
     /// An image of a prompt, with the scene that was drawn and its labels.
     ///
     /// # Errors
