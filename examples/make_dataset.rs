@@ -7,8 +7,8 @@
 //! cargo run --release --example make_dataset -- --merge
 //! ```
 //!
-//! Writes `images/*.png`, `labels/*.txt` (YOLO), `metadata.jsonl`, `coco.json`, `data.yaml` and `dataset.json`; see
-//! docs/dataset.md. A run that was killed continues where it stopped.
+//! Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (the same with oriented boxes), `labelTxt/*.txt` (DOTA),
+//! `metadata.jsonl`, `coco.json`, `data.yaml` with `train.txt` and `val.txt`, and `dataset.json`; see docs/dataset.md. A run that was killed continues where it stopped.
 
 #[path = "common/exit.rs"]
 mod exit;
@@ -42,6 +42,9 @@ struct Arguments {
     /// Seed of the whole set
     #[arg(long, default_value_t = 7)]
     seed: u64,
+    /// Share of the images that are for validation, 0 to 1
+    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
+    val_share: f64,
     /// Make only share i of n, into the folder shard-i
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -110,7 +113,7 @@ fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
     let recipe = recipe.with_assignments(&arguments.set)?;
     Ok(Manifest {
         shard: arguments.shard,
-        ..Manifest::new(recipe, arguments.seed, count)?
+        ..Manifest::new(recipe, arguments.seed, count)?.with_val_share(arguments.val_share)?
     })
 }
 

@@ -1,17 +1,21 @@
 //! Pairs to learn from, on disk or simulated.
 
 use std::error::Error;
+use std::ops::Range;
+use std::sync::Arc;
 
 use serde_json::{Value, json};
-use wake_ldm::dataset::{Folder, Manifest, Pair, Recipe, Simulated};
+use wake_ldm::dataset::{self, Folder, Manifest, Pair, Recipe, Simulated};
 use wake_ldm::network::WakeModelConfig;
 use wake_physics::Scene;
 
 use super::options::Options;
 
-pub(crate) enum Source {
-    Disk(Folder),
-    Endless(Simulated, u64),
+/// The first `count` pairs of a source.
+pub(crate) struct Source {
+    pairs: Arc<dyn dataset::Source>,
+    count: u64,
+    set: Manifest,
 }
 
 impl Source {
@@ -23,8 +27,12 @@ impl Source {
                 model: recipe.scene.model,
                 ..config.base_scene()
             };
-            let simulated = Simulated::new(recipe, options.seed)?;
-            return Ok(Self::Endless(simulated, options.count));
+            let set = Manifest::new(recipe.clone(), options.seed, options.count)?;
+            return Ok(Self {
+                pairs: Arc::new(Simulated::new(recipe, options.seed)?),
+                count: options.count,
+                set,
+            });
         };
         let folder = Folder::open(path)?;
         if folder.is_empty() {
@@ -34,33 +42,24 @@ impl Source {
             let told = |error| format!("--data {}: pair {number}: {error}", path.display());
             config.check_scene(scene).map_err(told)?;
         }
-        Ok(Self::Disk(folder))
+        Ok(Self {
+            count: folder.len(),
+            set: folder.manifest().clone(),
+            pairs: Arc::new(folder),
+        })
     }
 
-    pub(crate) fn pair(&self, index: u64) -> wake_ldm::Result<Pair> {
-        match self {
-            Self::Disk(folder) => folder.pair(index),
-            Self::Endless(simulated, _) => simulated.pair(index),
-        }
+    /// The pairs at some positions.
+    pub(crate) fn items(&self, positions: Range<u64>) -> wake_ldm::Result<Vec<Pair>> {
+        self.pairs.items(positions)
     }
 
     pub(crate) fn len(&self) -> u64 {
-        match self {
-            Self::Disk(folder) => folder.len(),
-            Self::Endless(_, count) => *count,
-        }
+        self.count
     }
 
     /// What the pairs are, as a run notes it.
-    pub(crate) fn identity(&self) -> wake_ldm::Result<Value> {
-        Ok(match self {
-            Self::Disk(folder) => {
-                json!({"set": folder.manifest(), "shard": folder.manifest().shard})
-            }
-            Self::Endless(simulated, count) => {
-                let set = Manifest::new(simulated.recipe().clone(), simulated.seed(), *count)?;
-                json!({"set": set, "shard": null})
-            }
-        })
+    pub(crate) fn identity(&self) -> Value {
+        json!({"set": self.set, "shard": self.set.shard})
     }
 }

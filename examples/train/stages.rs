@@ -93,7 +93,7 @@ impl<'a> Work<'a> {
         let source = with_data
             .then(|| Source::new(options, &config))
             .transpose()?;
-        let identity = source.as_ref().map(Source::identity).transpose()?;
+        let identity = source.as_ref().map(Source::identity);
         let identity = identity.unwrap_or_default();
         let begin = (stage, options.resume);
         Ok(Self {
@@ -136,7 +136,7 @@ impl<'a> Work<'a> {
     fn mean(&mut self, options: &Options) -> Outcome<()> {
         let source = self.source()?;
         let patches = self.patches()?;
-        let identity = json!({"data": source.identity()?, "patches": self.fingerprint(PATCHES)?});
+        let identity = json!({"data": source.identity(), "patches": self.fingerprint(PATCHES)?});
         let set = self.latents(&patches)?;
         let steps = options.steps(6000);
         let devices = options.learning_devices()?;
@@ -181,7 +181,7 @@ impl<'a> Work<'a> {
             flow: config.init_flow(&device),
         };
         let identity = json!({
-            "data": source.identity()?, "patches": self.fingerprint(PATCHES)?,
+            "data": source.identity(), "patches": self.fingerprint(PATCHES)?,
             "prior": self.fingerprint(PRIOR)?,
         });
         let set = self.latents(&model.patches)?;
@@ -244,9 +244,10 @@ impl<'a> Work<'a> {
         let count = source.len().min(FITTED);
         let bar = progress::bar(count, "images for the patch transform");
         let mut images = Vec::new();
-        for index in 0..count {
-            images.push(source.pair(index)?.image.pixels);
-            bar.inc(1);
+        for first in (0..count).step_by(AT_ONCE) {
+            let pairs = source.items(first..count.min(first + AT_ONCE as u64))?;
+            bar.inc(pairs.len() as u64);
+            images.extend(pairs.into_iter().map(|pair| pair.image.pixels));
         }
         bar.finish_and_clear();
         let pixels = images.iter().map(Vec::as_slice);
@@ -289,13 +290,13 @@ impl<'a> Work<'a> {
         let bar = progress::bar(source.len(), "pairs");
         let mut set = LatentSet::default();
         for first in (0..source.len()).step_by(AT_ONCE) {
-            let read = |index: u64| -> wake_ldm::Result<_> {
-                let Pair { image, scene, .. } = source.pair(index)?;
+            let read = |pair: Pair| -> wake_ldm::Result<_> {
+                let Pair { image, scene, .. } = pair;
                 let expected = expected_grey(&scene)?;
                 Ok(([image.pixels, expected], scene))
             };
-            let chunk = first..source.len().min(first + AT_ONCE as u64);
-            let pairs: Vec<_> = chunk.into_par_iter().map(read).collect();
+            let pairs = source.items(first..source.len().min(first + AT_ONCE as u64))?;
+            let pairs: Vec<_> = pairs.into_par_iter().map(read).collect();
             for pair in pairs {
                 let (images, scene) = pair?;
                 set.push(patches, images, scene)?;
@@ -419,8 +420,7 @@ fn vocabulary() -> Result<Vocabulary, wake_text::Error> {
 }
 
 fn sheet_examples(source: &Source) -> wake_ldm::Result<Vec<Pair>> {
-    let count = source.len().min(ACROSS);
-    (0..count).map(|index| source.pair(index)).collect()
+    source.items(0..source.len().min(ACROSS))
 }
 
 /// The mean images of some scenes.

@@ -35,6 +35,7 @@ fn wrong_recipes_shares_and_numbers_are_named() {
             ["--set", "draw.ship.speed=[12,6]"],
             ["draw.ship.speed", "[12, 6]", "lower first"],
         ),
+        (["--val-share", "2"], ["val_share", "is 2", "[0, 1]"]),
         (["--shard", "5/3"], ["--shard", "5/3", "from 0 to n"]),
         (["--shard", "half"], ["--shard", "half", "such as 0/4"]),
         (["--count", "0"], ["--count", "'0'", "1..="]),

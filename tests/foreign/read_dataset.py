@@ -52,3 +52,24 @@ for index, line in enumerate(lines):
         size = [w * grid["columns"], h * grid["rows"]]
         assert all(abs(a - b) < 1e-3 for a, b in zip(corner + size, box)), (index, found, box)
 print("COCO and YOLO agree:", len(boxes), "boxes")
+
+# So are the oriented ones: YOLO's, moved to the edge where they lie outside, and DOTA's.
+for line in lines:
+    name = pathlib.Path(line["file_name"]).with_suffix(".txt").name
+    yolo = [[float(v) for v in text.split()] for text in (folder / "labels-obb" / name).open()]
+    dota = [text.split() for text in (folder / "labelTxt" / name).open()]
+    oriented = line["objects"]["oriented"]
+    assert len(yolo) == len(dota) == len(oriented)
+    for shares, pixels, corners, category in zip(yolo, dota, oriented, line["objects"]["categories"]):
+        assert shares[0] == category and pixels[8] == ["wake", "ship"][category]
+        flat = [v for corner in corners for v in corner]
+        assert all(abs(float(a) - b) < 1e-2 for a, b in zip(pixels, flat))
+        for k, value in enumerate(flat):
+            size = grid[["columns", "rows"][k % 2]]
+            assert abs(shares[1 + k] * size - min(max(value, 0), size)) < 1e-3
+print("YOLO-OBB and DOTA agree")
+
+# Every image is in one of the two lists that data.yaml names.
+lists = [(folder / name).read_text().split() for name in ("train.txt", "val.txt")]
+assert sorted(lists[0] + lists[1]) == ["./" + line["file_name"] for line in lines]
+print(len(lists[0]), "images to train,", len(lists[1]), "to validate")

@@ -7,39 +7,45 @@ use wake_physics::labels::{Class, Labels};
 /// A box (x, y, width, height) \[pixels\], from the upper left corner of the image.
 pub(super) type Box2 = [f64; 4];
 
-/// Class and box of what is seen in the image.
-///
-/// Labels count from the centre of the first pixel, boxes from its corner, half a pixel before. Steps of 0.01 pixels.
-/// A wake has a box only where it can be seen, a ship only where its echo is drawn: what cannot be seen cannot be found.
-fn boxes(labels: &Labels, echo: bool) -> Vec<(u32, Box2)> {
-    let cornered = |[x, y, w, h]: Box2| [x + 0.5, y + 0.5, w, h].map(hundredths);
-    labels
-        .objects()
-        .into_iter()
-        .filter(|object| echo || object.class != Class::Ship)
-        .map(|object| (object.class.number(), cornered(object.box_px)))
-        .filter(|(_, [_, _, width, height])| *width > 0.0 && *height > 0.0)
-        .collect()
-}
+/// Corners (x, y) \[pixels\], from the upper left corner of the image; they may lie outside it.
+pub(super) type Corners = [[f64; 2]; 4];
 
 fn hundredths(value: f64) -> f64 {
     (100.0 * value).round() / 100.0
 }
 
 /// Boxes and their classes, as readers of image folders expect them.
+///
+/// Labels count from the centre of the first pixel, boxes from its corner, half a pixel before. Steps of 0.01 pixels.
+/// A wake has a box only where it can be seen, a ship only where its echo is drawn: what cannot be seen cannot be found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Objects {
-    /// (x, y, width, height) of each box, from the corner of the image \[pixels\].
+    /// (x, y, width, height) of each box \[pixels\].
     pub(super) bbox: Vec<Box2>,
+    /// Corners of the box along the track: port ahead, starboard ahead, starboard astern, port astern.
+    pub(super) oriented: Vec<Corners>,
     /// Class of each: 0 wake, 1 ship.
     pub(super) categories: Vec<u32>,
 }
 
 impl Objects {
-    /// What is seen of some labels; `echo`: whether the ship itself is drawn.
-    pub(super) fn of(labels: &Labels, echo: bool) -> Self {
-        let (categories, bbox) = boxes(labels, echo).into_iter().unzip();
-        Self { bbox, categories }
+    /// What is seen of some labels.
+    pub(super) fn of(labels: &Labels) -> Self {
+        let mut objects = Self::default();
+        for object in labels.objects() {
+            let [x, y, w, h] = object.box_px;
+            let bbox = [x + 0.5, y + 0.5, w, h].map(hundredths);
+            // A sliver at the edge may have no pixel's hundredth in the image.
+            if bbox[2] > 0.0 && bbox[3] > 0.0 {
+                objects.bbox.push(bbox);
+                let corners = object.oriented_box_px;
+                objects
+                    .oriented
+                    .push(corners.map(|corner| corner.map(|v| hundredths(v + 0.5))));
+                objects.categories.push(object.class.number());
+            }
+        }
+        objects
     }
 }
 
@@ -129,13 +135,44 @@ pub(super) fn yolo(objects: &Objects, [rows, columns]: [usize; 2]) -> String {
     text
 }
 
+/// The lines `class x1 y1 x2 y2 x3 y3 x4 y4` of oriented boxes for YOLO, as shares of the image. Its readers drop images
+/// with corners outside, so each of these moves to the nearest place in the image.
+pub(super) fn yolo_oriented(objects: &Objects, [rows, columns]: [usize; 2]) -> String {
+    let mut text = String::new();
+    for (class, corners) in objects.categories.iter().zip(&objects.oriented) {
+        let share = |value: f64, size: usize| (value / size as f64).clamp(0.0, 1.0);
+        let _ = write!(text, "{class}");
+        for [x, y] in corners {
+            let _ = write!(text, " {:.6} {:.6}", share(*x, columns), share(*y, rows));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The lines `x1 y1 x2 y2 x3 y3 x4 y4 class difficult` of oriented boxes as the data set DOTA has them, in pixels.
+pub(super) fn dota(objects: &Objects) -> String {
+    let mut text = String::new();
+    for (&class, corners) in objects.categories.iter().zip(&objects.oriented) {
+        for [x, y] in corners {
+            let _ = write!(text, "{x:.2} {y:.2} ");
+        }
+        let name = match class == Class::Ship.number() {
+            true => Class::Ship.name(),
+            false => Class::Wake.name(),
+        };
+        let _ = writeln!(text, "{name} 0");
+    }
+    text
+}
+
 /// The content of `data.yaml`.
 pub(super) fn data_yaml() -> String {
     let names: String = [Class::Wake, Class::Ship]
         .map(|class| format!("  {}: {}\n", class.number(), class.name()))
         .concat();
     format!(
-        "# For validation name another set, made with another seed.\ntrain: images\nval: images\nnames:\n{names}"
+        "# Lists of images beside this file; no scene is in both.\ntrain: train.txt\nval: val.txt\nnames:\n{names}"
     )
 }
 
@@ -188,25 +225,34 @@ mod tests {
     /// Labels count from the centre of the first pixel, boxes from its corner; steps of 0.01.
     #[test]
     fn boxes_are_those_of_the_labels_from_the_corner() {
-        let wake = (0, [11.05, 45.5, 38.89, 55.0]);
-        assert_eq!(boxes(&drawn(), false), [wake]);
-        let ship = (1, [29.85, 45.5, 1.3, 10.0]);
-        assert_eq!(boxes(&drawn(), true), [wake, ship]);
+        let objects = Objects::of(&drawn());
+        assert_eq!(objects.categories, [0, 1]);
+        let (wake, ship) = ([11.05, 45.5, 38.89, 55.0], [29.85, 45.5, 1.3, 10.0]);
+        assert_eq!(objects.bbox, [wake, ship]);
+        let corners = [[29.85, 45.5], [31.15, 45.5], [31.15, 55.5], [29.85, 55.5]];
+        assert_eq!(objects.oriented, [corners; 2]);
+        let mut sliver = drawn();
+        sliver.ships[0].wake.box_px = Some([3.0, 4.0, 0.004, 9.0]);
+        assert_eq!(Objects::of(&sliver).categories, [1]);
     }
 
     #[test]
     fn open_sea_and_ships_at_rest_have_no_wake() {
         let mut scene = northward();
-        scene.ships[0].speed = 0.0;
-        assert!(boxes(&labels_of(&scene), false).is_empty());
-        scene.ships.clear();
-        assert!(boxes(&labels_of(&scene), true).is_empty());
+        scene.ship.as_mut().unwrap().speed = 0.0;
+        assert_eq!(Objects::of(&labels_of(&scene)), Objects::default());
+        scene.ship = None;
+        assert_eq!(Objects::of(&labels_of(&scene)), Objects::default());
     }
 
     #[test]
     fn yolo_states_centres_and_sizes_as_shares() {
         let objects = Objects {
             bbox: vec![[10.0, 20.0, 30.0, 40.0], [0.0, 0.0, 200.0, 100.0]],
+            oriented: vec![
+                [[10.0, 20.0], [40.0, 20.0], [40.0, 60.0], [10.0, 60.0]],
+                [[-20.0, 50.0], [100.0, -10.0], [220.0, 50.0], [100.0, 110.0]],
+            ],
             categories: vec![0, 1],
         };
         let text = yolo(&objects, [100, 200]);
@@ -215,13 +261,28 @@ mod tests {
             "0 0.125000 0.400000 0.150000 0.400000\n1 0.500000 0.500000 1.000000 1.000000\n"
         );
         assert_eq!(yolo(&Objects::default(), [100, 200]), "");
+        let text = yolo_oriented(&objects, [100, 200]);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "0 0.050000 0.200000 0.200000 0.200000 0.200000 0.600000 0.050000 0.600000"
+        );
+        assert_eq!(
+            lines[1],
+            "1 0.000000 0.500000 0.500000 0.000000 1.000000 0.500000 0.500000 1.000000"
+        );
+        assert_eq!(
+            dota(&objects),
+            "10.00 20.00 40.00 20.00 40.00 60.00 10.00 60.00 wake 0\n\
+             -20.00 50.00 100.00 -10.00 220.00 50.00 100.00 110.00 ship 0\n"
+        );
         assert!(data_yaml().ends_with("names:\n  0: wake\n  1: ship\n"));
     }
 
     #[test]
     fn coco_counts_from_one_and_points_to_images() {
         let images = [(4, drawn()), (5, Labels::default()), (6, drawn())]
-            .map(|(index, labels)| (index, image_name(index), Objects::of(&labels, true)));
+            .map(|(index, labels)| (index, image_name(index), Objects::of(&labels)));
         let images = images
             .iter()
             .map(|(index, name, objects)| (*index, name.as_str(), objects));
@@ -260,7 +321,7 @@ mod tests {
         let source = Simulated::new(Recipe::default(), 2).unwrap();
         let mut wakes = 0;
         for index in 0..300 {
-            let objects = Objects::of(&source.pair_without_image(index).unwrap().labels, true);
+            let objects = Objects::of(&source.pair_without_image(index).unwrap().labels);
             let text = yolo(&objects, [256, 256]);
             assert_eq!(text.lines().count(), objects.bbox.len());
             for (line, [x, y, w, h]) in text.lines().zip(&objects.bbox) {

@@ -1,8 +1,9 @@
 //! Where the files of a data set lie, and what it says of itself.
 
-use super::recipe::Recipe;
-use super::scenes::Simulated;
-use crate::error::{Error, Result};
+use super::folder::shuffled;
+use super::recipe::{Draw, Recipe};
+use super::scenes::{PAPER_SCENES, Simulated};
+use crate::error::{Error, Result, check_range};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -10,7 +11,9 @@ use std::path::{Path, PathBuf};
 use wake_physics::grey::GreyScale;
 
 /// Version of the layout; a reader refuses others.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
+/// Share of the images that are for validation, unless another is asked for.
+const VAL_SHARE: f64 = 0.1;
 
 /// What a data set is: the content of its `dataset.json`, from which every other file follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,6 +27,8 @@ pub struct Manifest {
     pub count: u64,
     /// The mapping from σ⁰ to grey.
     pub grey: GreyScale,
+    /// Share of the images that are for validation, 0 to 1.
+    pub val_share: f64,
     /// Which scenes.
     pub recipe: Recipe,
     /// Which share of the set this folder holds, if not all: the content of `shard.json`.
@@ -68,8 +73,31 @@ impl Manifest {
             count,
             shard: None,
             grey: GreyScale::default(),
+            val_share: VAL_SHARE,
             recipe,
         })
+    }
+
+    /// The same set with another share for validation.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] for a share outside 0 to 1.
+    pub fn with_val_share(self, val_share: f64) -> Result<Self> {
+        check_range("val_share", val_share, 0.0, 1.0)?;
+        Ok(Self { val_share, ..self })
+    }
+
+    /// Whether image `index` is for validation: the share of all, chosen by the seed. The images of one scene of the
+    /// paper's grid, which differ in their seas alone, stay together.
+    pub(super) fn is_val(&self, index: u64) -> bool {
+        let scenes = match self.recipe.draw {
+            Draw::PaperGrid => self.count.min(PAPER_SCENES),
+            Draw::Values(_) => self.count,
+        };
+        let scenes = scenes.max(1);
+        let val = (self.val_share * scenes as f64).round() as u64;
+        shuffled(index % scenes, scenes, self.seed) < val
     }
 
     /// The pairs that it makes.
@@ -155,18 +183,21 @@ impl Layout<'_> {
         self.0.join("data.yaml")
     }
 
-    pub(super) fn images(self) -> PathBuf {
-        self.0.join("images")
+    /// Folders of the images and of their labels: YOLO, YOLO with oriented boxes, DOTA.
+    pub(super) fn folders(self) -> [PathBuf; 4] {
+        ["images", "labels", "labels-obb", "labelTxt"].map(|name| self.0.join(name))
     }
 
-    pub(super) fn labels(self) -> PathBuf {
-        self.0.join("labels")
+    /// The lists of images to train with, and to validate with.
+    pub(super) fn lists(self) -> [PathBuf; 2] {
+        ["train.txt", "val.txt"].map(|name| self.0.join(name))
     }
 
-    /// The image and the YOLO labels of one pair.
-    pub(super) fn files_of(self, index: u64) -> [PathBuf; 2] {
-        let labels = self.labels().join(format!("{index:06}.txt"));
-        [self.0.join(image_name(index)), labels]
+    /// The image of one pair and its labels, as in [`Self::folders`].
+    pub(super) fn files_of(self, index: u64) -> [PathBuf; 4] {
+        let [_, labels @ ..] = self.folders();
+        let [upright, oriented, dota] = labels.map(|folder| folder.join(format!("{index:06}.txt")));
+        [self.0.join(image_name(index)), upright, oriented, dota]
     }
 
     pub(super) fn shard(self, shard: Shard) -> PathBuf {

@@ -156,11 +156,14 @@ fn remove(path: &Path) -> Result<()> {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(cannot("remove", path, e)),
         _ => Ok(()),
     };
-    for inner in [layout.images(), layout.labels()] {
+    for inner in layout.folders() {
         gone(std::fs::remove_dir(inner))?;
     }
+    let [train, val] = layout.lists();
     for file in [
         layout.coco(),
+        train,
+        val,
         layout.yolo(),
         layout.metadata(),
         layout.shard_note(),

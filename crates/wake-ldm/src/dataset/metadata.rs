@@ -27,14 +27,14 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The line of a pair; `echo`: whether the ship itself is drawn.
-    pub(super) fn of(pair: &Pair, echo: bool) -> Self {
+    /// The line of a pair.
+    pub(super) fn of(pair: &Pair) -> Self {
         Self {
             file_name: image_name(pair.index),
             text: pair.prompt.clone(),
             columns: Columns::of(&pair.scene),
             scene: pair.scene.clone(),
-            objects: Objects::of(&pair.labels, echo),
+            objects: Objects::of(&pair.labels),
         }
     }
 }
@@ -42,7 +42,7 @@ impl Row {
 /// The values of a scene that a data set varies, a column of its table each, so that other readers need not know scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Columns {
-    /// Whether there is a ship; without one the values of the ship are `None`, of several they are the first one's.
+    /// Whether there is a ship; without one the values of the ship are `None`.
     ship: bool,
     ship_speed: Option<f64>,
     ship_heading: Option<f64>,
@@ -58,9 +58,9 @@ struct Columns {
 
 impl Columns {
     fn of(scene: &Scene) -> Self {
-        let ship = |value: fn(&Ship) -> f64| scene.ships.first().map(value);
+        let ship = |value: fn(&Ship) -> f64| scene.ship.as_ref().map(value);
         Self {
-            ship: !scene.ships.is_empty(),
+            ship: scene.ship.is_some(),
             ship_speed: ship(|s| s.speed),
             ship_heading: ship(|s| s.heading),
             ship_x: ship(|s| s.position[0]),
@@ -135,12 +135,6 @@ impl Log {
     }
 }
 
-/// Whether the ship itself is drawn.
-pub(super) fn echo(manifest: &Manifest) -> bool {
-    let ships = &manifest.recipe.scene.ships;
-    ships.iter().any(|ship| ship.echo)
-}
-
 /// A row as its line.
 fn line(row: &Row) -> Result<String> {
     let text = serde_json::to_string(row);
@@ -165,10 +159,10 @@ pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Row
 
 /// Checks that the lines are those that this set makes, byte for byte.
 fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<()> {
-    let (source, echo) = (manifest.source()?, echo(manifest));
+    let source = manifest.source()?;
     let lines = text.split_inclusive(|&b| b == b'\n');
     for (at, (found, (index, _))) in lines.zip(rows).enumerate() {
-        let row = Row::of(&source.pair_without_image(*index)?, echo);
+        let row = Row::of(&source.pair_without_image(*index)?);
         if found != line(&row)?.as_bytes() {
             let message = format!("not the line of pair {index} of this recipe and seed");
             return Err(broken(path, at + 1, message));

@@ -81,8 +81,10 @@ fn the_files_are_those_of_the_documentation() {
         "dataset.json".into(),
     ];
     expected.extend((0..COUNT).map(|i| format!("images/00000{i}.png")));
-    expected.extend((0..COUNT).map(|i| format!("labels/00000{i}.txt")));
-    expected.push("metadata.jsonl".into());
+    for folder in ["labelTxt", "labels", "labels-obb"] {
+        expected.extend((0..COUNT).map(|i| format!("{folder}/00000{i}.txt")));
+    }
+    expected.extend(["metadata.jsonl", "train.txt", "val.txt"].map(String::from));
     assert_eq!(names, expected);
 }
 
@@ -129,7 +131,12 @@ fn a_killed_run_continues() {
         for cut in [kept, kept + 40, ends[lines] - 1] {
             let folder = TempDir::new().unwrap();
             let mut left = whole.clone();
-            left.retain(|name, _| !matches!(name.to_str(), Some("coco.json" | "data.yaml")));
+            left.retain(|name, _| {
+                !matches!(
+                    name.to_str(),
+                    Some("coco.json" | "train.txt" | "val.txt" | "data.yaml")
+                )
+            });
             left.insert(metadata.clone(), log[..cut].to_vec());
             let ahead = (lines as u64 + 2).min(COUNT);
             for index in ahead..COUNT {
@@ -179,7 +186,12 @@ fn a_set_with_awkward_numbers_continues() {
 #[test]
 fn lost_files_are_made_again() {
     let whole = whole();
-    for lost in ["images/000002.png", "labels/000005.txt"] {
+    for lost in [
+        "images/000002.png",
+        "labels/000005.txt",
+        "labels-obb/000001.txt",
+        "labelTxt/000000.txt",
+    ] {
         let folder = TempDir::new().unwrap();
         plant(folder.path(), &whole);
         fs::remove_file(folder.path().join(lost)).unwrap();
@@ -225,7 +237,7 @@ fn a_killed_merge_continues() {
         .keys()
         .filter(|p| p.components().count() == 3)
         .collect();
-    assert_eq!(movable.len(), 2 * COUNT as usize);
+    assert_eq!(movable.len(), 4 * COUNT as usize);
     let mut left = start.clone();
     left.insert(
         "dataset.json".into(),
@@ -236,7 +248,13 @@ fn a_killed_merge_continues() {
         let content = left.remove(name).unwrap();
         left.insert(name.iter().skip(1).collect(), content);
     }
-    for name in ["metadata.jsonl", "coco.json", "data.yaml"] {
+    for name in [
+        "metadata.jsonl",
+        "coco.json",
+        "train.txt",
+        "val.txt",
+        "data.yaml",
+    ] {
         check(&left, &format!("before {name}"));
         left.insert(name.into(), whole[Path::new(name)].clone());
     }
@@ -245,9 +263,11 @@ fn a_killed_merge_continues() {
         .filter(|p| p.starts_with("shard-0"))
         .cloned()
         .collect();
-    assert_eq!(leftovers.len(), 5);
+    assert_eq!(leftovers.len(), 7);
     for name in [
         "coco.json",
+        "train.txt",
+        "val.txt",
         "data.yaml",
         "metadata.jsonl",
         "shard.json",
@@ -464,6 +484,46 @@ fn a_full_disk_is_one_sentence_and_loses_nothing() {
     fs::remove_dir_all(path.join("images/000004.png")).unwrap();
     assert_eq!(made(path, &manifest()), 1);
     assert_eq!(tree(path), whole);
+}
+
+/// Every image is in one list; the share is kept to half an image, and other seeds choose others. What the paper's grid
+/// shows twice is on one side.
+#[test]
+fn training_and_validation_share_no_scene() {
+    let split = |manifest: &Manifest| -> Vec<bool> {
+        (0..manifest.count).map(|i| manifest.is_val(i)).collect()
+    };
+    let set = |seed| Manifest {
+        seed,
+        count: 200,
+        ..manifest()
+    };
+    for share in [0.0, 0.1, 0.333, 1.0] {
+        let val = split(&set(1).with_val_share(share).unwrap());
+        let count = val.iter().filter(|&&v| v).count() as f64;
+        assert!((count - 200.0 * share).abs() <= 0.5, "{share}: {count}");
+    }
+    assert_ne!(split(&set(1)), split(&set(2)));
+    assert!(
+        set(1)
+            .with_val_share(1.5)
+            .unwrap_err()
+            .to_string()
+            .contains("val_share is 1.5")
+    );
+    let grid = Manifest::new(Recipe::paper(), 1, 8000).unwrap();
+    let val = split(&grid);
+    assert!((0..8000).all(|i| val[i] == val[i % 3456]));
+    let whole = whole();
+    let list = |name: &str| String::from_utf8(whole[Path::new(name)].clone()).unwrap();
+    let (train, val) = (list("train.txt"), list("val.txt"));
+    let mut all: Vec<&str> = train.lines().chain(val.lines()).collect();
+    all.sort_unstable();
+    let images: Vec<String> = (0..COUNT)
+        .map(|i| format!("./images/00000{i}.png"))
+        .collect();
+    assert_eq!(all, images);
+    assert_eq!(val.lines().count(), 1);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Makes a data set in a folder, or what is missing of it.
 
-use super::annotations::{Coco, data_yaml, yolo};
+use super::annotations::{Coco, data_yaml, dota, yolo, yolo_oriented};
 use super::layout::{Layout, Manifest, Shard, broken, cannot};
-use super::metadata::{Log, Row, Rows, echo};
+use super::metadata::{Log, Row, Rows};
 use super::ordered::Ordered;
 use crate::error::Result;
 use std::path::Path;
@@ -82,7 +82,7 @@ pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Resu
             return Err(broken(folder, 0, message));
         }
     }
-    for inner in [layout.images(), layout.labels()] {
+    for inner in layout.folders() {
         output::make_folder(&inner)?;
     }
     Ok(lock)
@@ -110,10 +110,11 @@ fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
 /// Indices without a line, or without their files.
 fn missing(folder: &Path, manifest: &Manifest, lines: usize) -> Vec<u64> {
     let start = manifest.indices().start;
-    let [image, labels] = [0, 1]
-        .map(|which| move |index: u64| std::fs::metadata(&Layout(folder).files_of(index)[which]));
-    let is_there =
-        |index: u64| image(index).is_ok_and(|file| file.len() > 0) && labels(index).is_ok();
+    let is_there = |index: u64| {
+        let [image, labels @ ..] = Layout(folder).files_of(index);
+        std::fs::metadata(image).is_ok_and(|file| file.len() > 0)
+            && labels.iter().all(|labels| labels.exists())
+    };
     manifest
         .indices()
         .filter(|&index| index - start >= lines as u64 || !is_there(index))
@@ -127,16 +128,23 @@ fn make(
     jobs: usize,
     indices: Vec<u64>,
 ) -> Result<Ordered<(u64, Row)>> {
-    let (source, echo) = (manifest.source()?, echo(manifest));
+    let source = manifest.source()?;
     let folder = folder.to_owned();
     Ordered::new(indices.into_iter(), jobs, move |index| {
         let pair = source.pair(index)?;
-        let row = Row::of(&pair, echo);
-        let [image, labels] = Layout(&folder).files_of(index);
-        let (rows, columns) = (pair.image.rows, pair.image.columns);
-        output::write_png(&image, &pair.image.levels(), rows, columns)?;
-        let text = yolo(&row.objects, [rows, columns]);
-        output::write_atomically(&labels, text.as_bytes())?;
+        let row = Row::of(&pair);
+        let [image, labels @ ..] = Layout(&folder).files_of(index);
+        let size = [pair.image.rows, pair.image.columns];
+        output::write_png(&image, &pair.image.levels(), size[0], size[1])?;
+        let objects = &row.objects;
+        let texts = [
+            yolo(objects, size),
+            yolo_oriented(objects, size),
+            dota(objects),
+        ];
+        for (path, text) in labels.iter().zip(texts) {
+            output::write_atomically(path, text.as_bytes())?;
+        }
         Ok((index, row))
     })
 }
@@ -149,6 +157,15 @@ pub(super) fn finish(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<
         .map(|(index, row)| (*index, row.file_name.as_str(), &row.objects));
     let coco = Coco::of(images, [grid.rows, grid.columns]);
     output::write_json(&layout.coco(), &coco)?;
+    for (path, val) in layout.lists().iter().zip([false, true]) {
+        let of = rows
+            .iter()
+            .filter(|(index, _)| manifest.is_val(*index) == val);
+        let list: String = of
+            .map(|(_, row)| format!("./{}\n", row.file_name))
+            .collect();
+        output::write_atomically(path, list.as_bytes())?;
+    }
     output::write_atomically(&layout.yolo(), data_yaml().as_bytes())?;
     Ok(())
 }
