@@ -11,9 +11,10 @@
 use crate::quadrature::GaussLegendre;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
 
-/// Nodes of the integrals over the window: exact to rounding up to the distance [`FARTHEST`].
-const NODES: usize = 96;
+/// The rule of the integrals over the window: exact to rounding up to the distance [`FARTHEST`].
+static RULE: LazyLock<GaussLegendre> = LazyLock::new(|| GaussLegendre::new(96));
 
 /// Farthest sidelobe looked at \[1/B\].
 const FARTHEST: f64 = 20.0;
@@ -91,9 +92,7 @@ impl Window {
     /// Energy of h² outside the main lobe over all of it \[dB\].
     #[must_use]
     pub fn integrated_sidelobes(self) -> f64 {
-        let main = 2.0
-            * GaussLegendre::new(NODES)
-                .integrate([0.0, self.first_null()], |x| self.response(x).powi(2));
+        let main = 2.0 * RULE.integrate([0.0, self.first_null()], |x| self.response(x).powi(2));
         // Parseval: ∫h² dx = ∫W² df/(∫W df)².
         let all = self.moment(2) / self.moment(1).powi(2);
         10.0 * (1.0 - main / all).log10()
@@ -170,7 +169,7 @@ impl Window {
         if shift >= 1.0 {
             return 0.0;
         }
-        let common = GaussLegendre::new(NODES).integrate([shift - 0.5, 0.5], |f| {
+        let common = RULE.integrate([shift - 0.5, 0.5], |f| {
             self.weight(f) * self.weight(f - shift)
         });
         (common / self.moment(2)).powi(2)
@@ -203,7 +202,7 @@ fn equivalent(count: u32, correlation: impl Fn(u32) -> f64) -> f64 {
 
 /// ∫ over the bandwidth.
 fn over_band(f: impl Fn(f64) -> f64) -> f64 {
-    GaussLegendre::new(NODES).integrate([-0.5, 0.5], f)
+    RULE.integrate([-0.5, 0.5], f)
 }
 
 /// The zero of a function that falls from `from` to `to`, by bisection.

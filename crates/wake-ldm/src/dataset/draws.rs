@@ -139,7 +139,9 @@ impl Draws {
     pub(super) fn validate(&self, base: &Scene) -> Result<()> {
         for case in 0..self.together.len().max(1) {
             let chosen = self.case(case);
-            for (&path, distribution) in &chosen {
+            // What all scenes have is looked at once, with the first table of `together`.
+            let own = |path: &str| case == 0 || self.together[case].1.contains_key(path);
+            for (&path, distribution) in chosen.iter().filter(|(path, _)| own(path)) {
                 self.own(path, distribution)?;
                 for value in distribution.extremes() {
                     let fixed = Distribution::Fixed(value);
