@@ -156,11 +156,13 @@ impl Recipe {
     /// [`Error::Recipe`] with the key or line at fault, [`Error::InvalidOption`] for something that is no distribution,
     /// [`Error::Scene`] for a value out of its range.
     pub fn from_toml(text: &str) -> Result<Self> {
-        let base = toml::from_str::<toml::Table>(text).ok();
-        match base.as_ref().and_then(|table| table.get("base")?.as_str()) {
-            Some(name) => Self::named(name)?.merged(text),
-            None => Self::default().merged(text),
-        }
+        let mut changes = parsed(text)?;
+        let base = match changes.remove("base") {
+            None => Self::default(),
+            Some(toml::Value::String(name)) => Self::named(&name)?,
+            Some(other) => Self::named(&other.to_string())?,
+        };
+        base.changed(changes, text)
     }
 
     /// Reads a recipe file and checks it.
@@ -196,12 +198,14 @@ impl Recipe {
     }
 
     fn merged(&self, text: &str) -> Result<Self> {
+        self.changed(parsed(text)?, text)
+    }
+
+    /// This recipe with the values of a table in the place of its own; `text`: what the table was read from.
+    fn changed(&self, mut changes: toml::Table, text: &str) -> Result<Self> {
         let fail = |message: String| Error::Recipe {
             message: sentence(&message),
         };
-        let mut changes: toml::Table =
-            toml::from_str(text).map_err(|e| fail(one_line(text, &e)))?;
-        changes.remove("base");
         let draw = match changes.remove("draw") {
             Some(change) => self.draw.clone().with(&change)?,
             None => self.draw.clone(),
@@ -228,6 +232,13 @@ impl Recipe {
             Draw::Values(draws) => draws.validate(&self.scene),
         }
     }
+}
+
+/// A text of TOML as its table.
+fn parsed(text: &str) -> Result<toml::Table> {
+    toml::from_str(text).map_err(|e| Error::Recipe {
+        message: sentence(&one_line(text, &e)),
+    })
 }
 
 /// What is wrong with a text, and in which line or table of it.

@@ -408,7 +408,14 @@ mod tests {
                 .draw,
             Draw::PaperGrid
         );
-        for bad in ["speckle", "=3", "speckle=maybe", "scene.sea", "draw=fast"] {
+        for bad in [
+            "speckle",
+            "=3",
+            "speckle=maybe",
+            "scene.sea",
+            "draw=fast",
+            "base=paper",
+        ] {
             assert!(Recipe::default().with_assignments(&[bad]).is_err(), "{bad}");
         }
     }
@@ -419,6 +426,7 @@ mod tests {
             ("speckles = true", "speckles"),
             ("draw = \"papers\"", "papers"),
             ("base = \"papers\"", "paper, ranges or detector"),
+            ("base = 3", "paper, ranges or detector"),
             ("[draw.ship]\nsped = [1, 2]", "sped"),
             ("[draw]\nseed = [1, 2]", "seed of its own"),
             ("[draw.grid]\nrows = [16, 32]", "one size"),
