@@ -27,7 +27,7 @@ impl Source for Painted {
             let Sample { pixels, wakes, .. } = self.sample(index);
             let levels: Vec<u8> = pixels.iter().map(|&p| p as u8).collect();
             let mut scene = Scene {
-                ship: None,
+                ships: Vec::new(),
                 seed: index,
                 ..Scene::default()
             };

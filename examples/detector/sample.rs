@@ -130,7 +130,7 @@ fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
     let middle = [(grid.columns / 2) as f64, (grid.rows / 2) as f64];
     let pixel = |[x, y]: [f64; 2]| [middle[0] + x / grid.spacing, middle[1] - y / grid.spacing];
     let mut wakes = Vec::new();
-    for ship in scene.ship.iter().filter(|ship| ship.speed > 0.0) {
+    for ship in scene.ships.iter().filter(|ship| ship.speed > 0.0) {
         let axis = (ship.heading + 180.0).rem_euclid(360.0);
         let astern = [axis.to_radians().sin(), axis.to_radians().cos()];
         let stern = [0, 1].map(|a| ship.position[a] + 0.5 * ship.length * astern[a]);

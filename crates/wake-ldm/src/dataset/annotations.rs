@@ -239,9 +239,9 @@ mod tests {
     #[test]
     fn open_sea_and_ships_at_rest_have_no_wake() {
         let mut scene = northward();
-        scene.ship.as_mut().unwrap().speed = 0.0;
+        scene.ships[0].speed = 0.0;
         assert_eq!(Objects::of(&labels_of(&scene)), Objects::default());
-        scene.ship = None;
+        scene.ships.clear();
         assert_eq!(Objects::of(&labels_of(&scene)), Objects::default());
     }
 

@@ -42,7 +42,7 @@ impl Row {
 /// The values of a scene that a data set varies, a column of its table each, so that other readers need not know scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Columns {
-    /// Whether there is a ship; without one the values of the ship are `None`.
+    /// Whether there is a ship; without one the values of the ship are `None`, of several they are the first one's.
     ship: bool,
     ship_speed: Option<f64>,
     ship_heading: Option<f64>,
@@ -58,9 +58,9 @@ struct Columns {
 
 impl Columns {
     fn of(scene: &Scene) -> Self {
-        let ship = |value: fn(&Ship) -> f64| scene.ship.as_ref().map(value);
+        let ship = |value: fn(&Ship) -> f64| scene.ships.first().map(value);
         Self {
-            ship: scene.ship.is_some(),
+            ship: !scene.ships.is_empty(),
             ship_speed: ship(|s| s.speed),
             ship_heading: ship(|s| s.heading),
             ship_x: ship(|s| s.position[0]),

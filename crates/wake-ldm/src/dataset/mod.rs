@@ -14,7 +14,7 @@
 //! let mut batches = Loader::new(source).batch(2).threads(2).on(&Device::default())?;
 //! let batch = batches.next().expect("there is always a next one")?;
 //! assert_eq!(batch.images.dims(), [2, 1, 32, 32]);
-//! println!("{:?}, {:?}", batch.scenes[0].ship, batch.objects[0]);
+//! println!("{:?}, {:?}", batch.scenes[0].ships, batch.objects[0]);
 //! # Ok::<(), wake_ldm::Error>(())
 //! ```
 

@@ -180,7 +180,7 @@ mod tests {
             prop_assert!(within(scene.sea.wind_speed, ranges.wind, 0.1));
             prop_assert!(within(scene.sea.fetch, ranges.fetch, 1.0));
             prop_assert!(within(scene.radar.incidence, ranges.incidence, 1.0));
-            if let Some(ship) = &scene.ship {
+            for ship in &scene.ships {
                 prop_assert!(within(ship.speed, ranges.speed, 0.1));
                 prop_assert!(turned_within(ship.heading, ranges.heading));
                 prop_assert!(within(ship.length, ranges.length, 0.1));
@@ -214,7 +214,7 @@ mod tests {
         let source = simulated(&[], 3);
         let n = 4000;
         let scenes: Vec<Scene> = (0..n).map(|i| source.scene(i).unwrap()).collect();
-        let ships: Vec<_> = scenes.iter().filter_map(|s| s.ship.clone()).collect();
+        let ships: Vec<_> = scenes.iter().flat_map(|s| s.ships.clone()).collect();
         // Five standard deviations of a binomial count.
         let empty = (n as usize - ships.len()) as f64;
         assert!((empty - 0.2 * n as f64).abs() < 5.0 * (0.16 * n as f64).sqrt());
@@ -273,7 +273,7 @@ mod tests {
                 simulated(&[], 3).scene(index).unwrap(),
                 other.scene(index).unwrap(),
             );
-            if let (Some(ship), Some(own)) = (&mut scene.ship, &one.ship) {
+            for (ship, own) in scene.ships.iter_mut().zip(&one.ships) {
                 assert!(ship.speed <= 2.0);
                 ship.speed = own.speed;
             }
@@ -343,8 +343,8 @@ mod tests {
             values.len()
         };
         let counts = [
-            distinct(|s| s.ship.as_ref().unwrap().speed),
-            distinct(|s| s.ship.as_ref().unwrap().heading),
+            distinct(|s| s.ships[0].speed),
+            distinct(|s| s.ships[0].heading),
             distinct(|s| s.sea.wind_speed),
             distinct(|s| s.sea.wind_toward),
             distinct(|s| s.sea.fetch),
@@ -491,12 +491,13 @@ mod tests {
         );
         assert!(scenes.iter().all(|s| s.radar.noise_floor.is_some()));
         for count in [
-            some(&|s| s.ship.is_none() && s.sea.slick_damping > 0.0),
-            some(&|s| s.ship.is_none() && s.sea.swell_height > 0.0),
+            some(&|s| s.ships.is_empty() && s.sea.slick_damping > 0.0),
+            some(&|s| s.ships.is_empty() && s.sea.swell_height > 0.0),
             some(&|s| s.sea.depth < 100.0),
             some(&|s| s.sea.gust_strength > 0.1),
-            some(&|s| s.ship.as_ref().is_some_and(|ship| ship.length < 60.0)),
-            some(&|s| s.ship.as_ref().is_some_and(|ship| ship.length > 200.0)),
+            some(&|s| s.ships.iter().any(|ship| ship.length < 60.0)),
+            some(&|s| s.ships.len() > 2),
+            some(&|s| s.ships.iter().any(|ship| ship.length > 200.0)),
         ] {
             assert!(count > 3, "{count}");
         }
