@@ -1,10 +1,11 @@
 //! The architecture page holds: every room stands in it, imports point up its lists and never round in a circle, its
-//! picture is that of the code, and files stay small.
+//! picture is that of the code, and files stay small. The page of scene keys is that of the types.
 //!
-//! `DRAW=1 cargo test --test tidy` draws the picture anew.
+//! `DRAW=1 cargo test --test tidy` writes picture and page anew.
 
 mod imports;
 mod picture;
+mod scene_keys;
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -175,15 +176,26 @@ fn the_picture_is_that_of_the_code() {
             rooms: rooms.iter().map(|room| room.join("/")).collect(),
         }
     });
-    let drawn = picture::draw(&columns);
-    let path = root().join("docs/architecture.svg");
+    is_drawn("docs/architecture.svg", &picture::draw(&columns));
+}
+
+#[test]
+fn the_page_of_scene_keys_is_that_of_the_code() {
+    let (page, wrong) = scene_keys::page(&root().join("crates/wake-physics/src/scene"));
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    is_drawn("docs/scene_keys.md", &page);
+}
+
+/// Asserts that a file of the documentation is what the code makes of it, or writes it where `DRAW` is set.
+fn is_drawn(name: &str, drawn: &str) {
+    let path = root().join(name);
     if std::env::var_os("DRAW").is_some() {
-        fs::write(&path, &drawn).expect("a writable picture");
+        fs::write(&path, drawn).expect("a writable file");
     }
     let kept = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         kept == drawn,
-        "docs/architecture.svg is old: `DRAW=1 cargo test --test tidy` draws it"
+        "{name} is old: `DRAW=1 cargo test -p wake --no-default-features --test tidy` writes it"
     );
 }
 
