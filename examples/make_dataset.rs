@@ -28,6 +28,7 @@ const PAPER_COUNT: u64 = 3456;
 
 /// Simulate a labelled data set of ship wakes.
 #[derive(Parser)]
+#[command(version)]
 struct Arguments {
     /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), detector (what satellites
     /// deliver), or a TOML file

@@ -18,6 +18,10 @@ use wake_text::{Reading, TOKENS, Tokenizer, Tokens};
 
 /// Turns a scene into a prompt and its CLIP tokens, or reads a prompt back.
 #[derive(Parser)]
+#[command(
+    version,
+    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
+)]
 struct Arguments {
     /// Scene file (TOML); without it and without --text, the default scene.
     #[arg(long, value_name = "FILE", conflicts_with = "text")]

@@ -6,26 +6,30 @@
 //! cargo run --release --example simulate -- --scene assets/scenes/satellite/sentinel_1.toml --compare REAL_IMAGES
 //! ```
 //!
-//! Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`; with `--compare` the texture of the open sea of the
-//! image beside that of real ones, `texture.json`.
+//! Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`; with `--overlay` the picture with its labels drawn,
+//! `overlay.png`; with `--export` every field as a NumPy array or a TIFF with the size of its pixels; with `--compare` the
+//! texture of the open sea of the image beside that of real ones, `texture.json`.
 
 #[path = "simulate/compare.rs"]
 mod compare;
 #[path = "common/exit.rs"]
 mod exit;
+#[path = "common/progress.rs"]
+mod progress;
 
 use clap::{Parser, ValueEnum};
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use wake_physics::grey::GreyScale;
-use wake_physics::{Method, Plan, Scene, Simulation, output, simulate_with};
+use wake_physics::picture::Picture;
+use wake_physics::{Method, Plan, Scene, Simulation, export, output, simulate_with};
 
 /// Simulate the SAR image of a ship wake from the numbers of a scene.
 #[derive(Parser)]
 #[command(
     version,
-    after_help = "Scene keys, units and ranges: see the documentation of wake_physics::Scene."
+    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
 )]
 struct Arguments {
     /// Scene file (TOML); without it, the default scene with its ship
@@ -40,6 +44,12 @@ struct Arguments {
     /// What the grey of the picture is linear in: decibels on one scale for all scenes, or amplitude as in quick-looks
     #[arg(long, value_enum, default_value = "decibel")]
     grey: GreyName,
+    /// Also write the picture with boxes, arms and tips drawn on it
+    #[arg(long)]
+    overlay: bool,
+    /// Also write every field as a file of its own, for NumPy or as TIFF
+    #[arg(long, value_enum, value_delimiter = ',')]
+    export: Vec<Export>,
     /// Folder of the results, made if absent
     #[arg(long, value_name = "DIR", default_value = "out/simulate")]
     out: PathBuf,
@@ -66,6 +76,12 @@ enum GreyName {
     Amplitude,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum Export {
+    Npy,
+    Tiff,
+}
+
 fn main() -> ExitCode {
     exit::code(|| run(&Arguments::parse()))
 }
@@ -82,19 +98,29 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         exit::note(&warning);
     }
     output::make_folder(&arguments.out)?;
-    let method = match arguments.method {
-        MethodName::Fast => Method::Fast,
+    let simulation = match arguments.method {
+        MethodName::Fast => simulate_with(&scene, Method::Fast)?,
         MethodName::Direct => {
-            exit::note("summing wave by wave and pixel by pixel: minutes for a large grid");
-            Method::Direct
+            let clock = progress::clock("summing wave by wave and pixel by pixel");
+            let simulation = simulate_with(&scene, Method::Direct);
+            clock.finish_and_clear();
+            simulation?
         }
     };
-    let simulation = simulate_with(&scene, method)?;
     let grey = match arguments.grey {
         GreyName::Decibel => GreyScale::default(),
         GreyName::Amplitude => simulation.quick_look(),
     };
     let report = simulation.write_in(&arguments.out, &grey)?;
+    if arguments.overlay {
+        let levels: Vec<u8> = simulation.levels(&grey);
+        let mut picture = Picture::from_levels(&levels, simulation.raster.columns);
+        picture.draw_labels(&simulation.labels);
+        picture.write(&arguments.out.join("overlay.png"))?;
+    }
+    for form in &arguments.export {
+        write_fields(&simulation, *form, &arguments.out)?;
+    }
     if let Some(folder) = &arguments.compare {
         let rows = compare::textures(&simulation.speckled, folder)?;
         output::write_json(&arguments.out.join("texture.json"), &rows)?;
@@ -124,7 +150,19 @@ fn cost(plan: &Plan) -> Option<String> {
     })
 }
 
-fn summary(simulation: &Simulation, out: &std::path::Path) -> String {
+fn write_fields(simulation: &Simulation, form: Export, out: &Path) -> wake_physics::Result<()> {
+    for (name, field) in simulation.named_fields() {
+        match form {
+            Export::Npy => export::write_npy(&out.join(format!("{name}.npy")), field)?,
+            Export::Tiff => {
+                export::write_tiff(&out.join(format!("{name}.tif")), &simulation.raster, field)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn summary(simulation: &Simulation, out: &Path) -> String {
     let notes = simulation.plan.notes.iter();
     let notes: String = notes.map(|note| format!("note: {note}\n")).collect();
     let (plan, seconds) = (&simulation.plan, &simulation.seconds);

@@ -43,6 +43,7 @@ use clap::{Parser, Subcommand};
 
 /// Find ship wakes in radar images.
 #[derive(Parser)]
+#[command(version)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,

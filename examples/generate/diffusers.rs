@@ -13,7 +13,7 @@ use wake_ldm::pipeline::{Pipeline, Request, to_bytes};
 use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
 use wake_physics::{Scene, output};
 
-use super::{Arguments, finish, image_name, progress, prompt};
+use super::{Arguments, finish, numbered, progress, prompt, scene};
 
 /// Steps, unless others are asked for.
 const STEPS: usize = 50;
@@ -21,7 +21,7 @@ const STEPS: usize = 50;
 const GUIDANCE: f64 = 7.5;
 
 pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Result<(), Box<dyn Error>> {
-    let scene = arguments.scene.as_deref().map(Scene::read).transpose()?;
+    let scene = scene(arguments, Scene::default)?;
     let prompt = prompt(arguments, scene.as_ref())?;
     let device = device_named(&arguments.device)?;
     let begin = Instant::now();
@@ -124,7 +124,7 @@ fn write_images(images: Tensor<4>, out: &Path) -> Result<Vec<String>, Box<dyn Er
     };
     let mut names = Vec::new();
     for (k, bytes) in to_bytes(images).into_iter().enumerate() {
-        let (name, mut png) = (image_name(k, count), Vec::new());
+        let (name, mut png) = (numbered("image", k, count, "png"), Vec::new());
         PngEncoder::new(&mut png).write_image(&bytes, columns as u32, rows as u32, color)?;
         output::write_atomically(&out.join(&name), &png)?;
         names.push(name);

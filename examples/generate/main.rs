@@ -7,8 +7,9 @@
 //! ```
 //!
 //! Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and
-//! `report.json`; the model that lies in `wake-ldm` also writes `labels.json`, and says which scene it drew (what the
-//! prompt states, and the default values of what it leaves open) and which parts of the prompt it did not read. A prompt that states nothing of a scene is an error.
+//! `report.json`; the model that lies in `wake-ldm` also writes the labels of each image (`labels.json`, `labels-0.json`, …),
+//! and says which scene it drew (what the prompt states, and the default values of what it leaves open) and which parts of
+//! the prompt it did not read. A prompt that states nothing of a scene is an error.
 
 mod diffusers;
 #[path = "../common/exit.rs"]
@@ -27,6 +28,10 @@ use wake_physics::{Scene, output};
 
 /// Generate an image from a prompt with a latent diffusion model.
 #[derive(Parser)]
+#[command(
+    version,
+    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
+)]
 struct Arguments {
     /// What the image shows; without it and without --scene, the default scene in words.
     #[arg(long, value_name = "TEXT", conflicts_with = "scene")]
@@ -34,6 +39,9 @@ struct Arguments {
     /// Scene file (TOML) to put into words.
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
+    /// Change one value of the scene, such as ship.speed=8; may be repeated; without --scene, of the model's own scene
+    #[arg(long, value_name = "KEY=VALUE", conflicts_with = "prompt")]
+    set: Vec<String>,
     /// Folder of a model: one that `train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
@@ -51,7 +59,7 @@ struct Arguments {
     #[arg(long, value_name = "TEXT")]
     negative: Option<String>,
     /// Image k has this seed plus k.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 7)]
     seed: u64,
     /// Number of images.
     #[arg(long, default_value_t = 1)]
@@ -59,6 +67,9 @@ struct Arguments {
     /// flex, ndarray, wgpu or cuda, where compiled in; a GPU's number may follow, as in cuda:1.
     #[arg(long, default_value = "flex")]
     device: String,
+    /// Also write the images with boxes, arms and tips drawn on them.
+    #[arg(long)]
+    overlay: bool,
     /// Folder of the results, made if absent.
     #[arg(long, value_name = "DIR", default_value = "out/generate")]
     out: PathBuf,
@@ -84,6 +95,19 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
 }
 
+/// The scene that is asked for as one, on the base of a model's own where no file is named.
+fn scene(
+    arguments: &Arguments,
+    base: impl FnOnce() -> Scene,
+) -> wake_physics::Result<Option<Scene>> {
+    let scene = match &arguments.scene {
+        Some(path) => Scene::read(path)?,
+        None if arguments.set.is_empty() => return Ok(None),
+        None => base(),
+    };
+    scene.with_assignments(&arguments.set).map(Some)
+}
+
 /// The prompt as given, or a scene in words, by default the default scene.
 fn prompt(arguments: &Arguments, scene: Option<&Scene>) -> wake_text::Result<String> {
     match &arguments.prompt {
@@ -92,11 +116,11 @@ fn prompt(arguments: &Arguments, scene: Option<&Scene>) -> wake_text::Result<Str
     }
 }
 
-/// The name of image `k` of `count`.
-fn image_name(k: usize, count: usize) -> String {
+/// The name of file `k` of `count` of one kind.
+fn numbered(stem: &str, k: usize, count: usize, ending: &str) -> String {
     match count {
-        1 => "image.png".to_owned(),
-        _ => format!("image-{k}.png"),
+        1 => format!("{stem}.{ending}"),
+        _ => format!("{stem}-{k}.{ending}"),
     }
 }
 

@@ -7,19 +7,17 @@ use std::time::Instant;
 use serde_json::json;
 use wake_ldm::sampler::WakeImage;
 use wake_ldm::{WakeSampler, device_named};
+use wake_physics::picture::Picture;
 use wake_physics::{Scene, output};
 use wake_text::Reading;
 
-use super::{Arguments, exit, finish, image_name, prompt};
+use super::{Arguments, exit, finish, numbered, prompt, scene};
 
 /// Images in a row of the contact sheet.
 const ACROSS: usize = 4;
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     refuse_options(arguments)?;
-    let scene = arguments.scene.as_deref().map(Scene::read).transpose()?;
-    let prompt = prompt(arguments, scene.as_ref())?;
-    let reading = Reading::of(&prompt)?;
     let device = device_named(&arguments.device)?;
     let begin = Instant::now();
     let mut sampler = match &arguments.weights {
@@ -30,6 +28,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         sampler = sampler.with_steps(steps)?;
     }
     let load = begin.elapsed().as_secs_f64();
+    let scene = scene(arguments, || sampler.base_scene())?;
+    let prompt = prompt(arguments, scene.as_ref())?;
+    let reading = Reading::of(&prompt)?;
     let (count, seed) = (arguments.count, arguments.seed);
     // All images as one batch.
     let images = match &scene {
@@ -38,12 +39,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     };
     let total = begin.elapsed().as_secs_f64();
     output::make_folder(&arguments.out)?;
-    let files = write_images(&images, &arguments.out)?;
-    let labels: Vec<_> = images.iter().map(|image| &image.labels).collect();
-    output::write_json(&arguments.out.join("labels.json"), &labels)?;
+    let files = write_images(&images, arguments)?;
     let seconds = images[0].seconds;
     let report = json!({
-        "prompt": prompt, "stated": reading.scene, "unread": reading.unread, "scene": images[0].scene, "seed": seed, "steps": sampler.steps(), "count": count, "device": arguments.device,
+        "prompt": prompt, "stated": reading.scene, "unread": reading.unread, "scene": images[0].scene, "seed": seed,
+        "steps": sampler.steps(), "count": count, "device": arguments.device,
         "weights": arguments.weights, "files": files,
         "seconds": {
             "load": load, "text": seconds.text, "expect": seconds.expect, "denoise": seconds.denoise,
@@ -87,38 +87,46 @@ fn refuse_options(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes each image, and all of them as one, and returns their names.
-fn write_images(images: &[WakeImage], out: &Path) -> wake_physics::Result<Vec<String>> {
-    let levels: Vec<Vec<u8>> = images.iter().map(WakeImage::levels).collect();
-    let [rows, columns] = [images[0].grey.rows, images[0].grey.columns];
+/// Writes each image with its labels, and sheets of them, and returns the names of the pictures.
+fn write_images(images: &[WakeImage], arguments: &Arguments) -> wake_physics::Result<Vec<String>> {
+    let (out, count) = (&arguments.out, images.len());
+    let columns = images[0].grey.columns;
     let mut names = Vec::new();
-    if images.len() > 1 {
-        let sheet = sheet(&levels, columns);
-        let width = columns * images.len().min(ACROSS);
-        output::write_png(&out.join("sheet.png"), &sheet, sheet.len() / width, width)?;
+    let mut pictures = Vec::new();
+    for (k, image) in images.iter().enumerate() {
+        let levels = image.levels();
+        let name = numbered("image", k, count, "png");
+        output::write_png(&out.join(&name), &levels, image.grey.rows, columns)?;
+        output::write_json(
+            &out.join(numbered("labels", k, count, "json")),
+            &image.labels,
+        )?;
+        names.push(name);
+        pictures.push(Picture::from_levels(&levels, columns));
+    }
+    if count > 1 {
+        sheet(&pictures, images, &out.join("sheet.png"))?;
         names.push("sheet.png".to_owned());
     }
-    for (k, levels) in levels.iter().enumerate() {
-        let name = image_name(k, images.len());
-        output::write_png(&out.join(&name), levels, rows, columns)?;
-        names.push(name);
+    if arguments.overlay {
+        for (picture, image) in pictures.iter_mut().zip(images) {
+            picture.draw_labels(&image.labels);
+        }
+        sheet(&pictures, images, &out.join("overlay.png"))?;
+        names.push("overlay.png".to_owned());
     }
     Ok(names)
 }
 
-/// Images side by side, [`ACROSS`] in a row; what is left of the last row is black.
-fn sheet(images: &[Vec<u8>], columns: usize) -> Vec<u8> {
-    let across = images.len().min(ACROSS);
-    let rows_of_images = images.chunks(across).map(|beside| {
-        let rows = beside[0].len() / columns;
-        let mut block = vec![0; rows * across * columns];
-        for (k, image) in beside.iter().enumerate() {
-            let lines = block.chunks_mut(across * columns);
-            for (line, row) in lines.zip(image.chunks(columns)) {
-                line[k * columns..][..columns].copy_from_slice(row);
-            }
-        }
-        block
-    });
-    rows_of_images.flatten().collect()
+/// Writes pictures as one, each below its seed.
+fn sheet(pictures: &[Picture], images: &[WakeImage], path: &Path) -> wake_physics::Result<()> {
+    let pictures = pictures.iter().zip(images);
+    let captioned: Vec<Picture> = pictures
+        .map(|(picture, image)| {
+            picture
+                .clone()
+                .captioned(&format!("seed {}", image.scene.seed))
+        })
+        .collect();
+    Picture::sheet(&captioned, ACROSS).write(path)
 }

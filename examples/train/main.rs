@@ -35,6 +35,7 @@ use options::Options;
 
 /// Train the small wake model.
 #[derive(Parser)]
+#[command(version)]
 struct Arguments {
     #[command(subcommand)]
     stage: Stage,

@@ -57,7 +57,7 @@ fn a_full_disk_is_an_error_of_one_sentence() {
             .expect("a full device");
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         let (code, message) = into(name, &arguments, full.into());
-        assert_eq!(code, Some(2), "{name}: {message}");
+        assert_eq!(code, Some(1), "{name}: {message}");
         assert!(
             message.contains("standard output") && message.lines().count() == 1,
             "{message}"

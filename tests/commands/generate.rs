@@ -4,6 +4,7 @@ use std::path::Path;
 
 use safetensors::tensor::{Dtype, TensorView};
 use serde_json::Value;
+use wake_physics::labels::Labels;
 
 use super::{cannot_write, done, names, refused_by, text};
 
@@ -108,14 +109,25 @@ fn foreign_and_broken_weights_are_named() {
 fn two_images_have_a_sheet_labels_and_a_report() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
-    let arguments = ["--count", "2", "--steps", "1", "--seed", "5", "--json"];
+    let arguments = [
+        "--count",
+        "2",
+        "--steps",
+        "1",
+        "--seed",
+        "5",
+        "--json",
+        "--overlay",
+    ];
     let printed = done("generate", &arguments, &out);
     assert_eq!(
         names(&out),
         [
             "image-0.png",
             "image-1.png",
-            "labels.json",
+            "labels-0.json",
+            "labels-1.json",
+            "overlay.png",
             "report.json",
             "sheet.png"
         ]
@@ -134,14 +146,43 @@ fn two_images_have_a_sheet_labels_and_a_report() {
         [&report["count"], &report["steps"], &report["seed"]].map(Value::as_u64),
         [2, 1, 5].map(Some)
     );
-    let labels: Value = serde_json::from_str(&read("labels.json")).expect("JSON");
-    assert_eq!(labels.as_array().map(Vec::len), Some(2));
+    for name in ["labels-0.json", "labels-1.json"] {
+        let labels: Labels = serde_json::from_str(&read(name)).expect("labels of one image");
+        assert_eq!(labels.ships.len(), 1);
+    }
     let [first, second, sheet] = ["image-0.png", "image-1.png", "sheet.png"]
         .map(|name| image::open(out.join(name)).expect(name).into_luma8());
     assert_ne!(first, second);
-    assert_eq!(sheet.dimensions(), (512, 256));
-    assert!(sheet.enumerate_pixels().all(|(x, y, level)| {
-        let image = if x < 256 { &first } else { &second };
-        image.get_pixel(x % 256, y) == level
-    }));
+    // Beside each other with a gap, below a line of text each.
+    let [top, right] = [sheet.height() - 256, sheet.width() - 256];
+    for (image, left) in [(&first, 0), (&second, right)] {
+        let part = image::imageops::crop_imm(&sheet, left, top, 256, 256).to_image();
+        assert!(part == *image, "the image at column {left}");
+    }
+    let overlay = image::open(out.join("overlay.png"))
+        .expect("a picture")
+        .into_rgb8();
+    assert!(
+        overlay.pixels().any(|p| p.0 == wake_physics::picture::WAKE),
+        "no box is drawn"
+    );
+}
+
+/// Keys of a scene in the place of a prompt, on the base of the scene that the model was trained on.
+#[test]
+fn a_scene_is_asked_for_by_its_keys() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let arguments = ["--set", "ship.speed=9", "--steps", "1", "--json"];
+    let report: Value = serde_json::from_str(&done("generate", &arguments, &out)).expect("JSON");
+    assert_eq!(report["scene"]["ship"]["speed"], 9.0);
+    assert_eq!(report["scene"]["seed"], 7);
+    let labels = std::fs::read_to_string(out.join("labels.json")).expect("labels");
+    let labels: Labels = serde_json::from_str(&labels).expect("labels of one image");
+    assert_eq!(labels.ships[0].ship.speed, 9.0);
+    refused(&["--set", "ship.sped=9"], &["sped", "speed"]);
+    refused(
+        &["--set", "ship.speed=9", "--prompt", "a ship"],
+        &["--set", "--prompt"],
+    );
 }

@@ -204,6 +204,21 @@ fn a_scene_gives_four_files_and_a_report() {
     );
 }
 
+/// What is asked for beside them.
+#[test]
+fn a_drawn_picture_and_fields_for_other_tools_are_written_where_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let size = ["--set", "grid.rows=24", "--set", "grid.columns=31"];
+    let asked = ["--overlay", "--export", "npy,tiff"];
+    done("simulate", &[&size[..], &asked].concat(), &out);
+    let names = names(&out);
+    let ending = |end: &str| names.iter().filter(|name| name.ends_with(end)).count();
+    assert_eq!([ending(".npy"), ending(".tif")], [10, 10], "{names:?}");
+    let overlay = image::open(out.join("overlay.png")).expect("a picture");
+    assert_eq!((overlay.width(), overlay.height()), (31, 24));
+}
+
 /// Names of all files below a folder, in order.
 fn names(folder: &Path) -> Vec<String> {
     let names = files(folder).into_keys();

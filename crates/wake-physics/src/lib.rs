@@ -26,12 +26,12 @@
 //!
 //! | of | modules |
 //! | --- | --- |
-//! | all | [`constants`], [`output`], [`dispersion`], [`window`] |
+//! | all | [`constants`], [`output`], [`export`], [`dispersion`], [`window`] |
 //! | what is asked | [`scene`] |
 //! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`swell`], [`surface`] |
 //! | the ship | [`hull`], [`nufft`], [`kelvin`], [`turbulent`] |
 //! | the radar | [`permittivity`], [`scattering`], [`sar`], [`gusts`], [`slicks`] |
-//! | the image | [`grey`], [`labels`], [`measure`] |
+//! | the image | [`grey`], [`labels`], [`picture`], [`measure`] |
 //!
 //! # Axes and units
 //!
@@ -55,6 +55,7 @@ mod quadrature;
 mod memory;
 mod workspace;
 pub mod output;
+pub mod export;
 mod fft;
 mod random;
 pub mod dispersion;
@@ -83,6 +84,7 @@ mod models;
 mod survey;
 mod plan;
 pub mod labels;
+pub mod picture;
 mod simulate;
 pub mod measure;
 

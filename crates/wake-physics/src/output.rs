@@ -168,16 +168,29 @@ fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) 
 ///
 /// If there are not rows × columns pixels.
 pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
+    write_encoded(path, pixels, [rows, columns], image::ExtendedColorType::L8)
+}
+
+/// Writes a PNG of red, green and blue, 8 bits each: `[rows, columns, 3]`.
+pub(crate) fn write_rgb_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
+    write_encoded(
+        path,
+        pixels,
+        [rows, columns],
+        image::ExtendedColorType::Rgb8,
+    )
+}
+
+fn write_encoded(
+    path: &Path,
+    pixels: &[u8],
+    [rows, columns]: [usize; 2],
+    colours: image::ExtendedColorType,
+) -> Result<()> {
     let mut bytes = Vec::new();
     let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    image::ImageEncoder::write_image(
-        encoder,
-        pixels,
-        columns as u32,
-        rows as u32,
-        image::ExtendedColorType::L8,
-    )
-    .map_err(|e| file_error("encode", path, &e))?;
+    image::ImageEncoder::write_image(encoder, pixels, columns as u32, rows as u32, colours)
+        .map_err(|e| file_error("encode", path, &e))?;
     write_atomically(path, &bytes)
 }
 

@@ -129,6 +129,13 @@ impl Simulation {
         GreyScale::amplitude_around((self.plan.mean_sigma0 + noise).max(1e-5))
     }
 
+    /// The image with speckle in levels of 8 bits, `[rows, columns]`: the pixels of `image.png`.
+    #[must_use]
+    pub fn levels(&self, grey: &GreyScale) -> Vec<u8> {
+        let level = |&power: &f32| grey.level(f64::from(power));
+        self.speckled.values.iter().map(level).collect()
+    }
+
     /// [`Self::write`] with the picture in another grey.
     ///
     /// # Errors
@@ -137,14 +144,8 @@ impl Simulation {
     pub fn write_in(&self, folder: &Path, grey: &GreyScale) -> Result<Value> {
         output::make_folder(folder)?;
         let path = |name: &str| folder.join(name);
-        let level = |&power: &f32| grey.level(f64::from(power));
-        let pixels: Vec<u8> = self.speckled.values.iter().map(level).collect();
-        output::write_png(
-            &path("image.png"),
-            &pixels,
-            self.raster.rows,
-            self.raster.columns,
-        )?;
+        let [rows, columns] = [self.raster.rows, self.raster.columns];
+        output::write_png(&path("image.png"), &self.levels(grey), rows, columns)?;
         let size = [self.raster.rows, self.raster.columns];
         let slc = self.slc.as_deref().map(|slc| (slc, size));
         output::write_fields(&path("fields.safetensors"), &self.named_fields(), slc)?;

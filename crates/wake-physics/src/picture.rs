@@ -1,0 +1,368 @@
+//! Pictures for people: an image with its labels drawn on it, captions, and sheets of several.
+
+use crate::error::Result;
+use crate::labels::{Labels, Pixel, Segment};
+use crate::output::write_rgb_png;
+use font8x8::{BASIC_FONTS, GREEK_FONTS, LATIN_FONTS, UnicodeFonts};
+use std::path::Path;
+
+/// Red, green, blue.
+pub type Colour = [u8; 3];
+
+/// Boxes of wakes.
+pub const WAKE: Colour = [255, 176, 0];
+/// Arms of wakes, and their tips.
+pub const ARMS: Colour = [64, 224, 128];
+/// Boxes of ships.
+pub const SHIP: Colour = [255, 96, 176];
+/// Behind captions and between the pictures of a sheet.
+const PAPER: Colour = [24, 24, 24];
+/// Letters.
+const INK: Colour = [240, 240, 240];
+
+/// Sides of a letter \[pixels\].
+const LETTER: usize = 8;
+/// From one line of letters to the next \[pixels\].
+const LINE: usize = 11;
+/// Between the pictures of a sheet \[pixels\].
+const GAP: usize = 4;
+/// Pixels drawn and left out in turn, so that what lies under a line can be seen.
+const DASH: usize = 5;
+
+/// A picture in colour.
+///
+/// ```
+/// use wake_physics::picture::Picture;
+///
+/// let image = Picture::from_levels(&[90; 64 * 48], 64);
+/// let sheet = Picture::sheet(&[image.clone().captioned("left"), image.captioned("right")], 2);
+/// assert_eq!(sheet.size(), [48 + 11, 64 + 4 + 64]); // rows, columns
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    rows: usize,
+    columns: usize,
+    pixels: Vec<Colour>,
+}
+
+impl Picture {
+    /// A grey picture from levels of 8 bits, `[rows, columns]`, row after row.
+    ///
+    /// # Panics
+    ///
+    /// If the levels are not whole rows.
+    #[must_use]
+    pub fn from_levels(levels: &[u8], columns: usize) -> Self {
+        let rows = levels.len() / columns.max(1);
+        assert!(rows * columns == levels.len(), "levels of whole rows");
+        Self {
+            rows,
+            columns,
+            pixels: levels.iter().map(|&level| [level; 3]).collect(),
+        }
+    }
+
+    /// Rows and columns.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        [self.rows, self.columns]
+    }
+
+    /// The colour at `[row, column]`.
+    ///
+    /// # Panics
+    ///
+    /// If the pixel lies outside the picture.
+    #[must_use]
+    pub fn at(&self, row: usize, column: usize) -> Colour {
+        assert!(column < self.columns, "a column of the picture");
+        self.pixels[row * self.columns + column]
+    }
+
+    /// The middle of the picture, no larger than that many rows and columns.
+    #[must_use]
+    pub fn middle(&self, rows: usize, columns: usize) -> Self {
+        let (rows, columns) = (rows.min(self.rows), columns.min(self.columns));
+        let (top, left) = ((self.rows - rows) / 2, (self.columns - columns) / 2);
+        let lines =
+            (top..top + rows).map(|row| &self.pixels[row * self.columns + left..][..columns]);
+        Self {
+            rows,
+            columns,
+            pixels: lines.flatten().copied().collect(),
+        }
+    }
+
+    /// Draws what labels say: the boxes of wakes and ships, the arms of wakes, their centrelines, and a cross at their
+    /// tips. What is drawn is cut to the picture.
+    ///
+    /// Pixels of labels are those of the picture: draw before a caption is set above it.
+    pub fn draw_labels(&mut self, labels: &Labels) {
+        for labelled in &labels.ships {
+            let wake = &labelled.wake;
+            if let Some(frame) = wake.box_px {
+                for &arm in wake.arms_px.iter().chain(&wake.centreline_px) {
+                    self.draw_line(arm, ARMS);
+                }
+                if let Some(tip) = wake.tip_px {
+                    self.draw_cross(tip, ARMS);
+                }
+                self.draw_box(frame, WAKE);
+            }
+            if let Some(frame) = labelled.ship.echo_box_px {
+                self.draw_box(frame, SHIP);
+            }
+        }
+    }
+
+    /// Draws the frame of a box (x, y, width, height).
+    pub fn draw_box(&mut self, [x, y, width, height]: [f64; 4], colour: Colour) {
+        let (right, bottom) = (x + width, y + height);
+        let corners = [[x, y], [right, y], [right, bottom], [x, bottom], [x, y]];
+        for pair in corners.windows(2) {
+            self.draw_line([pair[0], pair[1]], colour);
+        }
+    }
+
+    /// Draws two short lines through a place.
+    pub fn draw_cross(&mut self, [x, y]: Pixel, colour: Colour) {
+        let arm = (DASH - 1) as f64;
+        self.draw_line([[x - arm, y], [x + arm, y]], colour);
+        self.draw_line([[x, y - arm], [x, y + arm]], colour);
+    }
+
+    /// Draws a dashed line, cut to the picture; a line with an end that is not finite is not drawn.
+    pub fn draw_line(&mut self, line: Segment, colour: Colour) {
+        let Some([from, to]) = self.cut(line) else {
+            return;
+        };
+        let longest = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
+        let steps = longest.ceil().max(1.0) as usize;
+        for step in (0..=steps).filter(|step| (step / DASH).is_multiple_of(2)) {
+            let t = step as f64 / steps as f64;
+            let [column, row] = [0, 1].map(|a| (from[a] + t * (to[a] - from[a])).round() as usize);
+            self.pixels[row * self.columns + column] = colour;
+        }
+    }
+
+    /// The part of a line between the centres of the outermost pixels, after Liang and Barsky (1984).
+    fn cut(&self, [from, to]: Segment) -> Option<Segment> {
+        if self.pixels.is_empty() || !from.iter().chain(&to).all(|v| v.is_finite()) {
+            return None;
+        }
+        let far = [(self.columns - 1) as f64, (self.rows - 1) as f64];
+        let (mut start, mut end) = (0.0f64, 1.0f64);
+        for a in 0..2 {
+            let along = to[a] - from[a];
+            if along == 0.0 {
+                if !(0.0..=far[a]).contains(&from[a]) {
+                    return None;
+                }
+                continue;
+            }
+            let (low, high) = (-from[a] / along, (far[a] - from[a]) / along);
+            start = start.max(low.min(high));
+            end = end.min(low.max(high));
+        }
+        let at = |t: f64| [0, 1].map(|a| (from[a] + t * (to[a] - from[a])).clamp(0.0, far[a]));
+        (start <= end).then(|| [at(start), at(end)])
+    }
+
+    /// The picture with lines of text above it, broken where they are too long; letters that the font lacks are blank.
+    #[must_use]
+    pub fn captioned(mut self, text: &str) -> Self {
+        let lines = broken(text, self.columns / LETTER);
+        let above = lines.len() * LINE;
+        let mut pixels = vec![PAPER; above * self.columns];
+        pixels.append(&mut self.pixels);
+        self.pixels = pixels;
+        self.rows += above;
+        for (k, line) in lines.iter().enumerate() {
+            for (n, letter) in line.chars().enumerate() {
+                self.write_letter(letter, k * LINE + 1, n * LETTER);
+            }
+        }
+        self
+    }
+
+    fn write_letter(&mut self, letter: char, top: usize, left: usize) {
+        let fonts = [
+            BASIC_FONTS.get(letter),
+            LATIN_FONTS.get(letter),
+            GREEK_FONTS.get(letter),
+        ];
+        let shape = fonts.into_iter().flatten().next().unwrap_or([0; LETTER]);
+        for (row, bits) in shape.iter().enumerate() {
+            for column in (0..LETTER).filter(|column| bits >> column & 1 == 1) {
+                self.pixels[(top + row) * self.columns + left + column] = INK;
+            }
+        }
+    }
+
+    /// Pictures beside each other, `across` in a row; each begins at the upper left of its place.
+    #[must_use]
+    pub fn sheet(pictures: &[Self], across: usize) -> Self {
+        let across = across.clamp(1, pictures.len().max(1));
+        let largest = |side: fn(&Self) -> usize| pictures.iter().map(side).max().unwrap_or(0);
+        let (high, wide) = (largest(|p| p.rows), largest(|p| p.columns));
+        let down = pictures.len().div_ceil(across);
+        let length = |count: usize, side: usize| (count * (side + GAP)).saturating_sub(GAP);
+        let (rows, columns) = (length(down, high), length(across.min(pictures.len()), wide));
+        let mut pixels = vec![PAPER; rows * columns];
+        for (k, picture) in pictures.iter().enumerate() {
+            let (top, left) = (k / across * (high + GAP), k % across * (wide + GAP));
+            for (row, line) in picture.pixels.chunks(picture.columns.max(1)).enumerate() {
+                pixels[(top + row) * columns + left..][..line.len()].copy_from_slice(line);
+            }
+        }
+        Self {
+            rows,
+            columns,
+            pixels,
+        }
+    }
+
+    /// Writes the picture as a PNG.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::File`](crate::Error::File).
+    pub fn write(&self, path: &Path) -> Result<()> {
+        write_rgb_png(path, self.pixels.as_flattened(), self.rows, self.columns)
+    }
+}
+
+/// Words in lines of at most so many letters; a word that is longer is cut.
+fn broken(text: &str, letters: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let word: String = word.chars().take(letters).collect();
+        let used = lines.last().map_or(0, |line| line.chars().count());
+        let space = usize::from(used > 0);
+        match lines.last_mut() {
+            Some(line) if used + space + word.chars().count() <= letters => {
+                line.push_str(&" "[..space]);
+                line.push_str(&word);
+            }
+            _ => lines.push(word),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    fn grey(rows: usize, columns: usize) -> Picture {
+        Picture::from_levels(&vec![9; rows * columns], columns)
+    }
+
+    fn drawn(picture: &Picture, colour: Colour) -> Vec<[usize; 2]> {
+        let [rows, columns] = picture.size();
+        let places = (0..rows).flat_map(|i| (0..columns).map(move |j| [i, j]));
+        places
+            .filter(|&[i, j]| picture.at(i, j) == colour)
+            .collect()
+    }
+
+    #[test]
+    fn lines_are_dashed_and_cut_to_the_picture() {
+        let mut picture = grey(20, 30);
+        picture.draw_line([[-1e9, 7.0], [1e9, 7.0]], WAKE);
+        let row: Vec<usize> = drawn(&picture, WAKE)
+            .iter()
+            .map(|&[i, j]| i * 100 + j)
+            .collect();
+        let dashes = [0..5, 10..15, 20..25];
+        let expected: Vec<usize> = dashes.into_iter().flatten().map(|j| 700 + j).collect();
+        assert_eq!(row, expected);
+        // Past a corner, along a side outside, without an end, backwards through a corner.
+        let mut picture = grey(20, 30);
+        picture.draw_line([[-10.0, 5.0], [5.0, -10.0]], SHIP);
+        picture.draw_line([[0.0, -1.0], [29.0, -1.0]], SHIP);
+        picture.draw_line([[0.0, f64::NAN], [29.0, 3.0]], SHIP);
+        assert_eq!(drawn(&picture, SHIP), Vec::<[usize; 2]>::new());
+        picture.draw_line([[33.0, 23.0], [26.0, 16.0]], SHIP);
+        assert_eq!(
+            drawn(&picture, SHIP),
+            [[16, 26], [17, 27], [18, 28], [19, 29]]
+        );
+    }
+
+    /// A wake seen by its labels: box, arms and tip where the labels say, nothing else.
+    #[test]
+    fn labels_are_drawn_where_they_are() {
+        let scene = Scene::default()
+            .with_assignments(&["sea.wind_speed=3", "ship.heading=90", "ship.echo=true"])
+            .unwrap();
+        let labels = crate::labels_of(&scene);
+        let mut picture = grey(512, 512);
+        picture.draw_labels(&labels);
+        let wake = &labels.ships[0].wake;
+        let [x, y, width, height] = wake.box_px.unwrap();
+        let round = |v: f64| v.round() as usize;
+        assert_eq!(picture.at(round(y), round(x) + 1), WAKE);
+        let [column, row] = wake.tip_px.unwrap().map(round);
+        assert_eq!(picture.at(row, column - 4), ARMS);
+        let [ship_x, ship_y, ..] = labels.ships[0].ship.echo_box_px.unwrap();
+        assert_eq!(picture.at(round(ship_y), round(ship_x)), SHIP);
+        for [i, j] in drawn(&picture, WAKE) {
+            let edges = [round(y), round(y + height), round(x), round(x + width)];
+            assert!(
+                edges[..2].contains(&i) || edges[2..].contains(&j),
+                "{i}, {j}"
+            );
+        }
+        // Open sea has no labels.
+        let mut open = grey(8, 8);
+        open.draw_labels(&Labels::default());
+        assert_eq!(open, grey(8, 8));
+    }
+
+    #[test]
+    fn captions_are_broken_and_stand_above() {
+        // 80 columns hold ten letters.
+        let picture = grey(5, 80).captioned("a wake at 45°, σ in dB");
+        assert_eq!(picture.size(), [5 + 3 * LINE, 80]);
+        assert_eq!(
+            broken("a wake at 45°, σ in dB", 10),
+            ["a wake at", "45°, σ in", "dB"]
+        );
+        assert!(drawn(&picture, INK).iter().all(|&[i, _]| i < 3 * LINE));
+        assert_eq!(picture.at(3 * LINE, 0), [9; 3]);
+        // The bar of an L is at its left: the font's bits count from there.
+        let letter = grey(1, 8).captioned("L");
+        let columns: Vec<usize> = drawn(&letter, INK).iter().map(|p| p[1]).collect();
+        assert!(columns.iter().filter(|&&j| j < 4).count() > columns.len() / 2);
+        assert_eq!(broken("", 4), [""]);
+        assert_eq!(broken("overlong word", 4), ["over", "word"]);
+    }
+
+    #[test]
+    fn sheets_keep_every_pixel() {
+        let pictures = [grey(2, 3), Picture::from_levels(&[200; 4], 2), grey(2, 3)];
+        let sheet = Picture::sheet(&pictures, 2);
+        assert_eq!(sheet.size(), [2 + GAP + 2, 3 + GAP + 3]);
+        assert_eq!(drawn(&sheet, [9; 3]).len(), 12);
+        assert_eq!(sheet.at(0, 3 + GAP), [200; 3]);
+        assert_eq!(sheet.at(2 + GAP, 2), [9; 3]);
+        assert_eq!(Picture::sheet(&[], 3).size(), [0, 0]);
+        assert_eq!(sheet.middle(2, 3).size(), [2, 3]);
+        assert_eq!(grey(4, 4).middle(9, 2).size(), [4, 2]);
+    }
+
+    #[test]
+    fn a_picture_is_read_back_in_its_colours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        let mut picture = grey(6, 7);
+        picture.draw_cross([3.0, 2.0], WAKE);
+        picture.write(&path).unwrap();
+        let read = image::open(&path).unwrap().into_rgb8();
+        assert_eq!(read.dimensions(), (7, 6));
+        assert_eq!(read.get_pixel(3, 2).0, WAKE);
+        assert_eq!(read.get_pixel(0, 5).0, [9; 3]);
+    }
+}
