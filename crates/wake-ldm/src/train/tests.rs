@@ -320,3 +320,68 @@ fn long_gradients_are_shortened_to_the_largest_norm() {
     assert!(same.into_scalar::<f32>() < f32::MIN_POSITIVE);
     assert_eq!(trainer.model().num_params(), 2);
 }
+
+/// A trainer of two weights under the loss w₀ + w₁, whose gradient is the same in every step.
+fn of_a_plane(steps: usize) -> Trainer<burn::nn::Linear> {
+    let device = Device::flex().autodiff();
+    let layer = burn::nn::LinearConfig::new(2, 1)
+        .with_bias(false)
+        .init(&device);
+    let options = TrainerOptions {
+        rate: Rate {
+            peak: 1e-2,
+            warmup: 0,
+            steps,
+        },
+        adam: AdamOptions {
+            weight_decay: 0.0,
+            ..AdamOptions::default()
+        },
+        ..TrainerOptions::default()
+    };
+    Trainer::new(layer, options, vec![device])
+}
+
+fn first_weight(trainer: &Trainer<burn::nn::Linear>) -> f64 {
+    let weights = trainer.model().weight.val().into_data();
+    weights.iter::<f64>().next().unwrap()
+}
+
+/// Under one and the same gradient a step of Adam is as long as its rate, whatever the step's number, if that counts the
+/// steps that were made: 1 − βᵗ cancels in both averages. A step that is lost moves nothing and is not counted.
+#[test]
+fn a_step_that_is_lost_counts_for_nobody() {
+    let mut trainer = of_a_plane(10);
+    let start = first_weight(&trainer);
+    let mut moved = 0.0;
+    for factor in [1.0, f32::NAN, 1.0, f32::INFINITY, 1.0] {
+        let before = first_weight(&trainer);
+        let report = trainer.step(|layer, _, _| (layer.weight.val() * factor).sum());
+        assert_eq!(report.applied, factor.is_finite());
+        if report.applied {
+            moved += report.rate;
+        } else {
+            assert_eq!(first_weight(&trainer).to_bits(), before.to_bits());
+        }
+    }
+    assert_eq!(trainer.steps(), 5);
+    // Weights below 1 are 32-bit numbers: 6e-8 a step; ε of 1e-8 beside the gradient's ½.
+    let found = start - first_weight(&trainer);
+    assert!((found - moved).abs() < 5e-7, "{found} {moved}");
+}
+
+#[test]
+fn a_run_without_a_finite_step_ends_as_an_error() {
+    let mut lost = of_a_plane(3);
+    for _ in 0..3 {
+        assert!(lost.check().is_ok());
+        lost.step(|layer, _, _| (layer.weight.val() * f32::NAN).sum());
+    }
+    let error = lost.check().unwrap_err().to_string();
+    assert!(error.contains("3 steps"), "{error}");
+    let mut found = of_a_plane(3);
+    for factor in [f32::NAN, 1.0, f32::NAN] {
+        found.step(|layer, _, _| (layer.weight.val() * factor).sum());
+    }
+    assert!(found.check().is_ok());
+}

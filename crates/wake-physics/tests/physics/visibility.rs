@@ -233,18 +233,18 @@ fn a_wake_seen_to_the_edge_is_not_cut_short() {
     }
 }
 
-/// The contrast is good to a quarter, and that of arms falls by the cube root of the distance: the end of a faint wake
-/// lies between those at a quarter more and a quarter less contrast. The label's windows are 64 m long, and those of the
-/// image count to their middle, up to 45 m before their farthest corner.
+/// The contrast is good to three tenths, as above, and that of arms falls by the cube root of the distance: the end of a
+/// faint wake lies between those at so much more and so much less contrast. Windows of the image count to their middle, up to
+/// 45 m from the next one's along the track; the label's end half a window of 64 m beyond its last middle.
 #[test]
-fn a_faint_wake_ends_where_a_quarter_of_its_contrast_can_move_it() {
+fn a_faint_wake_ends_where_the_error_of_its_contrast_can_move_it() {
     for wind in [8, 10] {
         for heading in [50, 80, 300] {
             let scene = across_the_image(wind, heading);
-            let [far, near] = farthest_seen(&scene, [5.0 / 1.25, 5.0 * 1.25]);
+            let [far, near] = farthest_seen(&scene, [5.0 * 0.7, 5.0 * 1.3]);
             let stated = length_m(&scene);
             println!("wind {wind} heading {heading}: stated {stated} seen {near} to {far}");
-            assert!(near > 195.0 && (near - 109.0..far + 109.0).contains(&stated));
+            assert!(near > 195.0 && (near - 77.0..far + 77.0).contains(&stated));
         }
     }
 }
