@@ -148,3 +148,61 @@ impl Grey {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Recipe;
+
+    fn field(values: &[f32]) -> Field {
+        Field {
+            rows: 1,
+            columns: values.len(),
+            values: values.to_vec(),
+        }
+    }
+
+    /// The median amplitude has the grey of gain and offset, others are linear in amplitude, in steps of 8 bits, whatever
+    /// the unit of the intensity.
+    #[test]
+    fn a_quick_look_is_amplitude_of_an_unknown_factor() {
+        let power = [0.0, 1.0, 4.0, 9.0, 1e6];
+        let expected = [0.1, 0.2, 0.3, 0.4, 1.0];
+        for factor in [1e-6, 1.0, 1e3] {
+            let grey = Grey::quick_look(&field(&power.map(|p| factor * p)), 0.2, 0.1);
+            assert_eq!((grey.rows, grey.columns), (1, 5));
+            for (found, expected) in grey.pixels.iter().zip(expected) {
+                // Half a level, and the rounding of both numbers.
+                assert!((found - expected).abs() <= 0.5 / 255.0 + 1e-6, "{found}");
+                assert!((255.0 * found - (255.0 * found).round()).abs() < 1e-4);
+            }
+        }
+        let dark = Grey::quick_look(&field(&[0.0; 3]), 0.2, -0.1);
+        assert_eq!(dark.pixels, [0.0; 3]);
+        assert!(Grey::quick_look(&field(&[]), 0.2, 0.1).pixels.is_empty());
+    }
+
+    /// Images of a recipe that draws a gain have a median between its ends, another in each image.
+    #[test]
+    fn the_gain_is_drawn() {
+        let changes = [
+            "scene.grid.rows = 24",
+            "scene.grid.columns = 24",
+            "draw.quick_look.gain = [0.2, 0.6]",
+        ];
+        let recipe = Recipe::default().with_assignments(&changes).unwrap();
+        let source = Simulated::new(recipe, 2).unwrap();
+        let medians = (0..6).map(|index| {
+            let mut pixels = source.pair(index).unwrap().image.pixels;
+            let middle = pixels.len() / 2;
+            *pixels.select_nth_unstable_by(middle, f32::total_cmp).1
+        });
+        let medians: Vec<f32> = medians.collect();
+        assert!(
+            medians.iter().all(|m| (0.198..=0.602).contains(m)),
+            "{medians:?}"
+        );
+        let apart = medians.iter().any(|m| (m - medians[0]).abs() > 0.05);
+        assert!(apart, "{medians:?}");
+    }
+}
