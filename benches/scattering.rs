@@ -83,6 +83,7 @@ fn field(criterion: &mut Criterion) {
                 slope_y: &y,
                 modulation: Some(&y),
                 damping: None,
+                unresolved: None,
             };
             let table = BackscatterTable::covering(model.clone(), &x, &y, 1e-3 * mean);
             let name = BenchmarkId::new(format!("table/{degrees}_degrees"), size);
@@ -94,6 +95,7 @@ fn field(criterion: &mut Criterion) {
             slope_y: &y,
             modulation: None,
             damping: None,
+            unresolved: None,
         };
         group.bench_function(format!("quadrature_16_pixels/{degrees}_degrees"), |b| {
             b.iter(|| model.sigma0_field(&fields));

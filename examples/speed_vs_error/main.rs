@@ -10,7 +10,8 @@
 //! The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the default scene, the paper's own method
 //! and scale; the oracle of both is the harmonic sum, the strong baseline the same sum as a matrix product. Where an
 //! oracle is too slow for all pixels it runs on random ones of the same size, as many as the table says, and its time is
-//! scaled up; that of the whole scene stage by stage. The second part is the model, where it is built in: steps, batch
+//! scaled up; that of the whole scene stage by stage. One image on finer and finer pixels shows what its spacing does. The
+//! second part is the model, where it is built in: steps, batch
 //! size and weights against many steps from the same noise.
 
 #[path = "../common/exit.rs"]
@@ -23,6 +24,7 @@ mod progress;
 #[cfg(feature = "ldm")]
 mod rounding;
 mod row;
+mod spacing;
 mod stages;
 
 use clap::{Parser, ValueEnum};
@@ -80,6 +82,13 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let measured = simulator(arguments.largest as usize)?;
         plot::draw(&out.join("frontier.svg"), &plot::SIMULATOR, &measured)?;
         text += &table(&measured);
+        for row in measured {
+            rows.push(serde_json::to_value(row)?);
+        }
+        let bar = progress::bar(spacing::COUNT, "rows of the spacing");
+        let measured = spacing::measure(|| bar.inc(1))?;
+        bar.finish_and_clear();
+        text += &format!("\n{}", spacing::table(&measured));
         for row in measured {
             rows.push(serde_json::to_value(row)?);
         }

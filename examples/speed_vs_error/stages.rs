@@ -214,6 +214,7 @@ fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
         slope_y: &slopes[1],
         modulation: None,
         damping: None,
+        unresolved: None,
     };
     let model = backscatter_model(raster.spacing);
     let mean: f64 = model.parts([0.0, 0.0]).iter().sum();

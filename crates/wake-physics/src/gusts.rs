@@ -100,24 +100,28 @@ impl Gusts {
         field
     }
 
-    /// Multiplies σ⁰ with exp(n g − ½n²s²), g drawn on every few pixels and interpolated linearly between them: 1/200 of
-    /// the outer scale, below which lies a twentieth of the variance.
-    ///
-    /// - `exponent` n, see [`wind_exponent`]
-    pub(crate) fn modulate_raster(
-        &self,
-        sigma0: &mut Field,
-        raster: &Raster,
-        exponent: f64,
-        seed: u64,
-    ) {
+    /// g at every few pixels of a raster, and how many: 1/200 of the outer scale, below which lies a twentieth of the
+    /// variance.
+    pub(crate) fn coarse_field(&self, raster: &Raster, seed: u64) -> (Field, usize) {
         let step = ((self.scale / (200.0 * raster.spacing)) as usize).max(1);
         let [rows, columns] = raster.every(step);
         let coarse = Raster::image(rows, columns, step as f64 * raster.spacing);
-        let gusts = self.field(&coarse, seed);
+        (self.field(&coarse, seed), step)
+    }
+
+    /// Multiplies σ⁰ with exp(n g − ½n²s²), g interpolated linearly; the rows are those from `first` on.
+    ///
+    /// - `exponent` n, see [`wind_exponent`]
+    pub(crate) fn modulate_strip(
+        &self,
+        sigma0: &mut Field,
+        first: usize,
+        (gusts, step): &(Field, usize),
+        exponent: f64,
+    ) {
         let bias = (0.5 * (exponent * self.strength).powi(2)) as f32;
         let exponent = exponent as f32;
-        sigma0.change_with(&gusts, step, |value, g| {
+        sigma0.change_with(gusts, (*step, first), |value, g| {
             *value *= (exponent * g - bias).exp();
         });
     }
@@ -222,7 +226,8 @@ mod tests {
         // A spacing of 2.5 m draws g at every fourth pixel.
         let raster = Raster::image(41, 30, 2.5);
         let mut sigma0 = Field::constant(&raster, 0.02);
-        gusts.modulate_raster(&mut sigma0, &raster, 1.5, 1);
+        let coarse = gusts.coarse_field(&raster, 1);
+        gusts.modulate_strip(&mut sigma0, 0, &coarse, 1.5);
         let coarse = Raster::image(12, 9, 10.0);
         let field = gusts.field(&coarse, 1);
         let factor = |g: f64| 0.02 * (1.5 * g - 0.5 * (1.5f64 * 0.06).powi(2)).exp();

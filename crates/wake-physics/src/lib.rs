@@ -80,6 +80,7 @@ pub mod slicks;
 pub mod grey;
 mod modulation;
 mod wakes;
+mod computed;
 mod models;
 mod survey;
 mod plan;

@@ -1,7 +1,9 @@
 //! The models of a scene: sea, wake, backscatter and radar, with the scene's numbers in the units of formulas.
 
+use crate::computed::Computed;
 use crate::constants::SPEED_OF_LIGHT;
 use crate::gusts::{Gusts, wind_exponent};
+use crate::kelvin::{Roughness, UnresolvedWaves};
 use crate::permittivity;
 use crate::raster::Raster;
 use crate::sar::impulse::Axis;
@@ -18,7 +20,7 @@ use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
 use crate::window::Window;
 use num_complex::Complex64;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 /// Correlation of neighbouring pixels up to which each has speckle of its own: chosen.
 const INDEPENDENT: f64 = 0.05;
@@ -26,10 +28,12 @@ const INDEPENDENT: f64 = 0.05;
 /// The models of a valid scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Models {
-    /// Pixels that are computed: those of the image, or where it has an impulse response the finer ones around it.
+    /// Pixels that are computed: those of the image or finer ones, and the guard of an impulse response.
     pub(crate) image: Raster,
     /// Pixels of the image.
     pub(crate) delivered: Raster,
+    /// Spacing that the waves of a ship ask for \[m\], where what is computed is coarser.
+    pub(crate) asked_spacing: Option<f64>,
     /// Impulse response in range and azimuth, where pixels of their own do not suffice.
     pub(crate) response: Option<ImpulseResponse>,
     /// Incidence angle \[rad\].
@@ -52,6 +56,10 @@ pub(crate) struct Models {
     pub(crate) swell: Option<Swell>,
     /// The wakes, one a ship.
     pub(crate) wakes: Vec<Wake>,
+    /// Whether the ships' waves that the pixels do not carry count.
+    pub(crate) counts_unresolved: bool,
+    /// They, ship by ship.
+    pub(crate) unresolved: Vec<UnresolvedWaves>,
     /// Slicks, if the wind leaves them.
     pub(crate) slicks: Option<Slicks>,
     /// σ⁰ of breaking waves, 0 where it is not asked for.
@@ -71,7 +79,9 @@ impl Models {
         let sea = wind_sea(scene);
         let delivered = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
         let response = response(scene);
-        let image = response.map_or(delivered, |response| response.sources(&delivered));
+        let wakes = Wake::of(scene);
+        let computed = Computed::new(&scene.grid, &delivered, response.as_ref(), &wakes);
+        let image = computed.raster;
         let incidence = scene.radar.incidence.to_radians();
         // Whatever spectrum the resolved waves have, the short ones are Elfouhaily's.
         let short_waves = Elfouhaily::new(scene.sea.wind_speed, scene.sea.fetch);
@@ -81,6 +91,17 @@ impl Models {
             scene.sea.salinity,
         );
         let spectrum = DirectionalSpectrum::new(&sea);
+        let two_scale = TwoScale::new(
+            incidence,
+            TAU * scene.radar.frequency / SPEED_OF_LIGHT,
+            scene.radar.polarization,
+            permittivity,
+            short_waves,
+            spectrum.wind(),
+        );
+        let counts_unresolved = counts_unresolved(scene);
+        let waves = wakes.iter().filter(|_| counts_unresolved);
+        let band = [image.nyquist_wavenumber(), two_scale.split_wavenumber()];
         let unresolved = DirectionalSpectrum::new(&WindSea {
             spectrum: crate::scene::SpectrumModel::Elfouhaily,
             ..sea
@@ -88,6 +109,7 @@ impl Models {
         .moments(image.nyquist_wavenumber(), f64::INFINITY, incidence);
         Self {
             delivered,
+            asked_spacing: computed.asked,
             response,
             swell: swell(scene),
             slicks: slicks(scene),
@@ -114,22 +136,30 @@ impl Models {
                     spectrum.wind(),
                 ),
             },
-            two_scale: TwoScale::new(
-                incidence,
-                TAU * scene.radar.frequency / SPEED_OF_LIGHT,
-                scene.radar.polarization,
-                permittivity,
-                short_waves,
-                spectrum.wind(),
-            ),
+            counts_unresolved,
+            unresolved: waves
+                .filter_map(|wake| wake.kelvin.unresolved(band))
+                .collect(),
+            two_scale,
             permittivity,
             azimuth_resolution: scene.radar.resolution,
             sea: spectrum,
-            wakes: Wake::of(scene),
+            wakes,
             unresolved_velocity: unresolved.radial_velocity.sqrt(),
             averaged_slopes: SlopeCovariance::NONE,
             image,
         }
+    }
+
+    /// What the ship's waves that the pixels do not carry have at a place (x, y) \[m\], if any reach it.
+    pub(crate) fn roughness(&self, place: [f64; 2]) -> Option<Roughness> {
+        let each = self.unresolved.iter().filter_map(|waves| waves.at(place));
+        each.reduce(|a, b| a.plus(&b))
+    }
+
+    /// Whether what is computed are not the pixels of the image.
+    pub(crate) fn is_refined(&self) -> bool {
+        self.image != self.delivered
     }
 
     /// Averages over resolved waves too, as if a pixel held them.
@@ -196,6 +226,17 @@ impl Models {
         AzimuthResolution::at_rest(nominal, 1)
     }
 
+    /// Acceleration that defocuses the image as much as a random velocity of 1 m/s smears it [1/s]: (π/2 T (R/V) a)² of the
+    /// squared resolution against 2π² (R/V)² σ_u².
+    pub(crate) fn defocus_of_velocity(&self) -> f64 {
+        let defocus = self.resolution().defocus;
+        if defocus > 0.0 {
+            SQRT_2 * PI * self.range_to_velocity / defocus
+        } else {
+            0.0
+        }
+    }
+
     /// Wavenumber of the radar `k_e` [rad/m].
     fn radar_wavenumber(&self) -> f64 {
         TAU / self.wavelength
@@ -246,6 +287,16 @@ fn response(scene: &Scene) -> Option<ImpulseResponse> {
     let needed = *terms != Terms::Rule(TermRule::Needed)
         || response.pixel_correlation(scene.grid.spacing) > INDEPENDENT;
     needed.then_some(response)
+}
+
+/// Whether the waves that pixels do not carry count: where an impulse response is asked for, also if pixels of their own do
+/// as well, or where they are named. On the pixels of an image as they are they are left out, as in the model that this one
+/// started from.
+fn counts_unresolved(scene: &Scene) -> bool {
+    match &scene.model.terms {
+        Terms::List(list) => list.contains(&Term::Unresolved),
+        Terms::Rule(_) => scene.radar.range_resolution.is_some(),
+    }
 }
 
 fn swell(scene: &Scene) -> Option<Swell> {

@@ -6,12 +6,15 @@
 use crate::error::{Error, Result};
 use crate::raster::Field;
 use num_complex::Complex32;
-use safetensors::tensor::{Dtype, TensorView};
 use serde::Serialize;
+use serde_json::json;
 use std::fs::{File, TryLockError};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Numbers that are turned into bytes at once.
+const PIECE: usize = 1 << 16;
 
 /// Tells apart the files that one process writes at the same time.
 static COUNTER: AtomicU64 = AtomicU64::new(0);
@@ -194,7 +197,8 @@ fn write_encoded(
     write_atomically(path, &bytes)
 }
 
-/// Writes fields as `f32` tensors `[rows, columns]` of a safetensors file.
+/// Writes fields as `f32` tensors `[rows, columns]` of a safetensors file, and a complex image as `[rows, columns, 2]`, row by
+/// row: large fields are not copied as a whole.
 ///
 /// # Errors
 ///
@@ -204,27 +208,73 @@ pub fn write_fields(
     fields: &[(&str, &Field)],
     slc: Option<(&[Complex32], [usize; 2])>,
 ) -> Result<()> {
-    let complex: Vec<u8> = slc.map_or_else(Vec::new, |(values, _)| {
-        let parts = values.iter().flat_map(|v| [v.re, v.im]);
-        parts.flat_map(f32::to_le_bytes).collect()
-    });
-    let bytes: Vec<Vec<u8>> = fields
+    let mut tensors: Vec<Tensor<'_>> = fields
         .iter()
-        .map(|(_, f)| f.values.iter().flat_map(|v| v.to_le_bytes()).collect())
+        .map(|&(name, f)| Tensor::of(name, f))
         .collect();
-    let views = fields.iter().zip(&bytes).map(|((name, field), data)| {
-        let shape = vec![field.rows, field.columns];
-        TensorView::new(Dtype::F32, shape, data).map(|view| (*name, view))
-    });
-    let slc = slc.map(|(_, [rows, columns])| {
-        TensorView::new(Dtype::F32, vec![rows, columns, 2], &complex).map(|view| ("slc", view))
-    });
-    let views: Vec<_> = views
-        .chain(slc)
-        .collect::<std::result::Result<_, _>>()
-        .map_err(|e| file_error("encode", path, &e))?;
-    let file = safetensors::serialize(views, None).map_err(|e| file_error("encode", path, &e))?;
-    write_atomically(path, &file)
+    tensors.extend(slc.map(|(values, [rows, columns])| Tensor {
+        name: "slc",
+        shape: vec![rows, columns, 2],
+        values: Values::Complex(values),
+    }));
+    tensors.sort_by_key(|tensor| tensor.name);
+    let mut header = serde_json::Map::new();
+    let mut start = 0;
+    for tensor in &tensors {
+        let end = start + 4 * tensor.shape.iter().product::<usize>();
+        let entry = json!({"dtype": "F32", "shape": tensor.shape, "data_offsets": [start, end]});
+        header.insert(tensor.name.to_owned(), entry);
+        start = end;
+    }
+    let mut header = serde_json::Value::Object(header).to_string().into_bytes();
+    // The data begin at a multiple of eight.
+    header.resize(header.len().next_multiple_of(8), b' ');
+    let write = |file: &mut BufWriter<File>| {
+        file.write_all(&(header.len() as u64).to_le_bytes())?;
+        file.write_all(&header)?;
+        tensors.iter().try_for_each(|tensor| tensor.write(file))
+    };
+    write_with(path, write).map_err(|e| file_error("write", path, &e))
+}
+
+/// One tensor of a safetensors file.
+struct Tensor<'a> {
+    name: &'a str,
+    shape: Vec<usize>,
+    values: Values<'a>,
+}
+
+/// Its numbers.
+enum Values<'a> {
+    Real(&'a [f32]),
+    Complex(&'a [Complex32]),
+}
+
+impl<'a> Tensor<'a> {
+    fn of(name: &'a str, field: &'a Field) -> Self {
+        Self {
+            name,
+            shape: vec![field.rows, field.columns],
+            values: Values::Real(&field.values),
+        }
+    }
+
+    fn write(&self, file: &mut impl Write) -> std::io::Result<()> {
+        let mut bytes = Vec::with_capacity(4 * PIECE);
+        let mut piece = |values: &mut dyn Iterator<Item = f32>| {
+            bytes.clear();
+            bytes.extend(values.flat_map(f32::to_le_bytes));
+            file.write_all(&bytes)
+        };
+        match self.values {
+            Values::Real(values) => values
+                .chunks(PIECE)
+                .try_for_each(|values| piece(&mut values.iter().copied())),
+            Values::Complex(values) => values
+                .chunks(PIECE / 2)
+                .try_for_each(|values| piece(&mut values.iter().flat_map(|v| [v.re, v.im]))),
+        }
+    }
 }
 
 /// Writes a value as indented JSON.
@@ -253,6 +303,9 @@ mod tests {
         write_fields(&path, &[("elevation", &field)], Some((&slc, [2, 3]))).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let file = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        // As the library writes it itself, byte for byte.
+        let views: Vec<_> = file.iter().collect();
+        assert_eq!(safetensors::serialize(views, None).unwrap(), bytes);
         let tensor = file.tensor("elevation").unwrap();
         assert_eq!(tensor.shape(), [2, 3]);
         let expected: Vec<u8> = (0..6u8).flat_map(|v| f32::from(v).to_le_bytes()).collect();

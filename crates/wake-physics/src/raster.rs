@@ -56,6 +56,29 @@ impl Raster {
         }
     }
 
+    /// Some of the rows.
+    pub(crate) fn strip(&self, rows: &std::ops::Range<usize>) -> Self {
+        Self {
+            rows: rows.len(),
+            origin_row: self.origin_row - rows.start as i64,
+            ..*self
+        }
+    }
+
+    /// Pixels of a `divisions`-th of the spacing over the squares of these: the middle of a pixel is the middle of one of
+    /// them, and where that leaves half a pixel at the edge it has a whole one.
+    pub(crate) fn divided(&self, divisions: usize) -> Self {
+        let half = divisions / 2;
+        let size = |n: usize| n.saturating_sub(1) * divisions + 1 + 2 * half;
+        Self {
+            rows: size(self.rows),
+            columns: size(self.columns),
+            spacing: self.spacing / divisions as f64,
+            origin_row: self.origin_row * divisions as i64 + half as i64,
+            origin_column: self.origin_column * divisions as i64 + half as i64,
+        }
+    }
+
     /// Rows and columns of every `step`-th pixel from the first on, and one more to interpolate to.
     pub(crate) fn every(&self, step: usize) -> [usize; 2] {
         [self.rows, self.columns].map(|n| n.div_ceil(step) + 1)
@@ -153,7 +176,8 @@ impl Field {
         self.values[row * self.columns + column]
     }
 
-    /// Changes every pixel with a smooth field known at every `step`-th pixel, interpolated linearly between them.
+    /// Changes every pixel with a smooth field known at every `step`-th pixel of a raster of which these rows are a strip from
+    /// the row `first` on, interpolated linearly between them.
     ///
     /// # Panics
     ///
@@ -161,13 +185,14 @@ impl Field {
     pub(crate) fn change_with(
         &mut self,
         coarse: &Self,
-        step: usize,
+        (step, first): (usize, usize),
         change: impl Fn(&mut f32, f32) + Sync,
     ) {
         let rows = self.values.par_chunks_mut(self.columns.max(1));
         rows.enumerate().for_each_init(
             || vec![0.0f32; coarse.columns],
             |line, (i, row)| {
+                let i = first + i;
                 let down = (i % step) as f32 / step as f32;
                 let [above, below] = [0, 1]
                     .map(|n| &coarse.values[(i / step + n) * coarse.columns..][..coarse.columns]);
@@ -299,7 +324,7 @@ mod tests {
                 (step * (3 * i + 2 * j)) as f32
             });
             let mut field = Field::constant(&r, 1.0);
-            field.change_with(&coarse, step, |value, plane| *value += plane);
+            field.change_with(&coarse, (step, 0), |value, plane| *value += plane);
             for i in 0..13 {
                 for j in 0..10 {
                     let expected = (3 * i + 2 * j) as f32 + 1.0;

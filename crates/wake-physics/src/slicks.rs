@@ -11,6 +11,7 @@ use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
 use rand::Rng;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Wind speed from which films are torn apart [m/s]: chosen.
 pub const STRONGEST_WIND: f64 = 6.0;
@@ -41,19 +42,32 @@ impl Slicks {
     /// - `seed`: the same field whatever the number of threads
     #[must_use]
     pub fn field(&self, raster: &Raster, wind_speed: f64, seed: u64) -> Field {
-        let mut field = Field::constant(raster, 1.0);
+        self.strip(raster, &(0..raster.rows), (wind_speed, seed))
+    }
+
+    /// Some rows of [`Self::field`].
+    pub(crate) fn strip(
+        &self,
+        raster: &Raster,
+        rows: &Range<usize>,
+        (wind_speed, seed): (f64, u64),
+    ) -> Field {
+        let mut field = Field::constant(&raster.strip(rows), 1.0);
         if wind_speed > STRONGEST_WIND {
             return field;
         }
         let waves = self.waves(seed);
         let step = ((0.1 * self.width / raster.spacing) as usize).max(1);
-        let [rows, columns] = raster.every(step);
-        let damping = Field::from_fn(&Raster::image(rows, columns, 1.0), |i, j| {
-            let place = [raster.x(step * j), raster.y(step * i)];
+        let above = rows.start / step;
+        let [below, columns] = raster.every(step);
+        let below = below.min(rows.end.div_ceil(step) + 1);
+        let damping = Field::from_fn(&Raster::image(below - above, columns, 1.0), |i, j| {
+            let place = [raster.x(step * j), raster.y(step * (above + i))];
             let off = 2.0 * distance(&waves, place) / self.width;
             (self.damping * (-0.5 * off * off).exp()) as f32
         });
-        field.change_with(&damping, step, |left, damping| *left -= damping);
+        let first = rows.start - above * step;
+        field.change_with(&damping, (step, first), |left, damping| *left -= damping);
         field
     }
 

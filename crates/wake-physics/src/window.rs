@@ -219,7 +219,7 @@ fn root(f: impl Fn(f64) -> f64, [mut from, mut to]: [f64; 2]) -> f64 {
 }
 
 /// sin πx/(πx).
-fn sinc(x: f64) -> f64 {
+pub(crate) fn sinc(x: f64) -> f64 {
     let angle = PI * x;
     if angle.abs() < 1e-6 {
         1.0 - angle * angle / 6.0

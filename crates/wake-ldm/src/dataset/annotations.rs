@@ -192,6 +192,7 @@ mod tests {
             rows: 101,
             columns: 61,
             spacing: 20.0,
+            oversampling: None,
         };
         Scene {
             grid,

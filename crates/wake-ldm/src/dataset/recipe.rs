@@ -93,6 +93,7 @@ impl Default for Recipe {
                 rows: 256,
                 columns: 256,
                 spacing: 4.0,
+                oversampling: None,
             },
             ..Scene::default()
         };

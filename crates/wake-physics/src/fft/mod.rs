@@ -22,6 +22,7 @@ use crate::workspace::{Shelf, Workspace};
 use num_complex::Complex;
 use rayon::prelude::*;
 use rustfft::{Fft, FftNum, FftPlanner};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Rows transposed at once in the second pass.
@@ -182,13 +183,13 @@ impl<T: Real> Synthesis<T> {
             );
     }
 
-    /// Length of the workspace that [`Self::run_real`] needs.
+    /// Length of the workspace that [`Self::run_real`] needs for so many rows.
     #[must_use]
-    pub(crate) fn half_len(&self) -> usize {
-        2 * self.rows * self.columns.div_ceil(2)
+    pub(crate) fn half_len(&self, rows: usize) -> usize {
+        2 * rows * self.columns.div_ceil(2)
     }
 
-    /// Sums two real fields at once, each from its half spectrum.
+    /// Sums two real fields at once, each from its half spectrum, and keeps some rows and the first `columns` of them.
     ///
     /// A real field has S[−b, −a] = conj S[b, a], so `fill(b, first, second)` is asked for the lines b = 0, 1, …
     /// below columns/2 only and must overwrite both with the `rows` values of the line. Line 0 must have this
@@ -197,7 +198,7 @@ impl<T: Real> Synthesis<T> {
     /// # Shapes
     ///
     /// - `half`: a workspace of [`Self::half_len`] values of any content
-    /// - `first`, `second`: `keep`, row after row
+    /// - `first`, `second`: `[rows, columns]`, row after row
     ///
     /// # Panics
     ///
@@ -205,30 +206,41 @@ impl<T: Real> Synthesis<T> {
     pub(crate) fn run_real<F>(
         &self,
         half: &mut [Complex<T>],
-        keep: [usize; 2],
+        (rows, keep_columns): (Range<usize>, usize),
         (first, second): (&mut [f32], &mut [f32]),
         fill: F,
     ) where
         F: Fn(usize, &mut [Complex<T>], &mut [Complex<T>]) + Sync,
     {
-        let [keep_rows, keep_columns] = keep;
-        assert_eq!(half.len(), self.half_len(), "workspace of another size");
+        let keep_rows = rows.len();
+        assert_eq!(
+            half.len(),
+            self.half_len(keep_rows),
+            "workspace of another size"
+        );
         assert!(
-            keep_rows <= self.rows && keep_columns <= self.columns,
+            rows.end <= self.rows && keep_columns <= self.columns,
             "more kept than there is"
         );
         assert!(
             first.len() == keep_rows * keep_columns && second.len() == first.len(),
             "output of another size"
         );
-        half.par_chunks_mut(2 * self.rows)
+        let zero = Complex::new(T::zero(), T::zero());
+        half.par_chunks_mut((2 * keep_rows).max(1))
             .enumerate()
             .for_each_init(
-                || vec![Complex::new(T::zero(), T::zero()); self.along_y.get_inplace_scratch_len()],
-                |scratch, (b, lines)| {
+                || {
+                    let scratch = vec![zero; self.along_y.get_inplace_scratch_len()];
+                    (vec![zero; 2 * self.rows], scratch)
+                },
+                |(lines, scratch), (b, kept)| {
                     let (one, two) = lines.split_at_mut(self.rows);
                     fill(b, one, two);
                     self.along_y.process_with_scratch(lines, scratch);
+                    let (one, two) = kept.split_at_mut(keep_rows);
+                    one.copy_from_slice(&lines[rows.clone()]);
+                    two.copy_from_slice(&lines[self.rows..][rows.clone()]);
                 },
             );
         let half = &*half;
@@ -242,7 +254,7 @@ impl<T: Real> Synthesis<T> {
                 |(block, scratch), (n, (first, second))| {
                     let rows = n * BLOCK..((n + 1) * BLOCK).min(keep_rows);
                     let block = &mut block[..rows.len() * self.columns];
-                    self.gather_real(half, rows, block);
+                    self.gather_real((half, keep_rows), rows, block);
                     self.along_x.process_with_scratch(block, scratch);
                     let rows = block.chunks_exact(self.columns);
                     let out = first
@@ -258,12 +270,12 @@ impl<T: Real> Synthesis<T> {
     /// Transposes some rows of two half spectra into rows of the full spectrum of `first + i second`.
     fn gather_real(
         &self,
-        half: &[Complex<T>],
-        rows: std::ops::Range<usize>,
+        (half, kept): (&[Complex<T>], usize),
+        rows: Range<usize>,
         block: &mut [Complex<T>],
     ) {
-        for (j, lines) in half.chunks_exact(2 * self.rows).enumerate() {
-            let (one, two) = lines.split_at(self.rows);
+        for (j, lines) in half.chunks_exact(2 * kept).enumerate() {
+            let (one, two) = lines.split_at(kept);
             let pairs = one[rows.clone()].iter().zip(&two[rows.clone()]);
             for ((one, two), row) in pairs.zip(block.chunks_exact_mut(self.columns)) {
                 row[j] = Complex::new(one.re - two.im, one.im + two.re);
@@ -280,12 +292,7 @@ impl<T: Real> Synthesis<T> {
     }
 
     /// Transposes some rows into a block; reading a few rows at once touches each cache line once.
-    fn gather(
-        &self,
-        spectrum: &[Complex<T>],
-        rows: std::ops::Range<usize>,
-        block: &mut [Complex<T>],
-    ) {
+    fn gather(&self, spectrum: &[Complex<T>], rows: Range<usize>, block: &mut [Complex<T>]) {
         for (j, line) in spectrum.chunks_exact(self.rows).enumerate() {
             for (i, &v) in line[rows.clone()].iter().enumerate() {
                 block[i * self.columns + j] = v;
@@ -401,12 +408,14 @@ mod tests {
             let n = rows * columns;
             let (mut re, mut im) = (vec![0.0; n], vec![0.0; n]);
             plan.run(&mut full, [rows, columns], (&mut re, &mut im), |_, _| ());
-            // Fewer rows and columns kept, and a workspace that is not clean.
+            // Fewer rows, from the middle on, and columns kept, and a workspace that is not clean.
             let keep = [rows.div_ceil(2), columns.div_ceil(2)];
-            let mut half = vec![Complex::new(f64::NAN, 1.0); plan.half_len()];
+            let from = rows - keep[0];
+            let mut half = vec![Complex::new(f64::NAN, 1.0); plan.half_len(keep[0])];
             let (mut first, mut second) =
                 (vec![0.0; keep[0] * keep[1]], vec![0.0; keep[0] * keep[1]]);
-            plan.run_real(&mut half, keep, (&mut first, &mut second), |b, one, two| {
+            let kept = (from..rows, keep[1]);
+            plan.run_real(&mut half, kept, (&mut first, &mut second), |b, one, two| {
                 for a in 0..rows {
                     one[a] = value(b, a, 0.1);
                     two[a] = value(b, a, 0.9);
@@ -414,7 +423,7 @@ mod tests {
             });
             for i in 0..keep[0] {
                 for j in 0..keep[1] {
-                    let (kept, all) = (i * keep[1] + j, i * columns + j);
+                    let (kept, all) = (i * keep[1] + j, (from + i) * columns + j);
                     // Sums of up to 400 unit waves, rounded to f32.
                     assert!((first[kept] - re[all]).abs() < 1e-4);
                     assert!((second[kept] - im[all]).abs() < 1e-4);

@@ -7,8 +7,8 @@
 //! with ξ forward of midship and η to port. The waves lie on one curve in the plane of wavenumbers, so the
 //! integral is a sum of plane waves as soon as its nodes are chosen ([`KelvinWake::plan`]); any field of
 //! them follows from [`synthesize`](crate::nufft::synthesize). Files: `steady` the curve, `rays` where each wave is seen and how far the arms open, `zones` which part
-//! of it reaches a raster, `panels` the nodes, `fade` where the waves are shown, `resistance` the work the
-//! ship does for them, `direct` the slow integral that everything is checked against.
+//! of it reaches a raster, `panels` the nodes, `fade` where the waves are shown, `unresolved` what pixels do
+//! not carry, `resistance` the work the ship does for them, `direct` the slow integral that everything is checked against.
 
 mod direct;
 mod fade;
@@ -16,6 +16,7 @@ mod panels;
 mod rays;
 mod resistance;
 mod steady;
+mod unresolved;
 mod zones;
 
 pub use direct::direct_quadrature;
@@ -24,6 +25,7 @@ pub use fade::{fade, fade_field};
 pub use panels::{WakePlan, Zone};
 pub(crate) use rays::Ray;
 pub use rays::{KELVIN_ANGLE, half_angle};
+pub(crate) use unresolved::{Roughness, UnresolvedWaves};
 
 use crate::constants::GRAVITY;
 use crate::hull::Hull;

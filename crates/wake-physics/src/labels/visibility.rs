@@ -8,8 +8,9 @@ use crate::scene::{Scene, Term};
 use crate::survey::Survey;
 use crate::turbulent::TurbulentWake;
 use crate::wakes::Wake;
+use crate::window::sinc;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 /// Side of the windows in which a wake is looked for \[pixels\]: chosen.
 const WINDOW: usize = 16;
@@ -83,6 +84,8 @@ pub(super) struct Background {
     share: f64,
     /// Resolution in range where it is not the pixel \[m\].
     range_resolution: f64,
+    /// Side of the squares that the image is the mean over, where finer pixels are computed \[m\].
+    square: f64,
     /// Azimuth resolution of the moving sea \[m\].
     resolution: f64,
     /// Standard deviation of one pixel over its mean.
@@ -124,6 +127,10 @@ impl Background {
             share: 1.0 / (1.0 + survey.added.iter().sum::<f64>()),
             resolution,
             range_resolution,
+            square: match models.response {
+                None if models.is_refined() => models.delivered.spacing,
+                _ => 0.0,
+            },
             noise: 0.0,
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
@@ -145,7 +152,9 @@ impl Background {
 
     /// Mean square of the relative change of the image by a wave of unit mean square elevation [1/m²].
     fn modulation(&self, k: [f64; 2], omega: f64) -> f64 {
-        let smeared = smear(k[1], self.resolution) * smear(k[0], self.range_resolution);
+        let mean = k.map(|k| sinc(k * self.square / TAU));
+        let smeared =
+            smear(k[1], self.resolution) * smear(k[0], self.range_resolution) * mean[0] * mean[1];
         let change = self.share * smeared;
         self.transfer.at(k, omega).total().norm_sqr() * change * change
     }

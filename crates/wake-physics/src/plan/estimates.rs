@@ -92,6 +92,10 @@ impl<'a> Estimates<'a> {
             // What it smears away is at most all contrast; the speckle of neighbours is what it adds.
             Term::Response => return self.contrast.max(self.survey.response),
             Term::Kelvin => self.waves(&self.wake),
+            Term::Unresolved => {
+                let [change, wider] = self.survey.unresolved;
+                change * self.contrast.hypot(1.0) + wider * self.contrast
+            }
             Term::Turbulent => self.survey.damping * self.survey.modulation.bragg_share,
             Term::TiltAverage => self.survey.backscatter[0],
             Term::Specular => self.survey.backscatter[1],

@@ -14,6 +14,7 @@ use crate::error::Result;
 use crate::kelvin::WakePlan;
 use crate::memory;
 use crate::models::Models;
+use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::surface::lattice_size;
 use crate::survey::Survey;
@@ -21,6 +22,14 @@ use serde::Serialize;
 
 /// Fields of four bytes a pixel that are alive at once, at most; the target of the design.
 const FIELDS_IN_MEMORY: u64 = 40;
+
+/// Bytes a pixel that a scene in strips keeps as a whole: of the computed ones the waves of the sea, the intensity and what its
+/// impulse response takes; of the image its ten fields, a complex image and one to write.
+const WHOLE: [u64; 2] = [24, 52];
+
+/// Pixels that are computed at once, margins included; more are computed in strips of at most half as many (chosen: about a
+/// gibibyte of fields, and an image of 4096 × 4096 pixels is one strip).
+const MOST_AT_ONCE: usize = 1 << 25;
 
 /// The plan of a simulation.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +51,10 @@ pub struct Plan {
 /// How much is computed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sizes {
+    /// Spacing of the computed pixels \[m\]: that of the image or an integer fraction of it.
+    pub computed_spacing: f64,
+    /// Strips of rows that are computed one after the other.
+    pub strips: usize,
     /// Rows and columns added on each side of the image.
     pub margin: [usize; 2],
     /// Rows and columns computed.
@@ -54,6 +67,27 @@ pub struct Sizes {
     pub wake_nodes: [usize; 2],
     /// Ranges of the direction of wake waves to the track \[deg\].
     pub wake_directions: Vec<[f64; 2]>,
+}
+
+/// Number of strips of rows of an image.
+fn strips(computed: &Raster, image: &Raster) -> usize {
+    if computed.len() <= MOST_AT_ONCE {
+        return 1;
+    }
+    (2 * computed.len()).div_ceil(MOST_AT_ONCE).min(image.rows)
+}
+
+/// Bytes that are needed at once, at most.
+fn needed(computed: &Raster, image: &Raster, (strips, margin): (usize, usize)) -> u64 {
+    let all = FIELDS_IN_MEMORY * 4;
+    if strips == 1 {
+        return all * computed.len() as u64;
+    }
+    let rows = computed.rows / strips + 6 * margin;
+    let [of_computed, of_image] = WHOLE;
+    all * (rows * computed.columns) as u64
+        + of_computed * computed.len() as u64
+        + of_image * image.len() as u64
 }
 
 impl Plan {
@@ -88,7 +122,8 @@ impl Plan {
         let uses = |term| terms.iter().any(|t| t.term == term && t.used);
         let margin = survey.margin(models);
         let raster = models.image.with_margin(margin[0], margin[1]);
-        let needed = FIELDS_IN_MEMORY * 4 * raster.len() as u64;
+        let strips = strips(&raster, &models.delivered);
+        let needed = needed(&raster, &models.delivered, (strips, margin[0]));
         memory::check([scene.grid.rows, scene.grid.columns], margin, needed)?;
         // Each ship's share, so that all of them keep the tolerance together.
         let share = SHARES.wake_nodes / models.wakes.len().max(1) as f64;
@@ -100,6 +135,8 @@ impl Plan {
         let nodes = |of: fn(&WakePlan) -> usize| wakes.iter().map(of).sum();
         Ok(Self {
             sizes: Sizes {
+                computed_spacing: raster.spacing,
+                strips,
                 margin,
                 computed: [raster.rows, raster.columns],
                 band: raster.nyquist_wavenumber(),
@@ -147,9 +184,14 @@ impl std::fmt::Display for Plan {
         let s = &self.sizes;
         write!(
             f,
-            "computed {} x {} pixels (margin {} x {}), sea lattice {} x {}, wake nodes {} + {}",
+            "computed {} x {} pixels of {} m in {} (margin {} x {}), sea lattice {} x {}, wake nodes {} + {}",
             s.computed[0],
             s.computed[1],
+            s.computed_spacing,
+            match s.strips {
+                1 => "one piece".to_owned(),
+                strips => format!("{strips} strips"),
+            },
             s.margin[0],
             s.margin[1],
             s.sea_lattice[0],

@@ -98,30 +98,19 @@ impl ImpulseResponse {
         [self.azimuth, self.range].map(|axis| (GUARD * axis.resolution / spacing).ceil() as usize)
     }
 
-    /// Largest spacing of the sources \[m\]: ρ/3.5 of the coarser axis (chosen), so that brightness that comes of waves
-    /// shorter than the response is the same on finer ones, and 1/(2B) of each, so that the intensity is carried.
+    /// Largest spacing of sources that carry the intensity \[m\], 1/(2B) of each axis.
     #[must_use]
-    pub fn largest_spacing(&self) -> f64 {
+    pub fn carrying_spacing(&self) -> f64 {
         let carried = [self.range, self.azimuth].map(|axis| 0.5 / axis.bandwidth());
-        let coarser = self.range.resolution.max(self.azimuth.resolution);
-        (coarser / 3.5).min(carried[0]).min(carried[1])
+        carried[0].min(carried[1])
     }
 
-    /// Pixels of the sources for an image: a whole number of them a pixel, fine enough, with the guard around.
+    /// Largest spacing of the sources \[m\]: what carries the intensity, and ρ/4 of the coarser axis (chosen), so that
+    /// brightness that comes of waves shorter than the response is the same on finer ones.
     #[must_use]
-    pub fn sources(&self, image: &Raster) -> Raster {
-        let step = (image.spacing / self.largest_spacing()).ceil().max(1.0);
-        let spacing = image.spacing / step;
-        let [rows, columns] = self.guard(spacing);
-        let step = step as usize;
-        let fine = Raster {
-            rows: image.rows * step,
-            columns: image.columns * step,
-            spacing,
-            origin_row: image.origin_row * step as i64,
-            origin_column: image.origin_column * step as i64,
-        };
-        fine.with_margin(rows, columns)
+    pub fn largest_spacing(&self) -> f64 {
+        let coarser = self.range.resolution.max(self.azimuth.resolution);
+        (coarser / 4.0).min(self.carrying_spacing())
     }
 
     /// Largest correlation of the speckle of two pixels of a row or a column, see [`Window::pixel_correlation`].

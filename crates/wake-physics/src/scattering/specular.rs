@@ -80,11 +80,21 @@ impl Specular {
         self.strength * self.density.at(self.missing(slope))
     }
 
+    /// The mean return where there are `more` unresolved slopes.
+    #[must_use]
+    pub(crate) fn over(&self, more: &SlopeCovariance) -> Self {
+        let covariance = self.covariance.plus(more);
+        Self {
+            density: covariance.density(),
+            covariance,
+            ..*self
+        }
+    }
+
     /// Mean over resolved slopes: the two bands of slopes add up.
     #[must_use]
     pub fn mean_over(&self, resolved: &SlopeCovariance) -> f64 {
-        let total = self.covariance.plus(resolved);
-        self.strength * total.density().at(self.missing([0.0; 2]))
+        self.over(resolved).sigma0([0.0; 2])
     }
 
     /// Root mean square over resolved slopes.

@@ -67,18 +67,18 @@ impl BackscatterTable {
         slope_y: &Field,
         error: f64,
     ) -> Self {
-        Self::covering_or(None, backscatter, [slope_x, slope_y], error)
+        Self::covering_or(None, backscatter, ([slope_x, slope_y], 0.0), error)
     }
 
-    /// [`Self::covering`], which is `last` if that was made for the same.
+    /// [`Self::covering`] with slopes up to `reach` beyond, which is `last` if that was made for the same.
     pub(crate) fn covering_or(
         last: Option<Self>,
         backscatter: Backscatter,
-        [slope_x, slope_y]: [&Field; 2],
+        ([slope_x, slope_y], reach): ([&Field; 2], f64),
         error: f64,
     ) -> Self {
         let axes = backscatter.tilt.principal_axes();
-        let range = extent(&axes, &slope_x.values, &slope_y.values);
+        let range = extent(&axes, &slope_x.values, &slope_y.values, reach);
         last.filter(|last| last.made_for == (range, error) && last.backscatter == backscatter)
             .unwrap_or_else(|| Self::over(backscatter, range, error))
     }
@@ -188,12 +188,39 @@ impl BackscatterTable {
                 for (n, bragg) in (first..).zip(&mut *bragg) {
                     *bragg = self.bragg(fields.slope(n));
                 }
+                if fields.unresolved.is_some() {
+                    return self.roughened_row(fields, first, bragg, out);
+                }
                 for ((n, &mut bragg), value) in (first..).zip(bragg).zip(out) {
                     let specular = self.backscatter.specular.sigma0(fields.slope(n));
                     *value = fields.combine(n, [bragg, specular]);
                 }
             },
         );
+    }
+}
+
+impl BackscatterTable {
+    /// σ⁰ of the pixels from `first` on, where some have slopes that their neighbours do not have; `bragg` is without.
+    fn roughened_row(
+        &self,
+        fields: &FacetFields<'_>,
+        first: usize,
+        bragg: &[f64],
+        out: &mut [f32],
+    ) {
+        let specular = &self.backscatter.specular;
+        for ((n, &bragg), value) in (first..).zip(bragg).zip(out) {
+            let slope = fields.slope(n);
+            let parts = match fields.unresolved(n) {
+                None => [bragg, specular.sigma0(slope)],
+                Some(more) => [
+                    more.mean_around(slope, |slope| self.bragg(slope)),
+                    specular.over(&more).sigma0(slope),
+                ],
+            };
+            *value = fields.combine(n, parts);
+        }
     }
 }
 
@@ -354,7 +381,7 @@ fn error_between_nodes(lattice: &SlopeLattice, function: impl Fn([f64; 2]) -> f6
 const RANGE_STEP: f64 = 1.0 / 16.0;
 
 /// Range of the slopes along two axes, rounded outward, at least 0 to 0 and at most [`STEEPEST`] either way.
-fn extent(axes: &PrincipalAxes, slope_x: &[f32], slope_y: &[f32]) -> [[f64; 2]; 2] {
+fn extent(axes: &PrincipalAxes, slope_x: &[f32], slope_y: &[f32], reach: f64) -> [[f64; 2]; 2] {
     let widen = |a: [[f64; 2]; 2], b: [[f64; 2]; 2]| {
         [0, 1].map(|n| [a[n][0].min(b[n][0]), a[n][1].max(b[n][1])])
     };
@@ -370,6 +397,7 @@ fn extent(axes: &PrincipalAxes, slope_x: &[f32], slope_y: &[f32]) -> [[f64; 2]; 
         .map(of_chunk)
         .reduce(|| [[0.0; 2]; 2], widen);
     let outward = |bound: f64| bound.signum() * (bound.abs() / RANGE_STEP).ceil() * RANGE_STEP;
+    let range = range.map(|[low, high]| [low - reach, high + reach]);
     range.map(|r| r.map(|bound| outward(bound).clamp(-STEEPEST, STEEPEST)))
 }
 
@@ -515,6 +543,7 @@ mod tests {
             slope_y: &y,
             modulation: Some(&factors),
             damping: None,
+            unresolved: None,
         };
         let backscatter = Case {
             degrees: 24.0,
@@ -548,6 +577,7 @@ mod tests {
             slope_y: &y,
             modulation: None,
             damping: None,
+            unresolved: None,
         };
         let exact = backscatter.sigma0_field(&fields);
         let table = BackscatterTable::covering(backscatter, &x, &y, 1e-3 * exact.rms());
@@ -583,6 +613,7 @@ mod tests {
                 slope_y: &y,
                 modulation: None,
                 damping: None,
+                unresolved: None,
             };
             let exact = backscatter.sigma0_field(&facets);
             let allowed = 0.01 * exact.mean();
@@ -639,6 +670,7 @@ mod tests {
             slope_y: &flat,
             modulation: Some(&modulation),
             damping: Some(&damping),
+            unresolved: None,
         });
         let [bragg, specular] = table.lookup([0.0; 2]);
         for (value, factor) in sigma0.values.iter().zip([1.5, 0.0, 0.25]) {
@@ -668,6 +700,7 @@ mod tests {
             slope_y: &y,
             modulation: None,
             damping: None,
+            unresolved: None,
         };
         let sigma0 = table.sigma0_field(&fields);
         assert_eq!(sigma0.values[0], 0.0);
@@ -684,6 +717,7 @@ mod tests {
             slope_y: &y,
             modulation: None,
             damping: None,
+            unresolved: None,
         };
         for degrees in [5.0, 32.0, 75.0] {
             for wind_speed in [0.0, 0.5, 2.6, 30.0] {
@@ -719,6 +753,7 @@ mod tests {
             slope_y: &none,
             modulation: None,
             damping: None,
+            unresolved: None,
         };
         assert!(table.sigma0_field(&fields).values.is_empty());
     }

@@ -40,7 +40,9 @@ impl Grid {
     fn validate(&self) -> Result<()> {
         in_range("grid.rows", self.rows as f64, 1.0, 16384.0, "pixels")?;
         in_range("grid.columns", self.columns as f64, 1.0, 16384.0, "pixels")?;
-        in_range("grid.spacing", self.spacing, 0.1, 100.0, "m")
+        in_range("grid.spacing", self.spacing, 0.1, 100.0, "m")?;
+        let divisions = self.oversampling.map(f64::from);
+        optional("grid.oversampling", divisions, [1.0, 16.0], "")
     }
 }
 
@@ -199,10 +201,11 @@ mod tests {
     use super::*;
 
     /// Key, closed range, and values just outside it.
-    const RANGES: [(&str, f64, f64); 34] = [
+    const RANGES: [(&str, f64, f64); 35] = [
         ("grid.rows", 1.0, 16384.0),
         ("grid.columns", 1.0, 16384.0),
         ("grid.spacing", 0.1, 100.0),
+        ("grid.oversampling", 1.0, 16.0),
         ("sea.wind_speed", 0.0, 30.0),
         ("sea.fetch", 100.0, 1e7),
         ("sea.depth", 1.0, f64::INFINITY),
@@ -237,8 +240,7 @@ mod tests {
     ];
 
     fn set(key: &str, value: f64) -> Result<Scene> {
-        let whole = key.starts_with("grid.r") || key.starts_with("grid.c");
-        let value = if whole {
+        let value = if whole(key) {
             format!("{value}")
         } else {
             format!("{value:e}")
@@ -273,7 +275,7 @@ mod tests {
     }
 
     fn whole(key: &str) -> bool {
-        key == "grid.rows" || key == "grid.columns"
+        ["grid.rows", "grid.columns", "grid.oversampling"].contains(&key)
     }
 
     fn below(min: f64, key: &str) -> f64 {

@@ -40,6 +40,7 @@ struct GridKeys {
     rows: Option<usize>,
     columns: Option<usize>,
     spacing: Option<f64>,
+    oversampling: Option<u32>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -89,6 +90,7 @@ impl From<SceneKeys> for Scene {
                 rows: keys.grid.rows.unwrap_or(grid.rows),
                 columns: keys.grid.columns.unwrap_or(grid.columns),
                 spacing: keys.grid.spacing.or(spacing).unwrap_or(grid.spacing),
+                oversampling: keys.grid.oversampling,
             },
             sea: keys.sea,
             ships: keys.ships,

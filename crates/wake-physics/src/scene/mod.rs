@@ -67,6 +67,10 @@ pub struct Grid {
     pub columns: usize,
     /// Pixel size \[m\], 0.1 to 100.
     pub spacing: f64,
+    /// Pixels that are computed along each side of one of the image, 1 to 16; chosen by the plan where absent. An impulse
+    /// response has at least as many as carry it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub oversampling: Option<u32>,
 }
 
 impl Default for Grid {
@@ -75,6 +79,7 @@ impl Default for Grid {
             rows: 512,
             columns: 512,
             spacing: 2.5,
+            oversampling: None,
         }
     }
 }

@@ -37,7 +37,7 @@ impl Terms {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, turbulent, edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, bunching, coherence, noise, response, speckle"
+    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, unresolved, turbulent, edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, bunching, coherence, noise, response, speckle"
 )]
 pub enum Terms {
     /// By a rule.
@@ -66,6 +66,9 @@ pub enum Term {
     Swell,
     /// The Kelvin wake.
     Kelvin,
+    /// The ship's waves that the computed pixels do not carry, as slopes and velocities of a variance: with an impulse
+    /// response, or where a list of terms names them.
+    Unresolved,
     /// The turbulent wake.
     Turbulent,
     /// The current of the turbulent wake and its bright edges.
@@ -98,10 +101,11 @@ pub enum Term {
 
 impl Term {
     /// Every term, in the order of the data flow.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Sea,
         Self::Swell,
         Self::Kelvin,
+        Self::Unresolved,
         Self::Turbulent,
         Self::Edge,
         Self::Slicks,
@@ -125,6 +129,7 @@ impl Term {
             Self::Sea => "sea",
             Self::Swell => "swell",
             Self::Kelvin => "kelvin",
+            Self::Unresolved => "unresolved",
             Self::Turbulent => "turbulent",
             Self::Edge => "edge",
             Self::Slicks => "slicks",

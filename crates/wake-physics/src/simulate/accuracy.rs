@@ -33,6 +33,21 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
+    /// What two parts of a scene reached together: the worse of both.
+    pub(crate) fn and(&self, other: &Self) -> Self {
+        let worse = |a: Option<Reached>, b: Option<Reached>| match (a, b) {
+            (Some(a), Some(b)) if b.reached <= a.reached => Some(a),
+            (a, None) => a,
+            (_, b) => b,
+        };
+        let nodes = [self.table_nodes, other.table_nodes];
+        Self {
+            wake: worse(self.wake, other.wake),
+            table: worse(self.table, other.table),
+            table_nodes: [0, 1].map(|axis| nodes[0][axis].max(nodes[1][axis])),
+        }
+    }
+
     /// One sentence for every method that missed what it was asked for.
     #[must_use]
     pub fn missed(&self) -> Vec<String> {

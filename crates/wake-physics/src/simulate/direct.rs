@@ -2,8 +2,10 @@
 
 use super::clock::{Clock, Seconds};
 use super::simulation::Method;
-use super::stages::Stages;
+use super::stages::{Backdrop, Stages};
+use super::strips::Strip;
 use super::surface_fields::{SurfaceFields, Wanted};
+use crate::computed::Parts;
 use crate::error::{Error, Result};
 use crate::kelvin::fade;
 use crate::models::Models;
@@ -64,15 +66,26 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
             requirement: "so that no pixel can be had alone; simulate the whole scene with Method::Direct, or take the response away".to_owned(),
         });
     }
-    let stages = Stages::new(scene, &models, &plan, Method::Fast, Wanted::Image);
-    Ok(stages.direct_intensity(pixels))
+    let strip = Strip::whole(&models, &plan);
+    let how = (Method::Fast, Wanted::Image);
+    let stages = Stages::new((scene, &models, &plan), how, &strip);
+    if !models.is_refined() {
+        return Ok(stages.direct_intensity(pixels));
+    }
+    let parts = Parts::new(&models.image, &models.delivered);
+    let fine: Vec<[usize; 2]> = pixels.iter().flat_map(|&pixel| parts.of(pixel)).collect();
+    let mut direct = stages.direct_intensity(&fine);
+    let pixels = direct.intensity.chunks(parts.count());
+    direct.intensity = pixels.map(|values| parts.mean(values)).collect();
+    Ok(direct)
 }
 
 impl Stages<'_> {
     fn direct_intensity(&self, pixels: &[[usize; 2]]) -> DirectPixels {
         let workspace = &mut Workspace::default();
         let image = &self.models.image;
-        let sources = self.reaching(workspace, pixels);
+        let mut backdrop = Backdrop::new(workspace, self.scene, self.models, self.plan);
+        let sources = self.reaching(workspace, &mut backdrop, pixels);
         let at = |&[i, j]: &[usize; 2]| i * self.raster.columns + j;
         let mut seconds = Seconds::default();
 
@@ -80,7 +93,8 @@ impl Stages<'_> {
         self.add_edge(&mut fields);
         self.turn_into_factors(&mut fields);
         let damping = self.damping(workspace);
-        let (backscatter, facets) = self.facets(&fields, damping.as_ref());
+        let unresolved = self.unresolved(workspace, &mut fields);
+        let (backscatter, facets) = self.facets(&fields, damping.as_ref(), unresolved.as_ref());
         let mut clock = Clock::start();
         let exact = backscatter.sigma0_pixels(&facets, &sources);
         seconds.backscatter = clock.lap();
@@ -88,7 +102,7 @@ impl Stages<'_> {
         for (source, value) in sources.iter().zip(exact) {
             all.values[at(source)] = value;
         }
-        self.modulate(&mut all, damping.as_ref());
+        self.modulate(&mut all, damping.as_ref(), &backdrop);
         // Where no wave was summed there is no source.
         let mut sigma0 = workspace.flat_field(&self.raster);
         for source in &sources {
@@ -115,11 +129,17 @@ impl Stages<'_> {
     }
 
     /// The source pixels that reach the pixels, by the fast fields.
-    fn reaching(&self, workspace: &mut Workspace, pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
-        let mut fields = self.sea(workspace);
+    fn reaching(
+        &self,
+        workspace: &mut Workspace,
+        backdrop: &mut Backdrop,
+        pixels: &[[usize; 2]],
+    ) -> Vec<[usize; 2]> {
+        let mut fields = self.sea(workspace, backdrop);
         self.add_swell(workspace, &mut fields);
         self.add_wake(workspace, &mut fields);
         self.add_edge(&mut fields);
+        self.unresolved(workspace, &mut fields);
         let velocity = fields.radial_velocity(workspace, &self.raster, self.models.incidence);
         let power = Field::constant(&self.raster, 1.0);
         let (imaging, sources) = self.imaging(&power, &velocity, &fields);

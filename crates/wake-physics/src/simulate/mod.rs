@@ -14,6 +14,7 @@ mod linear_sea;
 mod simulation;
 mod speckling;
 mod stages;
+mod strips;
 mod surface_fields;
 
 pub use accuracy::{Accuracy, Reached};
@@ -33,7 +34,6 @@ use crate::survey::Survey;
 use crate::workspace::Workspace;
 use clock::Clock;
 use speckling::{Exposure, Speckling};
-use stages::Stages;
 use surface_fields::Wanted;
 
 /// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
@@ -84,14 +84,10 @@ impl Simulator {
         let mut seconds = Seconds::default();
         let models = Models::new(scene);
         let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
-        let stages = Stages::new(scene, &models, &plan, method, Wanted::Fields);
         seconds.plan = clock.lap();
-        let mut drawn = stages.draw(
-            &mut self.workspace,
-            &mut self.table,
-            &mut clock,
-            &mut seconds,
-        );
+        let what = (scene, &models, &plan);
+        let how = (method, Wanted::Fields);
+        let mut drawn = self.draw(what, how, (&mut clock, &mut seconds));
         let mut speckled = self.workspace.field(&models.delivered);
         speckled.values.copy_from_slice(&drawn.intensity.values);
         let speckling = Speckling::of(scene, &models, drawn.exposure.take());
@@ -106,23 +102,18 @@ impl Simulator {
             .for_each(|field| self.workspace.give(field));
         seconds.speckle = clock.lap();
         let labels = labels_of(scene);
-        let crop = |field: &mut Field| {
-            let [rows, columns] = plan.sizes.margin;
-            let field = std::mem::take(field).crop(rows, columns);
-            delivered(field, &models)
-        };
-        let fields = &mut drawn.fields;
+        let fields = drawn.fields;
         let mut simulation = Simulation {
             raster: models.delivered,
-            elevation: crop(&mut fields.elevation),
-            slope_x: crop(&mut fields.slope_x),
-            slope_y: crop(&mut fields.slope_y),
-            velocity_x: crop(&mut fields.velocity_x),
-            velocity_y: crop(&mut fields.velocity_y),
-            velocity_z: crop(&mut fields.velocity_z),
-            radial_velocity: crop(&mut drawn.radial_velocity),
-            sigma0: crop(&mut drawn.sigma0),
-            intensity: Field::default(),
+            elevation: fields.elevation,
+            slope_x: fields.slope_x,
+            slope_y: fields.slope_y,
+            velocity_x: fields.velocity_x,
+            velocity_y: fields.velocity_y,
+            velocity_z: fields.velocity_z,
+            radial_velocity: drawn.radial_velocity,
+            sigma0: drawn.sigma0,
+            intensity: drawn.intensity,
             speckled,
             slc,
             labels,
@@ -132,7 +123,6 @@ impl Simulator {
             method,
             scene: scene.clone(),
         };
-        simulation.intensity = drawn.give_back(&mut self.workspace);
         simulation.seconds.labels = clock.lap();
         simulation.seconds.total = clock.total();
         Ok(simulation)
@@ -186,15 +176,10 @@ impl Simulator {
         models: &Models,
         plan: &Plan,
     ) -> (Field, Option<Exposure>, Accuracy) {
-        let stages = Stages::new(scene, models, plan, Method::Fast, Wanted::Image);
-        let mut drawn = stages.draw(
-            &mut self.workspace,
-            &mut self.table,
-            &mut Clock::start(),
-            &mut Seconds::default(),
-        );
-        let (accuracy, exposure) = (drawn.accuracy, drawn.exposure.take());
-        (drawn.give_back(&mut self.workspace), exposure, accuracy)
+        let mut clock = (Clock::start(), Seconds::default());
+        let how = (Method::Fast, Wanted::Image);
+        let drawn = self.draw((scene, models, plan), how, (&mut clock.0, &mut clock.1));
+        (drawn.intensity, drawn.exposure, drawn.accuracy)
     }
 
     /// Takes the blocks of a simulation back that is no longer needed: the next one of this size asks the system for
@@ -218,19 +203,6 @@ impl Simulator {
         let fields = surface.into_iter().chain(more);
         fields.for_each(|field| self.workspace.give(field));
     }
-}
-
-/// A field of the computed pixels at the pixels of the image.
-fn delivered(field: Field, models: &Models) -> Field {
-    let (from, to) = (&models.image, &models.delivered);
-    if models.response.is_none() {
-        return field;
-    }
-    let step = (to.spacing / from.spacing).round() as usize;
-    let first = |computed: i64, image: i64| (computed - image * step as i64).max(0) as usize;
-    let row = first(from.origin_row, to.origin_row);
-    let column = first(from.origin_column, to.origin_column);
-    Field::from_fn(to, |i, j| field.at(row + step * i, column + step * j))
 }
 
 /// Simulates a scene with the fast methods; for many scenes see [`Simulator`].

@@ -3,7 +3,8 @@
 use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
 use super::simulation::Method;
-use super::speckling::{Exposure, hull_echoes};
+use super::speckling::hull_echoes;
+use super::strips::Strip;
 use super::surface_fields::{SurfaceFields, Wanted, quantities};
 use crate::kelvin::{self, KelvinWake, WakePlan};
 use crate::models::Models;
@@ -21,6 +22,7 @@ use crate::wakes::Wake;
 use crate::waves::{Quantity, harmonic_fields};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A scene being drawn: what its stages have in common.
 pub(super) struct Stages<'a> {
@@ -28,8 +30,11 @@ pub(super) struct Stages<'a> {
     pub(super) models: &'a Models,
     pub(super) plan: &'a Plan,
     method: Method,
-    /// The image and its margin.
+    /// The computed image and its margin; where strips are computed the rows of one, and how many lie before them.
     pub(super) raster: Raster,
+    first_row: usize,
+    /// The computed image, or the rows of it.
+    pub(super) image: Raster,
     /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
     /// same bits with and without the second.
     pub(super) quantities: [Vec<Quantity>; 2],
@@ -41,16 +46,42 @@ pub(super) struct Drawn {
     /// Velocity toward the radar [m/s].
     pub(super) radial_velocity: Field,
     pub(super) sigma0: Field,
-    /// Intensity of the image.
+    /// Intensity of the computed image.
     pub(super) intensity: Field,
-    /// What the impulse response looks at, where the image has one.
-    pub(super) exposure: Option<Exposure>,
     pub(super) accuracy: Accuracy,
 }
 
+/// What all strips see, drawn as a whole.
+pub(super) struct Backdrop {
+    /// The waves of the sea.
+    surface: Option<Surface>,
+    /// Gusts at every few pixels.
+    gusts: Option<(Field, usize)>,
+}
+
+impl Backdrop {
+    pub(super) fn new(
+        workspace: &mut Workspace,
+        scene: &Scene,
+        models: &Models,
+        plan: &Plan,
+    ) -> Self {
+        let [rows, columns] = plan.sizes.margin;
+        let whole = models.image.with_margin(rows, columns);
+        let seed_and_time = (scene.seed, scene.sea.time);
+        let gusts = models.gusts.filter(|_| plan.uses(Term::Gusts));
+        Self {
+            surface: plan
+                .uses(Term::Sea)
+                .then(|| Surface::new_in(workspace, &models.sea, seed_and_time, &whole)),
+            gusts: gusts.map(|(gusts, _)| gusts.coarse_field(&whole, scene.seed)),
+        }
+    }
+}
+
 impl Drawn {
-    /// Puts the blocks of all fields but the image's back.
-    pub(super) fn give_back(self, workspace: &mut Workspace) -> Field {
+    /// Puts the blocks of all fields back.
+    pub(super) fn give_back(self, workspace: &mut Workspace) {
         let f = self.fields;
         let surface = [
             f.elevation,
@@ -60,21 +91,17 @@ impl Drawn {
             f.velocity_y,
         ];
         let more = [f.velocity_z, f.radial_acceleration, f.modulation];
-        let rest = [self.radial_velocity, self.sigma0];
-        let sources = self.exposure.map(|exposure| exposure.intensity);
-        let fields = surface.into_iter().chain(more).chain(rest).chain(sources);
+        let rest = [self.radial_velocity, self.sigma0, self.intensity];
+        let fields = surface.into_iter().chain(more).chain(rest);
         fields.for_each(|field| workspace.give(field));
-        self.intensity
     }
 }
 
 impl<'a> Stages<'a> {
     pub(super) fn new(
-        scene: &'a Scene,
-        models: &'a Models,
-        plan: &'a Plan,
-        method: Method,
-        wanted: Wanted,
+        (scene, models, plan): (&'a Scene, &'a Models, &'a Plan),
+        (method, wanted): (Method, Wanted),
+        strip: &Strip,
     ) -> Self {
         let [rows, columns] = plan.sizes.margin;
         Self {
@@ -82,7 +109,9 @@ impl<'a> Stages<'a> {
             models,
             plan,
             method,
-            raster: models.image.with_margin(rows, columns),
+            raster: models.image.with_margin(rows, columns).strip(&strip.raster),
+            first_row: strip.raster.start,
+            image: models.image.strip(&strip.image),
             quantities: quantities(plan, wanted),
         }
     }
@@ -92,41 +121,40 @@ impl<'a> Stages<'a> {
         &self,
         workspace: &mut Workspace,
         last_table: &mut Option<BackscatterTable>,
-        clock: &mut Clock,
-        seconds: &mut Seconds,
+        backdrop: &mut Backdrop,
+        (clock, seconds): (&mut Clock, &mut Seconds),
     ) -> Drawn {
         let mut accuracy = Accuracy::default();
-        let mut fields = self.sea(workspace);
+        let mut fields = self.sea(workspace, backdrop);
         self.add_swell(workspace, &mut fields);
-        seconds.sea = clock.lap();
+        seconds.sea += clock.lap();
         accuracy.wake = self.add_wake(workspace, &mut fields);
-        seconds.kelvin = clock.lap();
+        seconds.kelvin += clock.lap();
         self.add_edge(&mut fields);
         self.turn_into_factors(&mut fields);
         let damping = self.damping(workspace);
-        seconds.turbulent = clock.lap();
+        seconds.turbulent += clock.lap();
+        let roughness = self.unresolved(workspace, &mut fields);
         let damping_field = damping.as_ref();
-        let mut sigma0 = self.sigma0(workspace, last_table, &fields, damping_field, &mut accuracy);
-        self.modulate(&mut sigma0, damping_field);
-        damping.into_iter().for_each(|field| workspace.give(field));
-        seconds.backscatter = clock.lap();
+        let mut sigma0 = self.sigma0(
+            workspace,
+            last_table,
+            (&fields, damping_field, roughness.as_ref()),
+            &mut accuracy,
+        );
+        self.modulate(&mut sigma0, damping_field, backdrop);
+        let used = damping.into_iter().chain(roughness.into_iter().flatten());
+        used.for_each(|field| workspace.give(field));
+        seconds.backscatter += clock.lap();
         let radial_velocity =
             fields.radial_velocity(workspace, &self.raster, self.models.incidence);
         let intensity = self.image(workspace, &sigma0, &radial_velocity, &fields);
-        let (intensity, exposure) = match self.models.response {
-            None => (intensity, None),
-            Some(response) => {
-                let exposure = Exposure::of(self.scene, self.models, response, intensity);
-                (exposure.mean(), Some(exposure))
-            }
-        };
-        seconds.imaging = clock.lap();
+        seconds.imaging += clock.lap();
         Drawn {
             fields,
             radial_velocity,
             sigma0,
             intensity,
-            exposure,
             accuracy,
         }
     }
@@ -142,17 +170,20 @@ impl<'a> Stages<'a> {
         (share * self.scene.model.tolerance).max(1e-6)
     }
 
-    pub(super) fn sea(&self, workspace: &mut Workspace) -> SurfaceFields {
+    /// Rows of the whole computed image with its margin.
+    fn rows(&self) -> Range<usize> {
+        self.first_row..self.first_row + self.raster.rows
+    }
+
+    /// The waves of the sea; the last strip puts their blocks back.
+    pub(super) fn sea(&self, workspace: &mut Workspace, backdrop: &mut Backdrop) -> SurfaceFields {
         let mut fields = SurfaceFields::default();
-        if !self.plan.uses(Term::Sea) {
+        let Some(surface) = &backdrop.surface else {
             for &quantity in self.quantities.iter().flatten() {
                 *fields.of(quantity) = workspace.flat_field(&self.raster);
             }
             return fields;
-        }
-        let seed_and_time = (self.scene.seed, self.scene.sea.time);
-        let spectrum = &self.models.sea;
-        let surface = Surface::new_in(workspace, spectrum, seed_and_time, &self.raster);
+        };
         let transfer = &self.models.transfer;
         let mut put = |quantities: &[Quantity], made: Vec<Field>| {
             for (&quantity, field) in quantities.iter().zip(made) {
@@ -163,10 +194,8 @@ impl<'a> Stages<'a> {
             Method::Fast => {
                 for group in &self.quantities {
                     let tolerance = self.field_tolerance();
-                    put(
-                        group,
-                        surface.fields_in(workspace, transfer, group, tolerance),
-                    );
+                    let sum = (transfer, &group[..], tolerance);
+                    put(group, surface.strip_in(workspace, &self.rows(), sum));
                 }
             }
             Method::Direct => {
@@ -177,7 +206,11 @@ impl<'a> Stages<'a> {
                 );
             }
         }
-        surface.give_back(workspace);
+        if self.rows().end == surface.raster().rows {
+            let last = backdrop.surface.take();
+            last.into_iter()
+                .for_each(|surface| surface.give_back(workspace));
+        }
         fields
     }
 
@@ -285,8 +318,10 @@ impl<'a> Stages<'a> {
     pub(super) fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
         let uses = |term| self.plan.uses(term);
         let slicks = self.models.slicks.filter(|_| uses(Term::Slicks));
-        let slicks = slicks
-            .map(|slicks| slicks.field(&self.raster, self.scene.sea.wind_speed, self.scene.seed));
+        let [rows, columns] = self.plan.sizes.margin;
+        let whole = self.models.image.with_margin(rows, columns);
+        let wind_and_seed = (self.scene.sea.wind_speed, self.scene.seed);
+        let slicks = slicks.map(|slicks| slicks.strip(&whole, &self.rows(), wind_and_seed));
         let wakes: &[Wake] = if uses(Term::Turbulent) {
             &self.models.wakes
         } else {
@@ -310,6 +345,50 @@ impl<'a> Stages<'a> {
             }
         }
         left
+    }
+
+    /// Variances xx, xy and yy of the slopes of the ship's waves that the pixels do not carry. Their velocities smear the
+    /// image as an acceleration would that defocuses as much: the mean square of both is that of one.
+    pub(super) fn unresolved(
+        &self,
+        workspace: &mut Workspace,
+        fields: &mut SurfaceFields,
+    ) -> Option<[Field; 3]> {
+        let models = self.models;
+        if !self.plan.uses(Term::Unresolved) {
+            return None;
+        }
+        let raster = &self.raster;
+        let mut variances = [(); 3].map(|()| workspace.flat_field(raster));
+        let per_velocity = if self.plan.uses(Term::Coherence) {
+            models.defocus_of_velocity()
+        } else {
+            0.0
+        };
+        let columns = raster.columns.max(1);
+        let mut unused = Vec::new();
+        let acceleration = &mut fields.radial_acceleration.values;
+        let acceleration = if per_velocity > 0.0 {
+            acceleration
+        } else {
+            unused.resize(raster.len(), 0.0);
+            &mut unused
+        };
+        let [xx, xy, yy] = variances
+            .each_mut()
+            .map(|f| f.values.par_chunks_mut(columns));
+        let rows = xx.zip(xy).zip(yy).zip(acceleration.par_chunks_mut(columns));
+        rows.enumerate()
+            .for_each(|(i, (((xx, xy), yy), acceleration))| {
+                for (j, acceleration) in acceleration.iter_mut().enumerate() {
+                    if let Some(rough) = models.roughness([raster.x(j), raster.y(i)]) {
+                        [xx[j], xy[j], yy[j]] = rough.slopes.map(|v| v as f32);
+                        let square = rough.radial(models.incidence) * per_velocity * per_velocity;
+                        *acceleration = acceleration.hypot(square.sqrt() as f32);
+                    }
+                }
+            });
+        Some(variances)
     }
 
     /// The edges that are drawn.
@@ -336,12 +415,19 @@ impl<'a> Stages<'a> {
     }
 
     /// What breaking waves, the wake's edges and gusts do to σ⁰.
-    pub(super) fn modulate(&self, sigma0: &mut Field, damping: Option<&Field>) {
+    pub(super) fn modulate(
+        &self,
+        sigma0: &mut Field,
+        damping: Option<&Field>,
+        backdrop: &Backdrop,
+    ) {
         self.add_breaking(sigma0, damping);
         for edge in self.edges() {
             edge.modulate(sigma0, &self.raster);
         }
-        self.add_gusts(sigma0);
+        if let (Some((gusts, exponent)), Some(drawn)) = (self.models.gusts, &backdrop.gusts) {
+            gusts.modulate_strip(sigma0, self.first_row, drawn, exponent);
+        }
     }
 
     /// Adds the return of breaking waves, damped like the short ones.
@@ -359,19 +445,12 @@ impl<'a> Stages<'a> {
         }
     }
 
-    fn add_gusts(&self, sigma0: &mut Field) {
-        if let Some((gusts, exponent)) = self.models.gusts
-            && self.plan.uses(Term::Gusts)
-        {
-            gusts.modulate_raster(sigma0, &self.raster, exponent, self.scene.seed);
-        }
-    }
-
     /// σ⁰ as a function of the slope, and the facets it is taken at.
     pub(super) fn facets<'f>(
         &self,
         fields: &'f SurfaceFields,
         damping: Option<&'f Field>,
+        unresolved: Option<&'f [Field; 3]>,
     ) -> (Backscatter, FacetFields<'f>) {
         let uses = |term| self.plan.uses(term);
         let backscatter = self
@@ -382,6 +461,7 @@ impl<'a> Stages<'a> {
             slope_y: &fields.slope_y,
             modulation: uses(Term::Hydrodynamic).then_some(&fields.modulation),
             damping,
+            unresolved,
         };
         (backscatter, facets)
     }
@@ -390,18 +470,18 @@ impl<'a> Stages<'a> {
         &self,
         workspace: &mut Workspace,
         last_table: &mut Option<BackscatterTable>,
-        fields: &SurfaceFields,
-        damping: Option<&Field>,
+        (fields, damping, unresolved): (&SurfaceFields, Option<&Field>, Option<&[Field; 3]>),
         accuracy: &mut Accuracy,
     ) -> Field {
-        let (backscatter, facets) = self.facets(fields, damping);
+        let (backscatter, facets) = self.facets(fields, damping, unresolved);
         if self.method == Method::Direct {
             return backscatter.sigma0_field(&facets);
         }
         let asked = SHARES.table * self.scene.model.tolerance;
         let slopes = [facets.slope_x, facets.slope_y];
+        let reach = facets.reach();
         let table_for = |last, mean: f64| {
-            BackscatterTable::covering_or(last, backscatter.clone(), slopes, asked * mean)
+            BackscatterTable::covering_or(last, backscatter.clone(), (slopes, reach), asked * mean)
         };
         let mut sigma0 = workspace.field(&self.raster);
         let mut table = table_for(last_table.take(), self.plan.mean_sigma0);
@@ -456,7 +536,7 @@ impl<'a> Stages<'a> {
         fields: &SurfaceFields,
     ) -> Field {
         let (imaging, sources) = self.imaging(sigma0, radial_velocity, fields);
-        let image = &self.models.image;
+        let image = &self.image;
         let tolerance = SHARES.kernels * self.scene.model.tolerance;
         let mut intensity = match self.method {
             Method::Fast => imaging.image_in(workspace, &sources, image, tolerance),
@@ -471,7 +551,7 @@ impl<'a> Stages<'a> {
         if self.models.response.is_none() {
             let resolution = self.models.resolution_at_rest().nominal;
             for echo in hull_echoes(self.scene, self.models) {
-                echo.add_to(intensity, &self.models.image, resolution);
+                echo.add_to(intensity, &self.image, resolution);
             }
         }
         if self.plan.uses(Term::Noise) {

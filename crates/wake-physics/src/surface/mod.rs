@@ -18,6 +18,7 @@ use draw::{Draw, Scatter};
 use factor::Factors;
 use num_complex::{Complex, Complex32, Complex64};
 use std::f64::consts::TAU;
+use std::ops::Range;
 use vector::Lane;
 use wave_lattice::WaveLattice;
 
@@ -161,6 +162,11 @@ impl Surface {
         }
     }
 
+    /// Where it is seen.
+    pub(crate) fn raster(&self) -> &Raster {
+        &self.raster
+    }
+
     /// Puts the blocks of the amplitudes back.
     pub(crate) fn give_back(self, workspace: &mut Workspace) {
         workspace.spectra.0.give(self.even);
@@ -283,27 +289,28 @@ impl Surface {
         quantities: &[Quantity],
         tolerance: f64,
     ) -> Vec<Field> {
-        self.fields_in(&mut Workspace::default(), transfer, quantities, tolerance)
+        let rows = 0..self.raster.rows;
+        let sum = (transfer, quantities, tolerance);
+        self.strip_in(&mut Workspace::default(), &rows, sum)
     }
 
-    /// [`Self::fields`] in blocks of a workspace.
-    pub(crate) fn fields_in(
+    /// Some rows of [`Self::fields`], in blocks of a workspace.
+    pub(crate) fn strip_in(
         &self,
         workspace: &mut Workspace,
-        transfer: &Transfer,
-        quantities: &[Quantity],
-        tolerance: f64,
+        rows: &Range<usize>,
+        (transfer, quantities, tolerance): (&Transfer, &[Quantity], f64),
     ) -> Vec<Field> {
-        let mut fields: Vec<Field> = quantities
-            .iter()
-            .map(|_| workspace.field(&self.raster))
-            .collect();
-        if self.is_flat() || self.raster.is_empty() {
+        let strip = self.raster.strip(rows);
+        let field = |_: &Quantity| workspace.field(&strip);
+        let mut fields: Vec<Field> = quantities.iter().map(field).collect();
+        let sum = (transfer, quantities);
+        if self.is_flat() || strip.is_empty() {
             fields.iter_mut().for_each(|field| field.values.fill(0.0));
         } else if tolerance >= SINGLE_PRECISION_TOLERANCE {
-            self.synthesize::<f32>(workspace, transfer, quantities, &mut fields);
+            self.synthesize::<f32>(workspace, rows, sum, &mut fields);
         } else {
-            self.synthesize::<f64>(workspace, transfer, quantities, &mut fields);
+            self.synthesize::<f64>(workspace, rows, sum, &mut fields);
         }
         fields
     }
@@ -312,36 +319,33 @@ impl Surface {
     fn synthesize<T: Lane>(
         &self,
         workspace: &mut Workspace,
-        transfer: &Transfer,
-        quantities: &[Quantity],
+        rows: &Range<usize>,
+        (transfer, quantities): (&Transfer, &[Quantity]),
         fields: &mut [Field],
     ) {
+        let columns = self.raster.columns;
         let mut unused = if quantities.len() % 2 == 1 {
-            workspace.floats.take(self.raster.len(), 0.0)
+            workspace.floats.take(rows.len() * columns, 0.0)
         } else {
             Vec::new()
         };
         let (blocks, planner) = T::of(workspace);
         let plan = Synthesis::<T>::planned(planner, self.lattice.rows, self.lattice.columns);
         let factors = Factors::new(&self.lattice, transfer);
-        let mut half = blocks.take(plan.half_len(), Complex::new(T::zero(), T::zero()));
+        let zero = Complex::new(T::zero(), T::zero());
+        let mut half = blocks.take(plan.half_len(rows.len()), zero);
         for (pair, quantities) in fields.chunks_mut(2).zip(quantities.chunks(2)) {
             let out = match pair {
                 [first, second] => (&mut first.values[..], &mut second.values[..]),
                 [first] => (&mut first.values[..], &mut unused[..]),
                 _ => continue,
             };
-            plan.run_real(
-                &mut half,
-                [self.raster.rows, self.raster.columns],
-                out,
-                |line, one, two| {
-                    vectorized(
-                        #[inline(always)]
-                        || self.half_spectra(&factors, line, quantities, [one, two]),
-                    );
-                },
-            );
+            plan.run_real(&mut half, (rows.clone(), columns), out, |line, one, two| {
+                vectorized(
+                    #[inline(always)]
+                    || self.half_spectra(&factors, line, quantities, [one, two]),
+                );
+            });
         }
         T::of(workspace).0.give(half);
         workspace.floats.give(unused);

@@ -49,6 +49,9 @@ pub(crate) struct Survey {
     /// Roots of mean squares over the image: what the current of the wake changes σ⁰ and its density in the image by,
     /// relative, and its velocity along the line of sight [m/s].
     pub(crate) edge: [f64; 2],
+    /// Roots of mean squares over the image: what the ship's unresolved waves change σ⁰ by, relative, and the share of
+    /// the width of a point that their velocities add, 0 to 1.
+    pub(crate) unresolved: [f64; 2],
     /// Damping in slicks.
     pub(crate) slicks: f64,
     /// Root of the mean square of what gusts change σ⁰ by, relative.
@@ -102,6 +105,7 @@ impl Survey {
             sea,
             swell,
             edge: edge(models),
+            unresolved: unresolved(models, &backscatter),
             slicks: models.slicks.map_or(0.0, |s| s.damping),
             gusts: models
                 .gusts
@@ -213,6 +217,13 @@ impl Survey {
                 scene.sea.wind_speed
             ));
         }
+        if let Some(asked) = models.asked_spacing {
+            notes.push(format!(
+                "waves on the arms of a wake ask for pixels of {asked:.2} m; {} m are computed: shorter waves count by their mean \
+                 slopes and velocities where an impulse response is asked for, else not",
+                models.image.spacing
+            ));
+        }
         let count = models.wakes.len();
         for (n, wake) in models.wakes.iter().enumerate() {
             let wavelength = wake.kelvin.transverse_wavelength();
@@ -241,6 +252,12 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
         unseen.then_some("it does not reach the image")
     };
     let asked = |asked: bool| (!asked).then_some("not asked for");
+    let unresolved = match &models.unresolved[..] {
+        _ if !models.counts_unresolved => Some("not asked for"),
+        [] => Some("there is no ship, or no such wave of one"),
+        _ if survey.unresolved[0] == 0.0 => Some("it does not reach the image"),
+        _ => None,
+    };
     let swell = match &models.swell {
         None => Some("not asked for"),
         Some(_) if survey.swell.is_empty() => Some("no swell that a pixel carries"),
@@ -258,6 +275,7 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
     };
     [
         (Term::Swell, swell),
+        (Term::Unresolved, unresolved),
         (Term::Edge, edge),
         (Term::Slicks, slicks),
         (Term::Breaking, asked(models.breaking > 0.0)),
@@ -383,6 +401,51 @@ fn edge(models: &Models) -> [f64; 2] {
     edges
         .map(of)
         .fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
+}
+
+/// What the waves of the ship that pixels do not carry change over the image, see [`Survey::unresolved`].
+fn unresolved(models: &Models, backscatter: &Backscatter) -> [f64; 2] {
+    if models.unresolved.is_empty() {
+        return [0.0; 2];
+    }
+    let curvature = curvature_of_sigma(backscatter);
+    let change = |place| {
+        let rough = models.roughness(place).unwrap_or_default();
+        let terms = rough.slopes.iter().zip(curvature);
+        terms
+            .map(|(variance, curvature)| variance * curvature)
+            .sum()
+    };
+    let narrow = models.resolution().at(0.0) / (SQRT_2 * PI);
+    let width = models.image.spacing.hypot(narrow);
+    let wider = |place| {
+        let rough = models.roughness(place).unwrap_or_default();
+        let smear = models.range_to_velocity.powi(2) * rough.radial(models.incidence);
+        smear / (smear + width * width)
+    };
+    [
+        rms_over(&models.image, change),
+        rms_over(&models.image, wider),
+    ]
+}
+
+/// ½∂²σ⁰/∂s² over σ⁰ for variances xx, xy and yy of the slopes, on the calm facet.
+fn curvature_of_sigma(backscatter: &Backscatter) -> [f64; 3] {
+    let sigma = |x: f64, y: f64| {
+        let [bragg, specular] = backscatter.coarse_parts([x * SLOPE_STEP, y * SLOPE_STEP]);
+        bragg + specular
+    };
+    let calm = sigma(0.0, 0.0);
+    if calm <= 0.0 {
+        return [0.0; 3];
+    }
+    let square = SLOPE_STEP * SLOPE_STEP * calm;
+    let mixed = sigma(1.0, 1.0) + sigma(-1.0, -1.0) - sigma(1.0, -1.0) - sigma(-1.0, 1.0);
+    [
+        0.5 * (sigma(1.0, 0.0) + sigma(-1.0, 0.0) - 2.0 * calm) / square,
+        0.25 * mixed / square,
+        0.5 * (sigma(0.0, 1.0) + sigma(0.0, -1.0) - 2.0 * calm) / square,
+    ]
 }
 
 /// Root of the mean square of a function of the place (x, y) over the image, looked at on a coarse raster.

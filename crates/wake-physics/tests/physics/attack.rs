@@ -14,7 +14,7 @@ fn ends(min: f64, max: f64) -> impl Strategy<Value = f64> {
 
 prop_compose! {
     fn grid()(rows in 1_usize..=9, columns in 1_usize..=9, spacing in ends(0.1, 100.0)) -> Grid {
-        Grid { rows, columns, spacing }
+        Grid { rows, columns, spacing, oversampling: None }
     }
 }
 

@@ -12,6 +12,7 @@ mod expected;
 mod hard_cases;
 mod methods;
 mod plan;
+mod refinement;
 mod satellite;
 mod ships;
 mod simulator;

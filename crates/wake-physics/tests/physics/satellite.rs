@@ -6,8 +6,9 @@ use wake_physics::scene::{Term, Terms};
 use wake_physics::{Field, Scene, Simulator, simulate};
 
 /// Terms that a scene has only where it asks for them.
-pub(crate) const EXTRAS: [Term; 7] = [
+pub(crate) const EXTRAS: [Term; 8] = [
     Term::Swell,
+    Term::Unresolved,
     Term::Edge,
     Term::Slicks,
     Term::Breaking,

@@ -1,0 +1,299 @@
+//! The pixels that a scene is computed on: those of the image, or a whole number of finer ones along each side of a pixel.
+//!
+//! Waves far shorter than a pixel are not seen as waves, but what they do to the mean brightness is: on pixels too coarse for
+//! the waves on the arms of a wake the arms vanish. So the spacing computed on is at most
+//!
+//! ```text
+//! ρ/4 and 1/(2B)                            where the image has an impulse response
+//! λ_cusp/3.5,  λ_cusp = (2/3) 2πU²/g        where a ship's waves would be seen and the image's pixels do not carry them
+//! ```
+//!
+//! and an integer fraction of the image's. A pixel of the image is the mean over its square.
+
+use crate::kelvin::KelvinWake;
+use crate::raster::{Field, Raster};
+use crate::sar::ImpulseResponse;
+use crate::scene::Grid;
+use crate::wakes::Wake;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Pixels a wave on the arms of a wake must have: chosen, as the brightness of arms no longer changes on finer ones.
+const PIXELS_A_CUSP_WAVE: f64 = 3.5;
+
+/// A ship's waves are not seen where their slopes have a smaller variance: σ⁰ changes by below 1 % (two-scale theory, C
+/// band at 25°, where it changes most: 1.4 dB by 0.005).
+const VISIBLE: f64 = 1e-4;
+
+/// For the sake of a ship's waves a pixel is divided by at most this along each side, and as long as no more pixels than
+/// these are computed: about a second on two cores (both chosen).
+const MOST_DIVISIONS: usize = 4;
+const MOST_PIXELS: usize = 1 << 22;
+
+/// What is computed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Computed {
+    /// The pixels, without the margin.
+    pub(crate) raster: Raster,
+    /// Spacing that the waves of a ship ask for \[m\], where it is below that of the raster.
+    pub(crate) asked: Option<f64>,
+}
+
+impl Computed {
+    /// Chooses the pixels for those of an image.
+    pub(crate) fn new(
+        grid: &Grid,
+        image: &Raster,
+        response: Option<&ImpulseResponse>,
+        wakes: &[Wake],
+    ) -> Self {
+        let divisions = |spacing: f64| (image.spacing / spacing * (1.0 - 1e-12)).ceil().max(1.0);
+        let carried = response.map_or(1.0, |r| divisions(r.carrying_spacing()));
+        let for_response = response.map_or(1.0, |r| divisions(r.largest_spacing()));
+        let cusp = |wake: &Wake| {
+            let wake = &wake.kelvin;
+            let spacing = wake.transverse_wavelength() / 1.5 / PIXELS_A_CUSP_WAVE;
+            visible(wake, image, spacing).then_some(spacing)
+        };
+        let asked = wakes.iter().filter_map(cusp).fold(f64::INFINITY, f64::min);
+        let most = (MOST_PIXELS as f64 / image.len() as f64).sqrt().floor();
+        let for_ships = divisions(asked).min(MOST_DIVISIONS as f64).min(most);
+        let chosen = match grid.oversampling {
+            Some(divisions) => f64::from(divisions).max(carried),
+            None => for_response.max(for_ships),
+        };
+        let fine = image.divided(chosen as usize);
+        Self {
+            raster: response.map_or(fine, |response| {
+                let [rows, columns] = response.guard(fine.spacing);
+                fine.with_margin(rows, columns)
+            }),
+            asked: (asked < fine.spacing * (1.0 - 1e-9)).then_some(asked),
+        }
+    }
+}
+
+/// Whether waves of a ship that the image's pixels do not carry, but pixels of a spacing \[m\] would, are seen half-way to
+/// the farthest corner of the image astern.
+fn visible(wake: &KelvinWake, image: &Raster, spacing: f64) -> bool {
+    if spacing >= image.spacing {
+        return false;
+    }
+    let astern = wake
+        .track
+        .corners(image)
+        .iter()
+        .map(|c| -c[0])
+        .fold(0.0, f64::max);
+    let waves = wake.unresolved([PI / image.spacing, PI / spacing]);
+    astern > 0.0 && waves.is_some_and(|waves| waves.steepest(0.5 * astern) >= VISIBLE)
+}
+
+/// The computed pixels of each pixel of an image, and their weights: one that lies on the edge of two counts half for each.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Parts {
+    /// First computed row and column of the image's first pixel.
+    first: [usize; 2],
+    step: usize,
+    /// Weights along a side of a pixel, with sum 1.
+    side: Vec<f32>,
+}
+
+impl Parts {
+    /// # Panics
+    ///
+    /// If a pixel of the image reaches beyond the computed ones.
+    pub(crate) fn new(computed: &Raster, image: &Raster) -> Self {
+        let step = (image.spacing / computed.spacing).round() as i64;
+        let half = step / 2;
+        let first = [
+            computed.origin_row - image.origin_row * step - half,
+            computed.origin_column - image.origin_column * step - half,
+        ];
+        assert!(
+            first.iter().all(|&n| n >= 0),
+            "an image that reaches beyond what is computed"
+        );
+        let on_edge = |n: i64| step % 2 == 0 && (n == 0 || n == step);
+        let weight = |n: i64| if on_edge(n) { 0.5 } else { 1.0 } / step as f32;
+        Self {
+            first: first.map(|n| n as usize),
+            step: step as usize,
+            side: (0..=2 * half).map(weight).collect(),
+        }
+    }
+
+    /// The computed rows of some rows of the image.
+    pub(crate) fn rows(&self, rows: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+        let start = self.first[0] + rows.start * self.step;
+        let last = self.first[0] + rows.end.max(1) * self.step - self.step;
+        start..(last + self.side.len()).max(start)
+    }
+
+    /// Number of computed pixels of one.
+    pub(crate) fn count(&self) -> usize {
+        self.side.len() * self.side.len()
+    }
+
+    /// The computed pixels of one, row after row.
+    pub(crate) fn of(&self, [i, j]: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
+        let [row, column] = [self.first[0] + i * self.step, self.first[1] + j * self.step];
+        let side = self.side.len();
+        (0..side * side).map(move |n| [row + n / side, column + n % side])
+    }
+
+    /// The mean over one pixel of values at its parts.
+    pub(crate) fn mean(&self, values: &[f64]) -> f64 {
+        let rows = values.chunks(self.side.len()).zip(&self.side);
+        let along = |row: &[f64]| -> f64 {
+            row.iter()
+                .zip(&self.side)
+                .map(|(v, &w)| v * f64::from(w))
+                .sum()
+        };
+        rows.map(|(row, &weight)| f64::from(weight) * along(row))
+            .sum()
+    }
+}
+
+/// The means of a field on computed pixels over those of an image.
+///
+/// # Panics
+///
+/// If a pixel of the image reaches beyond the computed ones, or the field is not of their size.
+pub(crate) fn means_over(field: &Field, computed: &Raster, image: &Raster) -> Field {
+    let size = [field.rows, field.columns];
+    assert_eq!(
+        size,
+        [computed.rows, computed.columns],
+        "a field of another size"
+    );
+    let Parts { first, step, side } = Parts::new(computed, image);
+    let mut out = Field::constant(image, 0.0);
+    let rows = out.values.par_chunks_mut(image.columns.max(1)).enumerate();
+    rows.for_each_init(
+        || vec![0.0f32; field.columns],
+        |line, (i, row)| {
+            line.fill(0.0);
+            for (n, weight) in side.iter().enumerate() {
+                let part = &field.values[(first[0] + i * step + n) * field.columns..];
+                for (sum, value) in line.iter_mut().zip(part) {
+                    *sum += weight * value;
+                }
+            }
+            for (j, value) in row.iter_mut().enumerate() {
+                let parts = line[first[1] + j * step..].iter().zip(&side);
+                *value = parts.map(|(v, w)| v * w).sum();
+            }
+        },
+    );
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scene;
+    use crate::models::Models;
+
+    fn computed(keys: &[&str]) -> (Models, f64) {
+        let size = ["grid.rows=64", "grid.columns=48"];
+        let scene = Scene::default()
+            .with_assignments(&[&size[..], keys].concat())
+            .unwrap();
+        let models = Models::new(&scene);
+        (models.clone(), models.image.spacing)
+    }
+
+    /// λ_cusp = 2π 6.5²/(1.5 · 9.807) = 18.05 m asks for 5.16 m: the fraction of the image's spacing below it.
+    #[test]
+    fn the_waves_on_the_arms_have_their_pixels() {
+        let slow = "ship.speed=6.5";
+        for (spacing, expected) in [
+            (20.0, 5.0),
+            (10.0, 5.0),
+            (5.0, 5.0),
+            (2.5, 2.5),
+            (15.0, 5.0),
+        ] {
+            let grid = format!("grid.spacing={spacing}");
+            assert!(
+                (computed(&[slow, &grid]).1 - expected).abs() < 1e-12,
+                "{spacing}"
+            );
+            // No waves, no finer pixels: without a ship, at rest, and where the image lies ahead of the ship.
+            for none in ["ship.speed=0", "ship.position=[0, 9000]"] {
+                let heading = "ship.heading=180";
+                assert!((computed(&[slow, heading, none, &grid]).1 - spacing).abs() < 1e-12);
+            }
+        }
+        // The waves of the default ship have 17 pixels as it is.
+        let (models, _) = computed(&[]);
+        assert!(!models.is_refined() && models.image == models.delivered);
+    }
+
+    /// Neither a slow ship nor a large image makes more pixels than the limits; what is asked for is known.
+    #[test]
+    fn the_limits_hold() {
+        let (models, spacing) = computed(&["ship.speed=2", "grid.spacing=10"]);
+        assert!((spacing - 2.5).abs() < 1e-12);
+        let asked = 2.0 / 3.0 * std::f64::consts::TAU * 4.0 / 9.80665 / 3.5;
+        assert!((models.asked_spacing.unwrap() / asked - 1.0).abs() < 1e-12);
+        let large = [
+            "ship.speed=2",
+            "grid.spacing=10",
+            "grid.rows=1500",
+            "grid.columns=1500",
+        ];
+        assert!((computed(&large).1 - 10.0).abs() < 1e-12);
+        let (models, spacing) = computed(&["ship.speed=6.5", "grid.spacing=10"]);
+        assert!((spacing - 5.0).abs() < 1e-12 && models.asked_spacing.is_none());
+    }
+
+    #[test]
+    fn a_key_or_a_response_decide_where_they_are_there() {
+        let key = "grid.oversampling=3";
+        assert!((computed(&["grid.spacing=9", key]).1 - 3.0).abs() < 1e-12);
+        let sentinel = "radar.sensor=sentinel-1-iw";
+        assert!((computed(&[sentinel]).1 - 5.0).abs() < 1e-12);
+        // ρ = 20.3 m asks for 5.1 m, and twice its bandwidth for 9.7 m: one pixel of 20 m would not carry it.
+        assert!(
+            (computed(&[sentinel, "grid.spacing=20", "grid.oversampling=1"]).1 - 20.0 / 3.0).abs()
+                < 1e-9
+        );
+    }
+
+    /// The weights are the shares of squares: a plane keeps its value in the middle of a pixel, and where the parts tile
+    /// the image each counts once in all.
+    #[test]
+    fn means_are_over_the_square_of_a_pixel() {
+        let image = Raster::image(5, 4, 12.0);
+        for divisions in 1..=5 {
+            let fine = image.divided(divisions).with_margin(2, 1);
+            let plane = Field::from_fn(&fine, |i, j| (fine.x(j) + 3.0 * fine.y(i)) as f32);
+            let means = means_over(&plane, &fine, &image);
+            let parts = Parts::new(&fine, &image);
+            for (i, j) in [(0, 0), (4, 3), (2, 1)] {
+                let expected = image.x(j) + 3.0 * image.y(i);
+                // Sums of 25 values below 200, rounded to 6e-8 each.
+                assert!(
+                    (f64::from(means.at(i, j)) - expected).abs() < 1e-4,
+                    "{divisions}"
+                );
+                let values = parts.of([i, j]).map(|[r, c]| f64::from(plane.at(r, c)));
+                let mean = parts.mean(&values.collect::<Vec<_>>());
+                assert!((mean - expected).abs() < 1e-4, "{divisions}");
+            }
+            let mut shares = vec![0.0f32; fine.len()];
+            for pixel in (0..image.len()).map(|n| [n / 4, n % 4]) {
+                for (n, [r, c]) in parts.of(pixel).enumerate() {
+                    let side = parts.side.len();
+                    shares[r * fine.columns + c] += parts.side[n / side] * parts.side[n % side];
+                }
+            }
+            let inner = shares[(2 + divisions) * fine.columns + 1 + divisions];
+            assert!((inner * (divisions * divisions) as f32 - 1.0).abs() < 1e-6);
+            assert!((shares.iter().sum::<f32>() - image.len() as f32).abs() < 1e-4);
+        }
+    }
+}

@@ -1,0 +1,345 @@
+//! A large scene in strips of rows: one after the other, so that only the image is in memory as a whole.
+//!
+//! Places decide, not strips: all strips see the same waves of the sea, drawn once on one lattice, and the same nodes of the
+//! wake. What differs is the rounding of sums that depend on what else is summed (FFTs of the wake's gridding, the table of
+//! σ⁰), which stays within the shares of the tolerance that these have. Rows are computed beyond a strip as far as echoes are
+//! displaced, twice the margin of the image.
+
+use super::Simulator;
+use super::accuracy::Accuracy;
+use super::clock::{Clock, Seconds};
+use super::simulation::Method;
+use super::speckling::Exposure;
+use super::stages::{Backdrop, Drawn, Stages};
+use super::surface_fields::{SurfaceFields, Wanted};
+use crate::computed::{Parts, means_over};
+use crate::models::Models;
+use crate::plan::Plan;
+use crate::raster::{Field, Raster};
+use crate::scene::Scene;
+use crate::workspace::Workspace;
+use std::ops::Range;
+
+/// Margins between a strip's image and the edge of what is computed for it.
+const OVERLAP: usize = 2;
+
+/// One strip.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Strip {
+    /// Rows of the image.
+    delivered: Range<usize>,
+    /// Rows of the computed image that they are made of; the last may be the first of the next strip as well.
+    pub(super) image: Range<usize>,
+    /// Those of them that belong to no other strip.
+    own: Range<usize>,
+    /// Rows of the computed pixels with their margin.
+    pub(super) raster: Range<usize>,
+}
+
+impl Strip {
+    /// All rows.
+    pub(super) fn whole(models: &Models, plan: &Plan) -> Self {
+        Self {
+            delivered: 0..models.delivered.rows,
+            image: 0..models.image.rows,
+            own: 0..models.image.rows,
+            raster: 0..models.image.rows + 2 * plan.sizes.margin[0],
+        }
+    }
+
+    /// The strips of a plan, from the first row to the last.
+    pub(super) fn all(models: &Models, plan: &Plan) -> Vec<Self> {
+        let count = plan.sizes.strips;
+        let whole = Self::whole(models, plan);
+        let parts = Parts::new(&models.image, &models.delivered);
+        let margin = plan.sizes.margin[0];
+        let one = |n: usize| {
+            let [start, end] = [n, n + 1].map(|n| n * whole.delivered.end / count);
+            let mut own = parts.rows(&(start..end)).start..parts.rows(&(end..end + 1)).start;
+            let mut image = parts.rows(&(start..end));
+            // Around the rows of the strip lie margin rows, then the overlap.
+            let mut raster = image.start.saturating_sub((OVERLAP - 1) * margin)
+                ..(image.end + (OVERLAP + 1) * margin).min(whole.raster.end);
+            if n == 0 {
+                (own.start, image.start, raster.start) = (0, 0, 0);
+            }
+            if n + 1 == count {
+                (own.end, image.end, raster.end) =
+                    (whole.own.end, whole.image.end, whole.raster.end);
+            }
+            Self {
+                delivered: start..end,
+                image,
+                own,
+                raster,
+            }
+        };
+        (0..count).map(one).collect()
+    }
+}
+
+/// A scene before speckle: everything at the pixels of the image.
+#[derive(Default)]
+pub(super) struct Delivered {
+    pub(super) fields: SurfaceFields,
+    /// Velocity toward the radar [m/s].
+    pub(super) radial_velocity: Field,
+    pub(super) sigma0: Field,
+    /// Intensity of the image.
+    pub(super) intensity: Field,
+    /// What the impulse response looks at, where the image has one.
+    pub(super) exposure: Option<Exposure>,
+    pub(super) accuracy: Accuracy,
+}
+
+impl Delivered {
+    /// The fields that are results, but for the image.
+    fn outputs(&mut self) -> [&mut Field; 8] {
+        outputs(
+            &mut self.fields,
+            &mut self.radial_velocity,
+            &mut self.sigma0,
+        )
+    }
+}
+
+impl Drawn {
+    /// As [`Delivered::outputs`].
+    fn outputs(&mut self) -> [&mut Field; 8] {
+        outputs(
+            &mut self.fields,
+            &mut self.radial_velocity,
+            &mut self.sigma0,
+        )
+    }
+}
+
+fn outputs<'f>(
+    fields: &'f mut SurfaceFields,
+    radial_velocity: &'f mut Field,
+    sigma0: &'f mut Field,
+) -> [&'f mut Field; 8] {
+    let SurfaceFields {
+        elevation,
+        slope_x,
+        slope_y,
+        velocity_x,
+        velocity_y,
+        velocity_z,
+        ..
+    } = fields;
+    [
+        elevation,
+        slope_x,
+        slope_y,
+        velocity_x,
+        velocity_y,
+        velocity_z,
+        radial_velocity,
+        sigma0,
+    ]
+}
+
+impl Simulator {
+    /// All stages up to the intensity before speckle. The clock runs since the plan was made; without `Wanted::Fields`
+    /// there is only the image.
+    pub(super) fn draw(
+        &mut self,
+        (scene, models, plan): (&Scene, &Models, &Plan),
+        (method, wanted): (Method, Wanted),
+        (clock, seconds): (&mut Clock, &mut Seconds),
+    ) -> Delivered {
+        let workspace = &mut self.workspace;
+        let mut backdrop = Backdrop::new(workspace, scene, models, plan);
+        let mut out = Delivered::default();
+        for strip in &Strip::all(models, plan) {
+            let stages = Stages::new((scene, models, plan), (method, wanted), strip);
+            let mut drawn =
+                stages.draw(workspace, &mut self.table, &mut backdrop, (clock, seconds));
+            out.accuracy = out.accuracy.and(&drawn.accuracy);
+            let pixels = models.delivered.strip(&strip.delivered);
+            let intensity = std::mem::take(&mut drawn.intensity);
+            if models.response.is_some() {
+                let rows = [strip.own.clone(), 0..models.image.rows];
+                put(workspace, &mut out.intensity, rows, intensity);
+            } else {
+                let rows = [strip.delivered.clone(), 0..models.delivered.rows];
+                let intensity = means(workspace, intensity, &stages.image, &pixels);
+                put(workspace, &mut out.intensity, rows, intensity);
+            }
+            if wanted == Wanted::Fields {
+                for (to, from) in out.outputs().into_iter().zip(drawn.outputs()) {
+                    let rows = [strip.delivered.clone(), 0..models.delivered.rows];
+                    let part = means(workspace, std::mem::take(from), &stages.raster, &pixels);
+                    put(workspace, to, rows, part);
+                }
+            }
+            drawn.give_back(workspace);
+        }
+        if let Some(response) = models.response {
+            let sources = std::mem::take(&mut out.intensity);
+            let exposure = Exposure::of(scene, models, response, sources);
+            out.intensity = exposure.mean();
+            out.exposure = Some(exposure);
+            seconds.imaging += clock.lap();
+        }
+        out
+    }
+}
+
+/// The means of a field over the pixels of an image.
+fn means(workspace: &mut Workspace, field: Field, computed: &Raster, image: &Raster) -> Field {
+    if computed == image {
+        return field;
+    }
+    let around = [computed.rows - image.rows, computed.columns - image.columns];
+    if computed.spacing == image.spacing
+        && computed.origin_row - image.origin_row == (around[0] / 2) as i64
+        && around[0] % 2 == 0
+    {
+        return field.crop(around[0] / 2, around[1] / 2);
+    }
+    let means = means_over(&field, computed, image);
+    workspace.give(field);
+    means
+}
+
+/// Puts some rows of all into a field; what covers all of it becomes it. Rows after those that are put are dropped.
+fn put(workspace: &mut Workspace, into: &mut Field, [rows, all]: [Range<usize>; 2], part: Field) {
+    if rows == all {
+        *into = part;
+        return;
+    }
+    let columns = part.columns;
+    if into.values.is_empty() {
+        *into = Field {
+            rows: all.len(),
+            columns,
+            values: workspace.floats.take(all.len() * columns, 0.0),
+        };
+    }
+    let to = rows.start * columns..rows.end * columns;
+    into.values[to].copy_from_slice(&part.values[..rows.len() * columns]);
+    workspace.give(part);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::SHARES;
+    use crate::survey::Survey;
+
+    /// Small margins: what lies beyond a strip is little.
+    fn scene(keys: &[&str]) -> Scene {
+        let base = [
+            "grid.rows=170",
+            "grid.columns=60",
+            "radar.range_to_velocity=20",
+            "ship.position=[20, 120]",
+            "ship.heading=20",
+        ];
+        let scene = Scene::default().with_assignments(&base).unwrap();
+        scene.with_assignments(keys).unwrap()
+    }
+
+    fn drawn(scene: &Scene, strips: usize) -> (Delivered, Vec<Strip>) {
+        let models = Models::new(scene);
+        let mut plan = Plan::of(scene, &models, &Survey::new(scene, &models)).unwrap();
+        plan.sizes.strips = strips;
+        let mut clock = (Clock::start(), Seconds::default());
+        let what = (scene, &models, &plan);
+        let how = (Method::Fast, Wanted::Fields);
+        let out = Simulator::default().draw(what, how, (&mut clock.0, &mut clock.1));
+        (out, Strip::all(&models, &plan))
+    }
+
+    const SCENES: [&[&str]; 4] = [
+        &[],
+        &[
+            "sea.gust_strength=0.1",
+            "sea.slick_damping=0.5",
+            "sea.wind_speed=4",
+            "sea.swell_height=1",
+        ],
+        &[
+            "radar.sensor=sentinel-1-iw",
+            "radar.range_to_velocity=20",
+            "sea.gust_strength=0.1",
+        ],
+        // Refined: rows of one strip are half of the next as well.
+        &["grid.spacing=10", "ship.speed=6.5", "ship.edge=true"],
+    ];
+
+    /// Strips make the same image: all fields, rounding and the methods' own errors apart.
+    #[test]
+    fn strips_make_the_image_that_one_piece_makes() {
+        for keys in SCENES {
+            let scene = scene(keys);
+            let (mut whole, one) = drawn(&scene, 1);
+            assert_eq!(one.len(), 1);
+            for count in [2, 3] {
+                let (mut parts, strips) = drawn(&scene, count);
+                assert_eq!(strips.len(), count);
+                let tolerance = scene.model.tolerance;
+                // Each keeps the share of the sums of waves, of which the wake's depend on the strip.
+                for (a, b) in whole.outputs().into_iter().zip(parts.outputs()).take(7) {
+                    assert_eq!((a.rows, a.columns), (170, 60));
+                    let (largest, _) = a.difference(b);
+                    assert!(
+                        largest <= 2.0 * SHARES.fields * tolerance * a.rms(),
+                        "{keys:?}"
+                    );
+                }
+                let shares = SHARES.fields + SHARES.table + SHARES.kernels;
+                let (_, rms) = whole.intensity.difference(&parts.intensity);
+                let allowed = shares * tolerance * whole.intensity.mean();
+                assert!(
+                    rms > 0.0 && rms <= allowed,
+                    "{keys:?} {count}: {rms:e} {allowed:e}"
+                );
+            }
+        }
+    }
+
+    /// The sea itself is the same to the last bit.
+    #[test]
+    fn the_sea_does_not_know_the_strips() {
+        for keys in SCENES {
+            let mut scene = scene(keys);
+            scene.ships.clear();
+            scene.sea.swell_height = 0.0;
+            let [mut whole, mut parts] = [1, 3].map(|count| drawn(&scene, count).0);
+            for (a, b) in whole.outputs().into_iter().zip(parts.outputs()).take(7) {
+                assert!(a == b && a.rms() > 0.0, "{keys:?}");
+            }
+        }
+    }
+
+    /// Each row belongs to one strip, and each strip has its margin.
+    #[test]
+    fn strips_cover_all_rows_once() {
+        for keys in SCENES {
+            let scene = scene(keys);
+            let models = Models::new(&scene);
+            let mut plan = Plan::of(&scene, &models, &Survey::new(&scene, &models)).unwrap();
+            let margin = plan.sizes.margin[0];
+            for count in [1, 2, 7, 170] {
+                plan.sizes.strips = count;
+                let strips = Strip::all(&models, &plan);
+                let mut next = [0; 2];
+                for strip in &strips {
+                    assert_eq!([strip.delivered.start, strip.own.start], next, "{keys:?}");
+                    next = [strip.delivered.end, strip.own.end];
+                    assert!(
+                        strip.image.start <= strip.own.start && strip.image.end >= strip.own.end
+                    );
+                    // Rows of the margin count from the first one above the image.
+                    let above = (strip.image.start + margin) - strip.raster.start;
+                    let below = strip.raster.end - (strip.image.end + margin);
+                    assert!(above >= margin && below >= margin);
+                }
+                assert_eq!(next, [170, models.image.rows]);
+            }
+        }
+    }
+}
