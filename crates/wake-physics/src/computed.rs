@@ -205,7 +205,7 @@ mod tests {
         (models.clone(), models.image.spacing)
     }
 
-    /// λ_cusp = 2π 6.5²/(1.5 · 9.807) = 18.05 m asks for 5.16 m: the fraction of the image's spacing below it.
+    /// `λ_cusp` = 2π 6.5²/(1.5 · 9.807) = 18.05 m asks for 5.16 m: the fraction of the image's spacing below it.
     #[test]
     fn the_waves_on_the_arms_have_their_pixels() {
         let slow = "ship.speed=6.5";

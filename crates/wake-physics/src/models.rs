@@ -227,7 +227,7 @@ impl Models {
     }
 
     /// Acceleration that defocuses the image as much as a random velocity of 1 m/s smears it [1/s]: (π/2 T (R/V) a)² of the
-    /// squared resolution against 2π² (R/V)² σ_u².
+    /// squared resolution against `2π² (R/V)² σ_u²`.
     pub(crate) fn defocus_of_velocity(&self) -> f64 {
         let defocus = self.resolution().defocus;
         if defocus > 0.0 {
@@ -290,13 +290,9 @@ fn response(scene: &Scene) -> Option<ImpulseResponse> {
 }
 
 /// Whether the waves that pixels do not carry count: where an impulse response is asked for, also if pixels of their own do
-/// as well, or where they are named. On the pixels of an image as they are they are left out, as in the model that this one
-/// started from.
+/// as well. On the pixels of an image as they are they are left out, as in the model that this one started from.
 fn counts_unresolved(scene: &Scene) -> bool {
-    match &scene.model.terms {
-        Terms::List(list) => list.contains(&Term::Unresolved),
-        Terms::Rule(_) => scene.radar.range_resolution.is_some(),
-    }
+    scene.radar.range_resolution.is_some() && scene.model.terms.allow(Term::Unresolved)
 }
 
 fn swell(scene: &Scene) -> Option<Swell> {

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::raster::Field;
 use num_complex::Complex32;
 use serde::Serialize;
-use serde_json::json;
+use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -218,15 +218,19 @@ pub fn write_fields(
         values: Values::Complex(values),
     }));
     tensors.sort_by_key(|tensor| tensor.name);
-    let mut header = serde_json::Map::new();
+    let mut header = BTreeMap::new();
     let mut start = 0;
     for tensor in &tensors {
         let end = start + 4 * tensor.shape.iter().product::<usize>();
-        let entry = json!({"dtype": "F32", "shape": tensor.shape, "data_offsets": [start, end]});
-        header.insert(tensor.name.to_owned(), entry);
+        let place = Place {
+            dtype: "F32",
+            shape: &tensor.shape,
+            data_offsets: [start, end],
+        };
+        header.insert(tensor.name, place);
         start = end;
     }
-    let mut header = serde_json::Value::Object(header).to_string().into_bytes();
+    let mut header = serde_json::to_vec(&header).map_err(|e| file_error("encode", path, &e))?;
     // The data begin at a multiple of eight.
     header.resize(header.len().next_multiple_of(8), b' ');
     let write = |file: &mut BufWriter<File>| {
@@ -235,6 +239,14 @@ pub fn write_fields(
         tensors.iter().try_for_each(|tensor| tensor.write(file))
     };
     write_with(path, write).map_err(|e| file_error("write", path, &e))
+}
+
+/// What the header of a safetensors file says of a tensor.
+#[derive(Serialize)]
+struct Place<'a> {
+    dtype: &'static str,
+    shape: &'a [usize],
+    data_offsets: [usize; 2],
 }
 
 /// One tensor of a safetensors file.

@@ -18,7 +18,7 @@ use std::f64::consts::{PI, TAU};
 /// is below stays as it is, so that waves count the same on pixels that carry them.
 pub(crate) const LARGEST_SLOPE_VARIANCE: f64 = 0.02;
 
-/// Kinematic viscosity ν_w of sea water at 20 °C [m²/s].
+/// Kinematic viscosity `ν_w` of sea water at 20 °C [m²/s].
 const VISCOSITY: f64 = 1.05e-6;
 
 /// Steps along the curve of steady waves.
@@ -51,7 +51,7 @@ struct WavesOfRay {
     direction: [f64; 2],
     /// Squared phase speed [m²/s²].
     square_speed: f64,
-    /// Rate of decay 4ν_w k² t/d [1/m].
+    /// Rate of decay 4 `ν_w` k² t/d [1/m].
     decay: f64,
 }
 
@@ -157,17 +157,19 @@ impl Sum {
     fn spread(&self, edges: [f64; 2], step: f64, rays: &mut [Self]) {
         let [low, high] = [edges[0].min(edges[1]) / step, edges[0].max(edges[1]) / step];
         let last = (high as usize).min(rays.len() - 1);
-        for n in (low as usize).min(last)..=last {
-            let inside = high.min((n + 1) as f64) - low.max(n as f64);
+        let first = (low as usize).min(last);
+        for (n, ray) in rays[first..=last].iter_mut().enumerate() {
+            let n = (first + n) as f64;
+            let inside = high.min(n + 1.0) - low.max(n);
             let share = if high > low {
                 inside.max(0.0) / (high - low)
             } else {
                 1.0
             };
             let slopes = share * self.slopes;
-            rays[n].slopes += slopes;
-            rays[n].cosine += slopes * self.cosine;
-            rays[n].decay += slopes * self.decay;
+            ray.slopes += slopes;
+            ray.cosine += slopes * self.cosine;
+            ray.decay += slopes * self.decay;
         }
     }
 
@@ -295,7 +297,8 @@ mod tests {
         }
     }
 
-    /// Rays and ages by the group velocity, an independent way: tan α = c_g sin χ/(U − c_g cos χ), t = d/(U − c_g cos χ).
+    /// Rays and ages by the group velocity, an independent way: `tan α = c_g sin χ/(U − c_g cos χ)`,
+    /// `t = d/(U − c_g cos χ)`.
     #[test]
     fn waves_lie_and_age_as_their_groups_run() {
         for length in [20.0, 5.0, 1.0, 0.1] {

@@ -67,7 +67,7 @@ pub enum Term {
     /// The Kelvin wake.
     Kelvin,
     /// The ship's waves that the computed pixels do not carry, as slopes and velocities of a variance: with an impulse
-    /// response, or where a list of terms names them.
+    /// response.
     Unresolved,
     /// The turbulent wake.
     Turbulent,

@@ -219,8 +219,8 @@ impl Survey {
         }
         if let Some(asked) = models.asked_spacing {
             notes.push(format!(
-                "waves on the arms of a wake ask for pixels of {asked:.2} m; {} m are computed: shorter waves count by their mean \
-                 slopes and velocities where an impulse response is asked for, else not",
+                "waves on the arms of a wake ask for pixels of {asked:.2} m; {} m are computed: shorter waves count by the \
+                 variances of their slopes and velocities where an impulse response is asked for, else not",
                 models.image.spacing
             ));
         }
