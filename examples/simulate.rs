@@ -29,7 +29,8 @@ use wake_physics::{Method, Plan, Scene, Simulation, export, output, simulate_wit
 #[derive(Parser)]
 #[command(
     version,
-    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
+    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
+                  grid.spacing is that of the image; the plan says which spacing is computed on (computed_spacing): docs/scene.md"
 )]
 struct Arguments {
     /// Scene file (TOML); without it, the default scene with its ship

@@ -33,6 +33,8 @@ pub(super) struct Stages<'a> {
     /// The computed image and its margin; where strips are computed the rows of one, and how many lie before them.
     pub(super) raster: Raster,
     first_row: usize,
+    /// Whether no strip comes after this one.
+    last: bool,
     /// The computed image, or the rows of it.
     pub(super) image: Raster,
     /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
@@ -111,6 +113,7 @@ impl<'a> Stages<'a> {
             method,
             raster: models.image.with_margin(rows, columns).strip(&strip.raster),
             first_row: strip.raster.start,
+            last: strip.delivered.end == models.delivered.rows,
             image: models.image.strip(&strip.image),
             quantities: quantities(plan, wanted),
         }
@@ -206,7 +209,7 @@ impl<'a> Stages<'a> {
                 );
             }
         }
-        if self.rows().end == surface.raster().rows {
+        if self.last {
             let last = backdrop.surface.take();
             last.into_iter()
                 .for_each(|surface| surface.give_back(workspace));

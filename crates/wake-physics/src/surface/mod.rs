@@ -162,11 +162,6 @@ impl Surface {
         }
     }
 
-    /// Where it is seen.
-    pub(crate) fn raster(&self) -> &Raster {
-        &self.raster
-    }
-
     /// Puts the blocks of the amplitudes back.
     pub(crate) fn give_back(self, workspace: &mut Workspace) {
         workspace.spectra.0.give(self.even);
