@@ -196,12 +196,13 @@ fn seen(keys: &[&str], more: &[&str]) -> [[f64; 3]; 4] {
 /// sea on pixels as they are. What is left between 5 m and 2.5 m are waves of the ship of 5 to 10 m, which are waves there and
 /// variances here: those modulate the short waves as well, to first order in their steepness of some 0.1.
 ///
-/// Without a response they do not count on 5 m at all. They brighten their own rays, 8 to 11° off the track, by up to a third
-/// (a slope variance of 0.005), and their velocities, 30 m of azimuth, carry some of it to the arms: 7 %.
+/// Without a response waves that are not carried do not count at all, and `λ_cusp`/3.5 carries those on the arms alone: 6.7, 5, 5
+/// and 2.5 m for the fifth scene. The others brighten their own rays, 8 to 12° off the track, by up to 40 % (a slope variance
+/// of 0.005 at 25°), and their velocities, 30 m of azimuth, carry at most a quarter of it into the arms: 10 %.
 #[test]
 fn arms_and_centreline_do_not_depend_on_the_pixels() {
     for (name, keys) in SCENES {
-        for (more, arms) in [(&RESPONSE[..], 0.05), (&[], 0.07)] {
+        for (more, arms) in [(&RESPONSE[..], 0.05), (&[], 0.1)] {
             let seen = seen(keys, more);
             for (part, allowed) in [arms, arms, 0.01].into_iter().enumerate() {
                 let values = seen.map(|s| s[part]);
