@@ -39,6 +39,7 @@ impl Source for Painted {
                 scene,
                 labels: Labels {
                     ships: wakes.iter().map(|wake| label(wake, self.size)).collect(),
+                    ..Labels::default()
                 },
             }
         };

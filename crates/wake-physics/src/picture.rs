@@ -1,7 +1,7 @@
 //! Pictures for people: an image with its labels drawn on it, captions, and sheets of several.
 
 use crate::error::Result;
-use crate::labels::{Labels, Pixel, Segment};
+use crate::labels::{Labels, Line, Pixel};
 use crate::output::write_rgb_png;
 use font8x8::{BASIC_FONTS, GREEK_FONTS, LATIN_FONTS, UnicodeFonts};
 use std::path::Path;
@@ -101,8 +101,9 @@ impl Picture {
         for labelled in &labels.ships {
             let wake = &labelled.wake;
             if let Some(frame) = wake.box_px {
-                for &arm in wake.arms_px.iter().chain(&wake.centreline_px) {
-                    self.draw_line(arm, ARMS);
+                let lines = wake.arms_px.iter().chain([&wake.centreline_px]);
+                for part in lines.flat_map(|line: &Line| line.windows(2)) {
+                    self.draw_line([part[0], part[1]], ARMS);
                 }
                 if let Some(tip) = wake.tip_px {
                     self.draw_cross(tip, ARMS);
@@ -132,7 +133,7 @@ impl Picture {
     }
 
     /// Draws a dashed line, cut to the picture; a line with an end that is not finite is not drawn.
-    pub fn draw_line(&mut self, line: Segment, colour: Colour) {
+    pub fn draw_line(&mut self, line: [Pixel; 2], colour: Colour) {
         let Some([from, to]) = self.cut(line) else {
             return;
         };
@@ -146,7 +147,7 @@ impl Picture {
     }
 
     /// The part of a line between the centres of the outermost pixels, after Liang and Barsky (1984).
-    fn cut(&self, [from, to]: Segment) -> Option<Segment> {
+    fn cut(&self, [from, to]: [Pixel; 2]) -> Option<[Pixel; 2]> {
         if self.pixels.is_empty() || !from.iter().chain(&to).all(|v| v.is_finite()) {
             return None;
         }

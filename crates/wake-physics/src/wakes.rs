@@ -7,7 +7,7 @@ use crate::scattering::{bragg, breaking};
 use crate::scene::{HullForm, Polarization, Radar, Scene, Ship};
 use crate::track::{Track, direction};
 use crate::turbulent::TurbulentWake;
-use crate::turbulent::current::{WakeCurrent, WakeEdge, response_time};
+use crate::turbulent::current::{EdgeResponse, WakeCurrent, WakeEdge};
 use std::f64::consts::TAU;
 
 /// Block coefficient of the full hull where the scene names none: a laden tanker.
@@ -55,7 +55,12 @@ fn kelvin(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
             }
         },
         speed: ship.speed,
-        track: Track::new(ship.position, ship.heading, ship.speed * time),
+        track: Track::turning(
+            ship.position,
+            ship.heading,
+            ship.speed * time,
+            ship.curvature(),
+        ),
         depth,
         filter_depth: ship.filter_depth,
     }
@@ -67,31 +72,31 @@ fn edge(scene: &Scene, ship: &Ship, track: Track) -> Option<WakeEdge> {
     if !ship.edge || ship.speed <= 0.0 || wind <= 0.0 {
         return None;
     }
-    let [wind_x, wind_y] = direction(scene.sea.wind_toward);
+    let blowing = direction(scene.sea.wind_toward);
     let [port_x, port_y] = track.port();
-    let to_port = wind * (wind_x * port_x + wind_y * port_y);
+    let to_port = wind * (blowing[0] * port_x + blowing[1] * port_y);
     Some(WakeEdge {
         current: WakeCurrent::of_wind(ship.speed, ship.beam, ship.edge_outflow, to_port),
+        wind: blowing.map(|component| wind * component),
         track,
         length: ship.length,
-        response: ship
-            .edge_time
-            .unwrap_or_else(|| edge_response(&scene.radar, wind, port_x)),
+        response: match ship.edge_time {
+            Some(time) => EdgeResponse::Given(time),
+            None => edge_response(&scene.radar, wind),
+        },
     })
 }
 
-/// Response of σ⁰ to the convergence of a wake whose track lies across `across` = cos χ of the look direction.
-fn edge_response(radar: &Radar, wind_speed: f64, across: f64) -> f64 {
+/// Response of σ⁰ to the convergence of a wake.
+fn edge_response(radar: &Radar, wind_speed: f64) -> EdgeResponse {
     let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
     let share = match radar.polarization {
         Polarization::VV => breaking::SHARE[0],
         Polarization::HH => breaking::SHARE[1],
     };
     let bragg = bragg::wavenumber(k_e, radar.incidence.to_radians());
-    response_time(
-        breaking::bragg_response(bragg, wind_speed),
-        across,
-        share,
-        breaking::response_time(k_e, wind_speed),
-    )
+    EdgeResponse::Waves {
+        bragg: breaking::bragg_response(bragg, wind_speed),
+        breaking: [share, breaking::response_time(k_e, wind_speed)],
+    }
 }

@@ -220,6 +220,7 @@ mod tests {
                     ..WakeLabel::default()
                 },
             }],
+            ..Labels::default()
         }
     }
 

@@ -309,6 +309,31 @@ impl<T: Real> Synthesis<T> {
     }
 }
 
+/// Sums waves around a circle, by one FFT.
+#[derive(Clone)]
+pub(crate) struct Circle(Arc<dyn Fft<f64>>);
+
+impl Circle {
+    pub(crate) fn planner() -> FftPlanner<f64> {
+        FftPlanner::new()
+    }
+
+    /// A circle of `count` points, at least 1.
+    pub(crate) fn planned(planner: &mut FftPlanner<f64>, count: usize) -> Self {
+        Self(planner.plan_fft_inverse(count))
+    }
+
+    /// Number of points.
+    pub(crate) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Puts the values Σₘ cₘ e^{2πi mj/n} at the points j in the place of the coefficients cₘ.
+    pub(crate) fn sum(&self, coefficients: &mut [Complex<f64>]) {
+        self.0.process(coefficients);
+    }
+}
+
 /// Takes real and imaginary parts apart.
 fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
     for ((v, re), im) in row.iter().zip(re).zip(im) {

@@ -29,8 +29,20 @@ pub fn fade_field(track: &Track, length: f64, raster: &Raster) -> Field {
     field
 }
 
+/// [`fade`] at a place (x, y) \[m\]; all of it beside a ship that turns, whose waves begin where they are sent.
+pub(crate) fn fade_at(track: &Track, length: f64, place: [f64; 2]) -> f64 {
+    match track.turn() {
+        None => fade(track.seen_from_ship(place)[0], length),
+        Some(_) => 1.0,
+    }
+}
+
 /// [`fade_field`] over a field of the raster's size.
 pub(crate) fn fill_fade(field: &mut Field, track: &Track, length: f64, raster: &Raster) {
+    if track.turn().is_some() {
+        field.values.fill(1.0);
+        return;
+    }
     let [fx, fy] = track.forward;
     let corner = track.seen_from_ship([raster.x(0), raster.y(0)])[0];
     let (down, right) = (-fy * raster.spacing, fx * raster.spacing);

@@ -7,7 +7,7 @@
 //! with ξ forward of midship and η to port. The waves lie on one curve in the plane of wavenumbers, so the
 //! integral is a sum of plane waves as soon as its nodes are chosen ([`KelvinWake::plan`]); any field of
 //! them follows from [`synthesize`](crate::nufft::synthesize). Files: `steady` the curve, `rays` where each wave is seen and how far the arms open, `zones` which part
-//! of it reaches a raster, `panels` the nodes, `fade` where the waves are shown, `unresolved` what pixels do
+//! of it reaches a raster, `panels` the nodes, `turning` those of a ship that turns, `fade` where the waves are shown, `unresolved` what pixels do
 //! not carry, `resistance` the work the ship does for them, `direct` the slow integral that everything is checked against.
 
 mod direct;
@@ -16,12 +16,13 @@ mod panels;
 mod rays;
 mod resistance;
 mod steady;
+mod turning;
 mod unresolved;
 mod zones;
 
 pub use direct::direct_quadrature;
-pub(crate) use fade::fill_fade;
 pub use fade::{fade, fade_field};
+pub(crate) use fade::{fade_at, fill_fade};
 pub use panels::{WakePlan, Zone};
 pub(crate) use rays::Ray;
 pub use rays::{KELVIN_ANGLE, half_angle};
@@ -97,11 +98,14 @@ impl KelvinWake {
 
     /// a = −w F̄ e^{−kd}, d the filter depth, [m per unit u].
     fn free_wave(&self, wave: &SteadyWave) -> Complex64 {
-        let michell = self
-            .hull
-            .michell_integral(wave.along, wave.wavenumber, self.depth);
-        let filter = (-wave.wavenumber * self.filter_depth).exp();
-        -michell.conj() * (wave.weight * filter)
+        self.source(wave.along, wave.wavenumber, wave.weight)
+    }
+
+    /// −w F̄ e^{−kd} of the wavenumber k, α along the track [rad/m], w a weight.
+    fn source(&self, along: f64, wavenumber: f64, weight: f64) -> Complex64 {
+        let michell = self.hull.michell_integral(along, wavenumber, self.depth);
+        let filter = (-wavenumber * self.filter_depth).exp();
+        -michell.conj() * (weight * filter)
     }
 }
 

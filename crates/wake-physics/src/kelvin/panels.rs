@@ -1,5 +1,6 @@
 //! The nodes of the wake integral: as many as the tolerance, the raster and the band ask for.
 
+use super::turning::Rings;
 use super::zones::{Piece, Reach};
 use super::{CUSP_ANGLE, KelvinWake};
 use crate::quadrature::{GaussLegendre, largest_phase};
@@ -40,13 +41,15 @@ pub struct WakePlan {
     pub error_bound: f64,
     /// Nodes u and weights, window included.
     quadrature: Vec<(f64, f64)>,
+    /// Rings of waves in the place of the nodes, behind a ship that turns.
+    rings: Option<Rings>,
 }
 
 impl WakePlan {
     /// Number of plane waves.
     #[must_use]
     pub fn nodes(&self) -> usize {
-        self.quadrature.len()
+        self.transverse_nodes + self.divergent_nodes
     }
 
     pub(super) fn quadrature(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
@@ -71,6 +74,9 @@ impl KelvinWake {
     /// Phases are accurate to 1e-16 of their size: ships beyond 1e9 m are not placed to the tolerance.
     #[must_use]
     pub fn plan(&self, raster: &Raster, tolerance: f64) -> WakePlan {
+        if self.track.turn().is_some() {
+            return self.plan_turn(raster, tolerance);
+        }
         let corners = astern(&self.track.corners(raster), 0.5 * self.hull.length());
         let Some(last) = self.last(raster, tolerance) else {
             return WakePlan::default();
@@ -104,6 +110,9 @@ impl KelvinWake {
     /// The plane waves at the nodes of a plan, phases and time included.
     #[must_use]
     pub fn waves(&self, plan: &WakePlan) -> PlaneWaves {
+        if let Some(rings) = &plan.rings {
+            return rings.waves(self);
+        }
         let mut out = PlaneWaves::default();
         let steady = self.steady_waves();
         let [x, y] = self.track.position;
@@ -115,6 +124,24 @@ impl KelvinWake {
             out.push(k, self.speed * wave.along, amplitude);
         }
         out
+    }
+
+    /// The rings of waves of a ship that turns.
+    fn plan_turn(&self, raster: &Raster, tolerance: f64) -> WakePlan {
+        let Some(rings) = Rings::of(self, raster, PANEL_SHARE * tolerance) else {
+            return WakePlan::default();
+        };
+        let cusp = self.steady_waves().at(CUSP_ANGLE.tan().asinh()).wavenumber;
+        let [transverse_nodes, divergent_nodes] = rings.nodes(cusp);
+        let largest = rings.count as f64 * rings.step;
+        WakePlan {
+            transverse_nodes,
+            divergent_nodes,
+            wavenumbers: [0.5 * rings.step, largest],
+            error_bound: PANEL_SHARE * tolerance,
+            rings: Some(rings),
+            ..WakePlan::default()
+        }
     }
 
     /// Largest |u|: by the band of the raster, or where the filter leaves nothing.

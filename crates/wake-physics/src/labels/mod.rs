@@ -5,13 +5,13 @@
 //! list. `visibility` says how far a wake is seen, `clip` cuts.
 
 mod clip;
+mod curve;
 mod visibility;
 
 use crate::kelvin::half_angle;
 use crate::raster::Raster;
 use crate::sar::geometry::{azimuth_displacement, direction, ship_radial_velocity};
 use crate::scene::{Scene, Ship};
-use crate::track::Track;
 use clip::{Polygon, Rectangle};
 use serde::{Deserialize, Serialize};
 use visibility::{Background, Extent};
@@ -21,8 +21,8 @@ pub use visibility::Visibility;
 /// A place in the image, (column, row), with fractions.
 pub type Pixel = [f64; 2];
 
-/// A line from one place in the image to another.
-pub type Segment = [Pixel; 2];
+/// A line from one place in the image to another, with places between where it bends.
+pub type Line = Vec<Pixel>;
 
 /// Which class of a detector an object is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -81,6 +81,11 @@ pub struct Object {
 pub struct Labels {
     /// The ships of the scene, each with its wake; also those outside the image.
     pub ships: Vec<LabelledShip>,
+    /// Azimuth by which a radar displaces the whole sea, its wakes too, by the sea's mean Doppler shift \[m\]: (R/V) times
+    /// its mean velocity toward the radar; 0 for a sea that returns nothing. It is left out of the simulated image. In a
+    /// real one the offset of a ship from its wake is `azimuth_displacement_m` less this.
+    #[serde(default)]
+    pub sea_displacement_m: f64,
 }
 
 /// A ship and its wake.
@@ -114,7 +119,7 @@ pub struct ShipLabel {
     /// the image.
     #[serde(with = "empty_list")]
     pub echo_oriented_box_px: Option<[Pixel; 4]>,
-    /// Where it moves to [deg clockwise from azimuth].
+    /// Where it moves to at the time of the image [deg clockwise from azimuth].
     pub heading: f64,
     /// Speed [m/s].
     pub speed: f64,
@@ -134,15 +139,16 @@ pub struct WakeLabel {
     /// The bow, from which the arms start; if in the image.
     #[serde(with = "empty_list")]
     pub tip_px: Option<Pixel>,
-    /// From the tip along the wake [deg clockwise from the image's up], 0 up to 360; null for a ship at rest.
+    /// From the tip along the wake [deg clockwise from the image's up], 0 up to 360, of a ship that turns along its tangent;
+    /// null for a ship at rest.
     pub axis_deg: Option<f64>,
     /// Angle between axis and arms \[deg\], see [`half_angle`]; null for a ship at rest.
     pub half_angle_deg: Option<f64>,
-    /// The Kelvin arms as far as waves are seen, port before starboard, each from the ship outward.
-    pub arms_px: Vec<Segment>,
-    /// The track line as far as the wake is seen, from the stern backward.
-    #[serde(with = "empty_list")]
-    pub centreline_px: Option<Segment>,
+    /// The Kelvin arms as far as waves are seen, port before starboard, each from the ship outward: two places, or a line of
+    /// more behind a ship that turns.
+    pub arms_px: Vec<Line>,
+    /// The track line as far as the wake is seen, from the stern backward, likewise; no place where nothing is seen.
+    pub centreline_px: Line,
     /// Distance along the axis from the tip to the end of what is seen in the image \[pixels\]; 0 if nothing is.
     pub length_px: f64,
     /// How clearly the wake is seen; null where it does not meet the image.
@@ -166,9 +172,8 @@ pub fn labels_of(scene: &Scene) -> Labels {
     let raster = Raster::image(grid.rows, grid.columns, grid.spacing);
     let (sea, wakes) = Background::new(scene);
     let ships = scene.ships.iter().zip(&wakes).map(|(ship, wake)| {
-        let run = ship.speed * scene.sea.time;
-        let position = Track::new(ship.position, ship.heading, run).position;
-        let frame = Frame::new(position, ship.heading, &raster);
+        let heading = ship.heading_at(scene.sea.time);
+        let frame = Frame::new(wake.kelvin.track.position, heading, &raster);
         let opening = half_angle(ship.speed, scene.sea.depth);
         let extent = match &sea {
             Some(sea) if ship.speed > 0.0 => sea.extent(wake, opening),
@@ -176,18 +181,24 @@ pub fn labels_of(scene: &Scene) -> Labels {
         };
         LabelledShip {
             ship: frame.ship(ship, echo_displacement(scene, ship)),
-            wake: frame.wake(ship, opening, &extent),
+            wake: match wake.kelvin.track.turn() {
+                None => frame.wake(ship, opening, &extent),
+                Some(_) => frame.curved_wake(&wake.kelvin, opening, &extent),
+            },
         }
     });
+    let velocity = sea.as_ref().map_or(0.0, |sea| sea.velocity);
     Labels {
         ships: ships.collect(),
+        sea_displacement_m: azimuth_displacement(scene.radar.range_to_velocity, velocity),
     }
 }
 
 /// Azimuth displacement of a ship's echo \[m\].
 pub(crate) fn echo_displacement(scene: &Scene, ship: &Ship) -> f64 {
     let incidence = scene.radar.incidence.to_radians();
-    let velocity = ship_radial_velocity(ship.speed, ship.heading, incidence);
+    let heading = ship.heading_at(scene.sea.time);
+    let velocity = ship_radial_velocity(ship.speed, heading, incidence);
     azimuth_displacement(scene.radar.range_to_velocity, velocity)
 }
 
@@ -241,6 +252,8 @@ struct Frame<'a> {
     raster: &'a Raster,
     image: Rectangle,
     position: [f64; 2],
+    /// [deg clockwise from azimuth].
+    heading: f64,
     ahead: [f64; 2],
     starboard: [f64; 2],
 }
@@ -253,6 +266,7 @@ impl<'a> Frame<'a> {
             raster,
             image: Rectangle::of(raster),
             position,
+            heading,
             ahead: [x, y],
             starboard: [y, -x],
         }
@@ -287,7 +301,7 @@ impl<'a> Frame<'a> {
             echo_px: self.pixel_inside(echo),
             echo_box_px,
             echo_oriented_box_px: echo_box_px.map(|_| hull.map(|corner| self.pixel(corner))),
-            heading: ship.heading,
+            heading: self.heading,
             speed: ship.speed,
             length: ship.length,
             azimuth_displacement_m: displacement,
@@ -326,13 +340,15 @@ impl<'a> Frame<'a> {
         };
         WakeLabel {
             tip_px: self.pixel_inside(bow),
-            axis_deg: Some((ship.heading + 180.0).rem_euclid(360.0)),
+            axis_deg: Some((self.heading + 180.0).rem_euclid(360.0)),
             half_angle_deg: Some(opening.to_degrees()),
             arms_px: arms
                 .into_iter()
                 .filter_map(|arm| self.ray(bow, arm, extent.waves / opening.cos()))
                 .collect(),
-            centreline_px: self.ray(stern, self.ahead.map(|v| -v), longest - ship.length),
+            centreline_px: self
+                .ray(stern, self.ahead.map(|v| -v), longest - ship.length)
+                .unwrap_or_default(),
             length_px: box_px.map_or(0.0, |_| length(&seen)),
             visibility: extent.visibility,
             box_px,
@@ -348,9 +364,9 @@ impl<'a> Frame<'a> {
         image.right_of(end, port)
     }
 
-    fn ray(&self, from: [f64; 2], along: [f64; 2], longest: f64) -> Option<Segment> {
+    fn ray(&self, from: [f64; 2], along: [f64; 2], longest: f64) -> Option<Line> {
         let ends = self.image.clip_ray(from, along, longest)?;
-        Some(ends.map(|end| self.pixel(end)))
+        Some(ends.map(|end| self.pixel(end)).to_vec())
     }
 
     /// (x, y, width, height) of the upright box around polygons; `None` if it has no area.

@@ -1,5 +1,6 @@
 use super::*;
-use crate::kelvin::KELVIN_ANGLE;
+use crate::kelvin::{KELVIN_ANGLE, KelvinWake};
+use std::f64::consts::PI;
 
 /// 201 × 201 pixels of 10 m: centres from −1000 m to +1000 m both ways.
 fn square() -> Raster {
@@ -33,6 +34,11 @@ fn labelled(ship: &Ship, displacement: f64, extent: &Extent, raster: &Raster) ->
     }
 }
 
+/// The two ends of a straight line.
+fn ends(line: &[Pixel]) -> [Pixel; 2] {
+    line.try_into().unwrap()
+}
+
 fn close(a: Pixel, b: Pixel) -> bool {
     (a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9
 }
@@ -49,7 +55,7 @@ fn northward_by_hand() {
     // Port is to the left of a ship that moves up.
     assert!(close(wake.arms_px[0][1], [100.0 - aside, 200.0]));
     assert!(close(wake.arms_px[1][1], [100.0 + aside, 200.0]));
-    let [from, to] = wake.centreline_px.unwrap();
+    let [from, to] = ends(&wake.centreline_px);
     assert!(close(from, [100.0, 110.0]) && close(to, [100.0, 200.0]));
     let [x, y, width, height] = wake.box_px.unwrap();
     assert!(close([x, y], [100.0 - aside, 90.0]) && close([width, height], [2.0 * aside, 110.0]));
@@ -76,7 +82,7 @@ fn eight_headings() {
             wake.tip_px.unwrap(),
             [100.0 + 10.0 * sin, 100.0 - 10.0 * cos]
         ));
-        let [from, to] = wake.centreline_px.unwrap();
+        let [from, to] = ends(&wake.centreline_px);
         assert!(close(from, [100.0 - 10.0 * sin, 100.0 + 10.0 * cos]));
         for (arm, side) in wake.arms_px.iter().zip([1.0, -1.0]) {
             // Port lies clockwise of astern, starboard counter-clockwise.
@@ -184,7 +190,7 @@ fn a_ship_outside_may_leave_its_wake_inside() {
     let away = labelled(&ship(0.0, [200.0, 5000.0]), 0.0, &ALL_WAVES, &square());
     assert!(away.ship.position_px.is_none() && away.wake.tip_px.is_none());
     assert!(close(away.ship.position_m, [200.0, 5000.0]));
-    let [from, to] = away.wake.centreline_px.unwrap();
+    let [from, to] = ends(&away.wake.centreline_px);
     assert!(close(from, [120.0, 0.0]) && close(to, [120.0, 200.0]));
     // 4100 m behind the bow the arms are 1450 m aside: outside; the wedge is the whole image.
     assert!(away.wake.arms_px.is_empty());
@@ -200,12 +206,12 @@ fn a_ship_outside_may_leave_its_wake_inside() {
     let faded = labelled(&ship(0.0, [200.0, 5000.0]), 0.0, &faded, &square()).wake;
     assert_eq!(
         (faded.box_px, faded.centreline_px, faded.length_px),
-        (None, None, 0.0)
+        (None, Vec::new(), 0.0)
     );
     // On the other side all has gone by.
     let ahead = labelled(&ship(180.0, [200.0, 5000.0]), 0.0, &ALL_WAVES, &square());
     assert_eq!((ahead.wake.box_px, ahead.wake.length_px), (None, 0.0));
-    assert!(ahead.wake.arms_px.is_empty() && ahead.wake.centreline_px.is_none());
+    assert!(ahead.wake.arms_px.is_empty() && ahead.wake.centreline_px.is_empty());
 }
 
 /// Waves seen 600 m astern of the bow at row 90 end in row 150; the dark line, 20 m to either side, in row 180. Where
@@ -223,7 +229,7 @@ fn boxes_end_where_the_wake_does() {
     for (arm, side) in wake.arms_px.iter().zip([-1.0, 1.0]) {
         assert!(close(arm[1], [100.0 + side * aside, 150.0]), "{arm:?}");
     }
-    assert!(close(wake.centreline_px.unwrap()[1], [100.0, 180.0]));
+    assert!(close(wake.centreline_px[1], [100.0, 180.0]));
     let [x, y, width, height] = wake.box_px.unwrap();
     assert!(close([x, y], [100.0 - aside, 90.0]) && close([width, height], [2.0 * aside, 90.0]));
     assert!(close(
@@ -255,7 +261,7 @@ fn nothing_is_labelled_where_nothing_is() {
     );
     assert_eq!((one.wake.box_px, one.ship.echo_box_px), (None, None));
     scene.ships.clear();
-    assert_eq!(labels_of(&scene), Labels::default());
+    assert_eq!(labels_of(&scene).ships, []);
 }
 
 /// Objects are the labels of what is drawn, in the terms of a detector.
@@ -271,6 +277,7 @@ fn objects_are_the_visible_wakes_and_the_drawn_ships() {
     let one = labelled(&ship(45.0, [0.0, 0.0]), 300.0, &extent, &square());
     let labels = Labels {
         ships: vec![one.clone(), one],
+        ..Labels::default()
     };
     let objects = labels.objects();
     assert_eq!(objects.len(), 4);
@@ -291,6 +298,7 @@ fn objects_are_the_visible_wakes_and_the_drawn_ships() {
     assert!((side(0, 1) - 3.0).abs() < 1e-9 && (side(1, 2) - 20.0).abs() < 1e-9);
     let empty = Labels {
         ships: vec![LabelledShip::default()],
+        ..Labels::default()
     };
     assert!(empty.objects().is_empty());
 }
@@ -309,7 +317,7 @@ fn json_has_the_stated_keys_and_empty_lists() {
         keys.join(" ")
     };
     let one = &value["ships"][0];
-    assert_eq!(keys(&value), "ships");
+    assert_eq!(keys(&value), "sea_displacement_m ships");
     assert_eq!(keys(one), "ship wake");
     assert_eq!(
         keys(&one["ship"]),
@@ -342,10 +350,105 @@ fn json_has_the_stated_keys_and_empty_lists() {
     assert!(nothing["wake"]["visibility"].is_null() && nothing["wake"]["axis_deg"].is_null());
     let empty = Labels {
         ships: vec![LabelledShip::default()],
+        ..Labels::default()
     };
     for labels in [full, empty, Labels::default()] {
         // Through a value, not a text: serde_json reads floats to the last bit only on demand.
         let value = serde_json::to_value(&labels).unwrap();
         assert_eq!(serde_json::from_value::<Labels>(value).unwrap(), labels);
     }
+}
+
+/// A ship of heading 0 in the middle that turns to starboard on 500 m, as on `track::tests`.
+fn turned(extent: &Extent, curvature: f64) -> WakeLabel {
+    let wake = KelvinWake {
+        hull: crate::hull::Hull::wigley(200.0, 30.0, 10.0),
+        speed: 10.0,
+        track: crate::track::Track::turning([0.0; 2], 0.0, 0.0, curvature),
+        depth: f64::INFINITY,
+        filter_depth: 0.0,
+    };
+    Frame::new([0.0; 2], 0.0, &square()).curved_wake(&wake, KELVIN_ANGLE, extent)
+}
+
+/// Half a circle of dark line, 20 m wide on both sides: a box around it, and a line along it.
+#[test]
+fn a_dark_line_on_a_turn_by_hand() {
+    let half_circle = Extent {
+        dark_line: 100.0 + 500.0 * PI,
+        half_width: 20.0,
+        ..Extent::NOTHING
+    };
+    let wake = turned(&half_circle, 1.0 / 500.0);
+    let [x, y, width, height] = wake.box_px.unwrap();
+    // A chord of a 24th of the half circle and the bow's 100 m stays R (1 − cos(0.07)) = 1.3 m inside, 0.13 pixels. From
+    // 2 pixels west of the ship to the eastern edge at 100 pixels east of it; 52 pixels to the south.
+    assert!(
+        (x - 98.0).abs() < 0.6 && (x + width - 200.0).abs() < 1e-9,
+        "{x} {width}"
+    );
+    assert!((y + height - 152.0).abs() < 0.15, "{y} {height}");
+    assert_eq!(
+        (wake.axis_deg, wake.tip_px),
+        (Some(180.0), Some([100.0, 90.0]))
+    );
+    // The line begins at the stern and ends where it leaves the image.
+    let line = &wake.centreline_px;
+    assert!(line.len() > 20);
+    for [column, row] in line {
+        let radius = (column - 150.0).hypot(row - 100.0);
+        assert!((radius - 50.0).abs() < 0.15, "{column} {row}");
+    }
+    assert!((wake.length_px - 0.1 * half_circle.dark_line).abs() < 1e-9);
+}
+
+/// The arms on a turn: rays of the waves on them from where they were sent, by hand for two of them.
+#[test]
+fn arms_on_a_turn_are_where_their_waves_have_come_to() {
+    let extent = Extent {
+        waves: 500.0,
+        ..Extent::NOTHING
+    };
+    let wake = turned(&extent, 1.0 / 500.0);
+    // The last place was sent 750 m before the bow: 650 m of arc before midship, 1.3 rad. From there a third of 750 m
+    // forward and √2/6 of it aside; forward is (sin −1.3, cos −1.3).
+    let (sin, cos) = 1.3f64.sin_cos();
+    let sent = [500.0 * (1.0 - cos), -500.0 * sin];
+    let (forward, aside) = (250.0, 750.0 * 2f64.sqrt() / 6.0);
+    for (arm, side) in wake.arms_px.iter().zip([1.0, -1.0]) {
+        let x = sent[0] - forward * sin - side * aside * cos;
+        let y = sent[1] + forward * cos - side * aside * sin;
+        let last = arm.last().unwrap();
+        // The steepest of 512 rays is within 1e-5 of the cusp's angle, its place within its square root of that along it.
+        assert!(
+            (last[0] - 100.0 - 0.1 * x).abs() < 0.3 && (last[1] - 100.0 + 0.1 * y).abs() < 0.3,
+            "{last:?} {x} {y}"
+        );
+    }
+    assert_eq!(wake.arms_px.len(), 2);
+}
+
+/// On a wide turn the label is that of a straight track.
+#[test]
+fn a_wide_turn_has_the_label_of_a_straight_track() {
+    let extent = Extent {
+        waves: 700.0,
+        dark_line: 900.0,
+        half_width: 30.0,
+        visibility: None,
+    };
+    let straight = labelled(&ship(0.0, [0.0, 0.0]), 0.0, &extent, &square()).wake;
+    let wide = turned(&extent, 1e-7);
+    // 1050² m²/2R = 5.5 m at 10,000 km, less for what is nearer; arms as above.
+    let pairs = [(wide.box_px, straight.box_px)];
+    for (a, b) in pairs {
+        for (a, b) in a.unwrap().into_iter().zip(b.unwrap()) {
+            assert!((a - b).abs() < 0.3, "{a} {b}");
+        }
+    }
+    for (a, b) in wide.arms_px.iter().zip(&straight.arms_px) {
+        let [a, b] = [a, b].map(|arm| *arm.last().unwrap());
+        assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.3, "{a:?} {b:?}");
+    }
+    assert!((wide.length_px - straight.length_px).abs() < 0.1);
 }

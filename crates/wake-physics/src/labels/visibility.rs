@@ -92,6 +92,8 @@ pub(super) struct Background {
     noise: f64,
     waves_drawn: bool,
     dark_line_drawn: bool,
+    /// Mean velocity toward the radar [m/s].
+    pub(super) velocity: f64,
 }
 
 impl Background {
@@ -104,6 +106,7 @@ impl Background {
         if survey.mean[0] + survey.mean[1] <= 0.0 {
             return (None, wakes);
         }
+        let velocity = survey.mean_velocity(scene, &models);
         let [range_resolution, own] = models.response.map_or([0.0; 2], |response| {
             [response.range, response.azimuth].map(|axis| OF_HALF_POWER * axis.resolution)
         });
@@ -134,6 +137,7 @@ impl Background {
             noise: 0.0,
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
+            velocity,
         };
         let sea: f64 = survey
             .sea
@@ -165,19 +169,32 @@ impl Background {
         let band = DarkLine::new(self, wake.turbulent);
         let wake = &wake.kelvin;
         let rays = self.rays(wake);
+        let turns = wake.track.turn().is_some();
         let half_length = 0.5 * wake.hull.length();
-        let farthest = wake
-            .track
-            .corners(&self.raster)
-            .iter()
-            .map(|c| -half_length - c[0])
-            .fold(0.0, f64::max);
+        let farthest = (wake.track.farthest_astern(&self.raster) - half_length).max(0.0);
         let mut extent = Extent::NOTHING;
         let mut rows = Vec::new();
         for n in 0..(farthest / step).ceil() as usize {
             // Middle of the row of windows, astern of the stern.
             let distance = (n as f64 + 0.5) * step;
-            let row = self.row(wake, distance, half_angle, &rays, &band);
+            let row = if turns {
+                // Waves and dark line lie there as beside a straight track along the tangent.
+                let there = wake.track.at(-distance - half_length).straight();
+                let rays = self.rays(&KelvinWake {
+                    track: there,
+                    ..*wake
+                });
+                let band = DarkLine::new(
+                    self,
+                    TurbulentWake {
+                        track: there,
+                        ..band.wake
+                    },
+                );
+                self.row(wake, distance, half_angle, &rays, &band)
+            } else {
+                self.row(wake, distance, half_angle, &rays, &band)
+            };
             let end = distance + 0.5 * step + 2.0 * half_length;
             let seen = |square: f64| WINDOW as f64 * square.sqrt() >= THRESHOLD * self.noise;
             if seen(row.largest[0]) {

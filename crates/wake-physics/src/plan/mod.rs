@@ -30,6 +30,8 @@ const WHOLE: [u64; 2] = [24, 52];
 /// Pixels that are computed at once, margins included; more are computed in strips of at most half as many (chosen: about a
 /// gibibyte of fields, and an image of 4096 × 4096 pixels is one strip).
 const MOST_AT_ONCE: usize = 1 << 25;
+/// Bytes of a plane wave while its amplitudes are found and it is summed.
+const BYTES_OF_A_WAVE: u64 = 64;
 
 /// The plan of a simulation.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,6 +132,9 @@ impl Plan {
         let wakes = models.wakes.iter().filter(|_| uses(Term::Kelvin));
         let wakes = wakes.map(|wake| wake.kelvin.plan(&raster, share * tolerance));
         let wakes: Vec<WakePlan> = wakes.collect();
+        let waves = wakes.iter().map(WakePlan::nodes).max().unwrap_or(0);
+        let needed = needed + BYTES_OF_A_WAVE * waves as u64;
+        memory::check([scene.grid.rows, scene.grid.columns], margin, needed)?;
         let zones = wakes.iter().flat_map(|wake| &wake.zones);
         let directions = zones.map(|z| z.directions.map(f64::to_degrees));
         let nodes = |of: fn(&WakePlan) -> usize| wakes.iter().map(of).sum();

@@ -188,8 +188,11 @@ pub struct Ship {
     pub draft: f64,
     /// Speed U [m/s], 0 to 40.
     pub speed: f64,
-    /// Where it moves to [deg clockwise from azimuth].
+    /// Where it moves to at time 0 [deg clockwise from azimuth].
     pub heading: f64,
+    /// How fast it turns [deg/s], −10 to 10, positive to starboard; 0: straight on. It has turned by half a circle, and came
+    /// straight before. The radius is at least two lengths of the ship and of its transverse waves, at most 100 km.
+    pub turn_rate: f64,
     /// Midship (x, y) at time 0 \[m\].
     #[serde(deserialize_with = "forms::two")]
     pub position: [f64; 2],
@@ -221,6 +224,7 @@ impl Default for Ship {
             draft: 10.0,
             speed: 10.0,
             heading: 45.0,
+            turn_rate: 0.0,
             position: [0.0, 0.0],
             hull: HullForm::Wigley,
             block_coefficient: None,
@@ -231,6 +235,21 @@ impl Default for Ship {
             edge_outflow: 0.0,
             roll: 0.0,
         }
+    }
+}
+
+impl Ship {
+    /// Curvature of its track [1/m], positive to starboard; 0 on a straight one.
+    pub(crate) fn curvature(&self) -> f64 {
+        if self.turn_rate == 0.0 {
+            return 0.0;
+        }
+        self.turn_rate.to_radians() / self.speed
+    }
+
+    /// Where it moves to at a time \[s\] [deg clockwise from azimuth].
+    pub(crate) fn heading_at(&self, time: f64) -> f64 {
+        self.heading + self.turn_rate * time
     }
 }
 

@@ -7,7 +7,7 @@ use super::strips::Strip;
 use super::surface_fields::{SurfaceFields, Wanted};
 use crate::computed::Parts;
 use crate::error::{Error, Result};
-use crate::kelvin::fade;
+use crate::kelvin::fade_at;
 use crate::models::Models;
 use crate::plan::Plan;
 use crate::raster::Field;
@@ -183,7 +183,7 @@ impl Stages<'_> {
             let wake = &wake.kelvin;
             let faded = |&[i, j]: &[usize; 2]| {
                 let place = [raster.x(j), raster.y(i)];
-                fade(wake.track.seen_from_ship(place)[0], wake.hull.length())
+                fade_at(&wake.track, wake.hull.length(), place)
             };
             let fades: Vec<f64> = pixels.iter().map(faded).collect();
             seconds.kelvin += add(&wake.waves(plan), &fades);

@@ -69,12 +69,13 @@ fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     let ships = scene.ships.iter().zip(&models.wakes).enumerate();
     let drawn = ships.filter(|(_, (ship, _))| ship.echo);
     let of_ship = |(n, (ship, wake)): (usize, (&Ship, &Wake))| {
+        let heading = ship.heading_at(scene.sea.time);
         let echo = ShipEcho {
             position: wake.kelvin.track.position,
-            heading: ship.heading,
+            heading,
             length: ship.length,
             beam: ship.beam,
-            radial_velocity: ship_radial_velocity(ship.speed, ship.heading, models.incidence),
+            radial_velocity: ship_radial_velocity(ship.speed, heading, models.incidence),
             roll_velocity: ship.roll,
         };
         echo.scatterers(&view, (scene.seed, n))
@@ -161,7 +162,7 @@ pub(super) fn hull_echoes(scene: &Scene, models: &Models) -> impl Iterator<Item 
         let displacement = SEA_WATER_DENSITY * wake.kelvin.hull.volume();
         Echo {
             position: wake.kelvin.track.position,
-            heading: ship.heading,
+            heading: ship.heading_at(scene.sea.time),
             length: ship.length,
             beam: ship.beam,
             cross_section: ship_cross_section(scene.radar.frequency, displacement),

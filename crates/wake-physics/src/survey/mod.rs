@@ -1,5 +1,6 @@
 //! What is known of a scene before it is computed: a few thousand of its waves, its backscatter, its motion.
 
+mod doppler;
 mod waves;
 
 use crate::kelvin::KelvinWake;
@@ -9,6 +10,7 @@ use crate::raster::Raster;
 use crate::sar::AzimuthResolution;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::{Scene, Term};
+use crate::track::Track;
 use crate::turbulent::current::WakeEdge;
 use crate::wakes::Wake;
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity};
@@ -25,6 +27,9 @@ const DAMPING_POINTS: usize = 48;
 
 /// Standard deviations that the margin holds; beyond lie 7 in a million.
 const DEVIATIONS: f64 = 4.5;
+
+/// Headings that stand for all of a ship that turns: chosen.
+const HEADINGS: usize = 8;
 
 /// Mean square of the wake where it is over that in the whole image: the wedge covers about a quarter of it.
 const WEDGE: f64 = 4.0;
@@ -181,6 +186,11 @@ impl Survey {
         (slopes(&self.sea), rms(&self.sea, radial))
     }
 
+    /// Mean velocity of the open sea toward the radar by its Doppler shift [m/s].
+    pub(crate) fn mean_velocity(&self, scene: &Scene, models: &Models) -> f64 {
+        doppler::mean_velocity(scene, models, &self.modulation)
+    }
+
     /// The modulation where models may average over more waves than those this was made of.
     pub(crate) fn modulation_of(&self, models: &Models) -> ModulationTransfer {
         ModulationTransfer {
@@ -290,6 +300,37 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
 
 /// The waves of the wake in the image, and how much stronger they are within a ship's length of the stern.
 fn sampled_wake(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
+    match wake.track.turn() {
+        None => sampled_straight(wake, image),
+        Some((radius, _)) => sampled_turn(wake, radius, image),
+    }
+}
+
+/// The same behind a ship that turns: the mean over ships that go straight on, on all headings that it has had, and are as
+/// far ahead of the middle of the image as it is from it.
+fn sampled_turn(wake: &KelvinWake, radius: f64, image: &Raster) -> (Vec<WaveSample>, f64) {
+    if wake.plan(image, COARSE).nodes() == 0 {
+        return (Vec::new(), 1.0);
+    }
+    let middle = [image.x(image.columns / 2), image.y(image.rows / 2)];
+    let [dx, dy] = [0, 1].map(|a| wake.track.position[a] - middle[a]);
+    let (mut waves, mut largest) = (Vec::new(), 1.0f64);
+    for n in 0..HEADINGS {
+        let there = wake.track.at(-PI * radius * n as f64 / HEADINGS as f64);
+        let ahead = dx.hypot(dy);
+        let track = Track {
+            position: [0, 1].map(|a| middle[a] + ahead * there.forward[a]),
+            ..there.straight()
+        };
+        let (mut one, crowding) = sampled_straight(&KelvinWake { track, ..*wake }, image);
+        one.iter_mut().for_each(|w| w.variance /= HEADINGS as f64);
+        waves.extend(one);
+        largest = largest.max(crowding);
+    }
+    (waves, largest)
+}
+
+fn sampled_straight(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64) {
     let corners = wake.track.corners(image);
     let length = wake.hull.length();
     let farthest = corners
@@ -382,15 +423,19 @@ fn damping(models: &Models) -> f64 {
 /// What the current of the wake changes over the image, see [`Survey::edge`].
 fn edge(models: &Models) -> [f64; 2] {
     let of = |edge: &WakeEdge| {
-        let [port_x, port_y] = edge.track.port().map(f64::abs);
-        let along_sight = port_x * models.incidence.sin();
-        // Velocity bunching gathers by R/V times the slope of the velocity along azimuth.
-        let gathered = models.range_to_velocity * along_sight * port_y;
+        let to_port = |seen: [f64; 2]| edge.track.at(seen[0]).port().map(f64::abs);
         let change = |place| {
             let seen = edge.track.seen_from_ship(place);
+            let [port_x, port_y] = to_port(seen);
+            let along_sight = port_x * models.incidence.sin();
+            // Velocity bunching gathers by R/V times the slope of the velocity along azimuth.
+            let gathered = models.range_to_velocity * along_sight * port_y;
             (edge.factor(seen) - 1.0).abs() + gathered * edge.divergence(seen).abs()
         };
-        let velocity = |place| along_sight * edge.velocity(edge.track.seen_from_ship(place));
+        let velocity = |place| {
+            let seen = edge.track.seen_from_ship(place);
+            to_port(seen)[0] * models.incidence.sin() * edge.velocity(seen)
+        };
         [
             rms_over(&models.image, change),
             rms_over(&models.image, velocity),

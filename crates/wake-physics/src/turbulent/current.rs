@@ -11,7 +11,7 @@
 //! side was computed and seen by Fujimura, Soloviev and Kudryavtsev (2010), IEEE Geosci. Remote Sens. Lett. 7. The form
 //! and every constant here are chosen, some so that they resemble measured images.
 
-use super::{width, within};
+use super::width;
 use crate::kelvin::fade;
 use crate::raster::{Field, Raster};
 use crate::track::Track;
@@ -90,14 +90,44 @@ impl WakeCurrent {
 /// The current behind a ship on its track, and what it makes of σ⁰.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WakeEdge {
-    /// The current.
+    /// The current at the stern.
     pub current: WakeCurrent,
+    /// Wind at 10 m (x, y) [m/s], of which the drift to port is where the track turns.
+    pub wind: [f64; 2],
     /// Place and direction of the ship.
     pub track: Track,
     /// Length of the hull L \[m\].
     pub length: f64,
-    /// Response `T_e` of σ⁰ to a divergence \[s\], see [`response_time`].
-    pub response: f64,
+    /// Response of σ⁰ to a divergence.
+    pub response: EdgeResponse,
+}
+
+/// Response `T_e` of σ⁰ to a divergence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum EdgeResponse {
+    /// The same wherever the track leads \[s\].
+    Given(f64),
+    /// By [`response_time`] of the direction across the track.
+    Waves {
+        /// Of Bragg waves that run across the track \[s\].
+        bragg: f64,
+        /// Share of σ⁰ from breaking waves, and their response \[s\].
+        breaking: [f64; 2],
+    },
+}
+
+impl EdgeResponse {
+    /// `T_e` \[s\] where the unit vector to port has the component `across` along the look direction.
+    #[must_use]
+    pub fn at(&self, across: f64) -> f64 {
+        match *self {
+            Self::Given(response) => response,
+            Self::Waves {
+                bragg,
+                breaking: [share, time],
+            } => response_time(bragg, across, share, time),
+        }
+    }
 }
 
 impl WakeEdge {
@@ -106,18 +136,35 @@ impl WakeEdge {
     #[must_use]
     pub fn factor(&self, seen: [f64; 2]) -> f64 {
         let [forward, port] = seen;
-        let divergence = self.current.divergence(self.astern(forward), port);
-        edge_factor(divergence, self.response).powf(fade(forward, self.length))
+        let (current, across) = self.there(forward);
+        let divergence = current.divergence(self.astern(forward), port);
+        edge_factor(divergence, self.response.at(across)).powf(fade(forward, self.length))
+    }
+
+    /// The current at ξ of the track, and the component of the unit vector to port along the look direction there.
+    fn there(&self, forward: f64) -> (WakeCurrent, f64) {
+        if self.track.turn().is_none() {
+            return (self.current, self.track.port()[0]);
+        }
+        let [x, y] = self.track.at(forward).port();
+        let to_port = self.wind[0] * x + self.wind[1] * y;
+        let current = WakeCurrent {
+            drift: DRIFT_OF_WIND * to_port,
+            ..self.current
+        };
+        (current, x)
     }
 
     /// Velocity to port there [m/s].
     pub(crate) fn velocity(&self, [forward, port]: [f64; 2]) -> f64 {
-        self.current.velocity(self.astern(forward), port) * fade(forward, self.length)
+        let (current, _) = self.there(forward);
+        current.velocity(self.astern(forward), port) * fade(forward, self.length)
     }
 
     /// Divergence of the current there [1/s].
     pub(crate) fn divergence(&self, [forward, port]: [f64; 2]) -> f64 {
-        self.current.divergence(self.astern(forward), port) * fade(forward, self.length)
+        let (current, _) = self.there(forward);
+        current.divergence(self.astern(forward), port) * fade(forward, self.length)
     }
 
     /// Distance astern of the stern \[m\].
@@ -134,13 +181,16 @@ impl WakeEdge {
 
     /// Adds the current to the velocities of the water along x and y [m/s]; a field without pixels stays so.
     pub(crate) fn add_velocity(&self, along: [&mut Field; 2], raster: &Raster) {
-        let port = self.track.port();
-        for (field, port) in along.into_iter().zip(port) {
+        for (axis, field) in along.into_iter().enumerate() {
             if field.values.is_empty() {
                 continue;
             }
+            let port = |seen: [f64; 2]| match self.track.turn() {
+                None => self.track.port()[axis],
+                Some(_) => self.track.at(seen[0]).port()[axis],
+            };
             self.change(field, raster, |value, seen| {
-                *value += (port * self.velocity(seen)) as f32;
+                *value += (port(seen) * self.velocity(seen)) as f32;
             });
         }
     }
@@ -152,19 +202,12 @@ impl WakeEdge {
         raster: &Raster,
         change: impl Fn(&mut f32, [f64; 2]) + Sync,
     ) {
-        let farthest = self
-            .track
-            .corners(raster)
-            .iter()
-            .map(|c| -c[0])
-            .fold(0.0, f64::max);
+        let farthest = self.track.farthest_astern(raster);
         let reach = REACH * width(self.current.beam, farthest);
-        let corner = self.track.seen_from_ship([raster.x(0), raster.y(0)]);
-        let step = self.track.seen_from_ship([raster.x(1), raster.y(0)])[1] - corner[1];
         let rows = field.values.par_chunks_mut(raster.columns.max(1));
         rows.enumerate().for_each(|(i, row)| {
             let seen = |j: usize| self.track.seen_from_ship([raster.x(j), raster.y(i)]);
-            let columns = within(seen(0)[1], step, reach, row.len());
+            let columns = self.track.columns_within(raster, i, reach);
             for (j, value) in columns.clone().zip(&mut row[columns]) {
                 change(value, seen(j));
             }
@@ -327,8 +370,9 @@ mod tests {
         WakeEdge {
             current: wake(),
             track: Track::new([200.0, -100.0], 70.0, 0.0),
+            wind: [0.0; 2],
             length: 150.0,
-            response: 300.0,
+            response: EdgeResponse::Given(300.0),
         }
     }
 

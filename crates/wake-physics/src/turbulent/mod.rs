@@ -16,7 +16,6 @@ use crate::kelvin::fade;
 use crate::raster::{Field, Raster};
 use crate::track::Track;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// Damping on the centreline at the stern, D(0) = 0.6, that is −4 dB: chosen.
 pub const STERN_DAMPING: f64 = 0.6;
@@ -94,13 +93,9 @@ impl TurbulentWake {
 
     /// [`Self::damping_field`] over a field of the raster's size.
     pub(crate) fn fill_damping(&self, field: &mut Field, raster: &Raster) {
-        let corners = self.track.corners(raster);
-        let farthest = corners.iter().map(|c| -c[0]).fold(0.0, f64::max);
+        let farthest = self.track.farthest_astern(raster);
         // Six standard deviations: exp(−18) ≈ 1.5e-8 lies below the rounding of 1 − damping in f32.
         let reach = 3.0 * width(self.beam, farthest);
-        let corner = self.track.seen_from_ship([raster.x(0), raster.y(0)]);
-        // Places seen from the ship change by the same step from pixel to pixel of a row.
-        let step = self.track.seen_from_ship([raster.x(1), raster.y(0)]);
         field.values.fill(0.0);
         field
             .values
@@ -108,23 +103,12 @@ impl TurbulentWake {
             .enumerate()
             .for_each(|(i, row)| {
                 let seen = |j: usize| self.track.seen_from_ship([raster.x(j), raster.y(i)]);
-                let columns = within(seen(0)[1], step[1] - corner[1], reach, row.len());
+                let columns = self.track.columns_within(raster, i, reach);
                 for (j, value) in columns.clone().zip(&mut row[columns]) {
                     *value = self.damping(seen(j)) as f32;
                 }
             });
     }
-}
-
-/// The numbers j below `count` with |start + j·step| ≤ reach.
-fn within(start: f64, step: f64, reach: f64, count: usize) -> Range<usize> {
-    if step == 0.0 {
-        return if start.abs() <= reach { 0..count } else { 0..0 };
-    }
-    let ends = [-reach, reach].map(|end| (end - start) / step);
-    let first = ends[0].min(ends[1]).ceil().max(0.0) as usize;
-    let last = (ends[0].max(ends[1]).floor() + 1.0).max(0.0) as usize;
-    first.min(count)..last.min(count).max(first.min(count))
 }
 
 #[cfg(test)]
@@ -191,22 +175,5 @@ mod tests {
             }
         }
         assert!(dark > 50);
-    }
-
-    #[test]
-    fn columns_within_reach_are_those_counted_one_by_one() {
-        for (start, step, reach) in [
-            (-10.0, 0.7, 4.0),
-            (3.0, -0.3, 2.0),
-            (50.0, 1.0, 5.0),
-            (-2.0, -1.0, 1.0),
-            (1.0, 0.0, 2.0),
-            (3.0, 0.0, 2.0),
-        ] {
-            let inside = |&j: &usize| (start + j as f64 * step).abs() <= reach;
-            let counted: Vec<usize> = (0..40).filter(inside).collect();
-            let range: Vec<usize> = within(start, step, reach, 40).collect();
-            assert_eq!(range, counted, "{start} {step} {reach}");
-        }
     }
 }

@@ -183,3 +183,54 @@ fn every_ship_has_its_echo() {
         assert!(f64::from(at) > 100.0 * calm);
     }
 }
+
+/// A ship that turns and one that does not: sound images, and the edge that is bright changes sides with the wind.
+#[test]
+fn a_turning_ship_has_a_sound_image() {
+    let keys = [
+        "ship.1.turn_rate=-1",
+        "ship.1.echo=true",
+        "ship.1.edge=true",
+        "ship.2.turn_rate=0.01",
+        "grid.spacing=10",
+        "model.tolerance=1e-3",
+    ];
+    for more in [
+        "sea.time=0",
+        "sea.time=50",
+        "sea.depth=15",
+        "model.terms=all",
+    ] {
+        let [_, _, both] = scenes(&[&keys[..], &[more]].concat());
+        let simulation = run(&both);
+        assert_sound(&simulation, more);
+        let [turning, wide] = &simulation.labels.ships[..] else {
+            panic!("{} ships", simulation.labels.ships.len());
+        };
+        assert!(turning.wake.centreline_px.len() > 2, "{more}");
+        assert!(wide.wake.visibility.is_some(), "{more}");
+    }
+    // In 50 s it has turned to port by 50 degrees from 45.
+    let [later, ..] = scenes(&[&keys[..], &["sea.time=50"]].concat());
+    let label = labels_of(&later).ships.remove(0);
+    assert!((label.ship.heading + 5.0).abs() < 1e-9);
+    assert!((label.wake.axis_deg.unwrap() - 175.0).abs() < 1e-9);
+}
+
+/// The whole image of a wide turn is that of a straight track, but for 1,000²/2R of metres.
+#[test]
+fn a_wide_turn_is_a_straight_track() {
+    let keys = [
+        "model.terms=[\"turbulent\", \"edge\"]",
+        "ship.edge=true",
+        "grid.spacing=5",
+    ];
+    let straight = small(96, 80, &[&keys[..], &["ship.position=[100, 100]"]].concat());
+    let mut wide = straight.clone();
+    wide.ships[0].turn_rate = 0.006;
+    let [straight, wide] = [straight, wide].map(|scene| run(&scene));
+    // 500²/2R = 1.3 m on 95 km, over a width of 50 m, of a change of 0.6 at most.
+    let far = largest([&straight.sigma0, &straight.sigma0], &wide.sigma0, |a, _| a);
+    assert!(far < 0.6 * 1.3 / 25.0, "{far:e}");
+    assert!(far > 1e-6);
+}

@@ -170,7 +170,7 @@ fn no_wave_and_no_dark_line_have_no_box() {
         (nothing.box_px, nothing.oriented_box_px, nothing.length_px),
         (None, None, 0.0)
     );
-    assert!(nothing.arms_px.is_empty() && nothing.centreline_px.is_none());
+    assert!(nothing.arms_px.is_empty() && nothing.centreline_px.is_empty());
     assert_eq!(
         nothing.visibility,
         Some(Visibility {

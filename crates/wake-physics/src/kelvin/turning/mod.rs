@@ -1,0 +1,276 @@
+//! The waves of a ship that turns: every point of its past track sends those that keep station with it there.
+//!
+//! A source that moves along x(s), s the distance run since, sends all waves k. At the time of the picture they sum to
+//!
+//! ```text
+//! ζ(x) = Re ∫ d²k B(k)/(2πU) e^{ik·x} ∫ w(s) e^{−ik·x(s) − iωs/U} ds,      B = −(U/π) F̄ e^{−kd}
+//! ```
+//!
+//! On a straight track the inner integral is 2πU δ(U k·t − ω), the curve of steady waves, and B that of
+//! [`KelvinWake::amplitude`]. On a circle of radius R around C, with α = s/R and β the direction of k from the heading,
+//! both counted against the turn, it is
+//!
+//! ```text
+//! ∫ w e^{−ik·x(s) − iωs/U} ds = R e^{−ik·C} Σₘ Jₘ(kR) ŵ(m − ωR/U) e^{imβ},     ŵ(q) = ∫ w(α) e^{iqα} dα
+//! ```
+//!
+//! by e^{iz sin φ} = Σ Jₘ(z) e^{imφ} (Jacobi and Anger): one FFT for each k. Nothing is approximated but that the strength
+//! and phase F̄ of the source are those of the steady wave of length 2π/k. So caustics where a turn focuses its waves are
+//! right, too.
+//!
+//! w rises from bow to stern as the waves of a straight track are faded there. Waves longer than any steady wave are
+//! summed with all others: they are the local rise of water around the hull, and without them the sum over k would end
+//! sharply where they begin.
+
+use super::KelvinWake;
+use crate::dispersion::{angular_frequency, group_speed};
+use crate::fft::{Circle, fast_length};
+use crate::raster::Raster;
+use crate::waves::PlaneWaves;
+use num_complex::Complex64;
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+/// Steps along the track in which the waves that reach a raster are looked for.
+const STEPS: usize = 400;
+
+/// Samples beyond those that the largest phase asks for: the tails of what is summed.
+const GUARD: f64 = 1.15;
+
+/// Wavelengths of the longest steady wave over which the oldest waves set in: chosen.
+const ONSET: f64 = 3.0;
+
+/// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp: chosen.
+const LONG: [f64; 2] = [0.6, 1.0];
+
+/// Which waves of a turning ship are summed: rings of wavenumbers, each as many directions as the raster asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rings {
+    /// Radius of the turn R \[m\].
+    radius: f64,
+    /// 1 to starboard, −1 to port.
+    side: f64,
+    /// Wavenumber between rings [rad/m].
+    pub(super) step: f64,
+    pub(super) count: usize,
+    /// Wavenumber of the longest steady wave [rad/m].
+    longest: f64,
+    /// Distances run between which the oldest waves set in \[m\].
+    onset: [f64; 2],
+    /// Largest phase over k \[m\].
+    reach: f64,
+    /// Waves weaker than this share of the root mean square are left out.
+    least: f64,
+}
+
+impl Rings {
+    /// The rings for a raster; `None` if no wave that it carries reaches it.
+    pub(super) fn of(wake: &KelvinWake, raster: &Raster, tolerance: f64) -> Option<Self> {
+        let (radius, side) = wake.track.turn()?;
+        if wake.speed <= 0.0 {
+            return None;
+        }
+        let steady = wake.steady_waves();
+        let longest = steady.at(steady.first()).wavenumber;
+        let largest = raster.nyquist_wavenumber();
+        if longest >= largest {
+            return None;
+        }
+        let [x, y] = [raster.columns, raster.rows].map(|n| 0.5 * (n.max(1) - 1) as f64);
+        let middle = [
+            raster.x(0) + x * raster.spacing,
+            raster.y(0) - y * raster.spacing,
+        ];
+        let half = x.hypot(y) * raster.spacing;
+        // Waves sent a distance s ago lie on a circle around a point of the heading that they were sent at.
+        let share = 0.5 * group_share(wake, longest.max(1e-6 * largest));
+        let sent = |s: f64| {
+            let there = wake.track.at(-s);
+            let centre = [0, 1].map(|a| there.position[a] + share * s * there.forward[a]);
+            (centre[0] - middle[0]).hypot(centre[1] - middle[1])
+        };
+        let run = PI * radius;
+        let at = |n: usize| run * n as f64 / STEPS as f64;
+        let reaches = |s: f64| sent(s) <= half + share * s + run / STEPS as f64;
+        let oldest = (0..=STEPS).rev().map(at).find(|&s| reaches(s))?;
+        let wavelength = TAU / longest.max(1e-3 * largest);
+        let ramp = (ONSET * wavelength).max(0.1 * oldest).min(0.5 * run);
+        let end = (oldest + ramp).min(run);
+        let passed = (0..=STEPS).map(at).take_while(|&s| s <= end);
+        let farthest = passed.map(|s| sent(s) + share * s).fold(0.0, f64::max);
+        let reach = GUARD * (farthest + half) + wavelength;
+        let count = (largest * reach / TAU).ceil() as usize;
+        Some(Self {
+            radius,
+            side,
+            step: largest / count as f64,
+            count,
+            longest,
+            onset: [end - ramp, end],
+            reach,
+            least: tolerance,
+        })
+    }
+
+    /// Wavenumber of a ring [rad/m].
+    fn wavenumber(&self, ring: usize) -> f64 {
+        (ring as f64 + 0.5) * self.step
+    }
+
+    /// Directions of a ring.
+    fn directions(&self, ring: usize) -> usize {
+        let phase = self.wavenumber(ring) * self.reach;
+        // Tails of the Bessel functions beyond their argument fall over a few cube roots of it.
+        fast_length((phase + 10.0 * phase.cbrt() + 32.0).ceil() as usize)
+    }
+
+    /// Waves of all rings up to a wavenumber, and beyond it, before the weak ones are left out.
+    pub(super) fn nodes(&self, cusp: f64) -> [usize; 2] {
+        let mut nodes = [0; 2];
+        for ring in 0..self.count {
+            nodes[usize::from(self.wavenumber(ring) >= cusp)] += self.directions(ring);
+        }
+        nodes
+    }
+
+    /// The waves.
+    pub(super) fn waves(&self, wake: &KelvinWake) -> PlaneWaves {
+        let mut planner = Circle::planner();
+        let circles: Vec<Circle> = (0..self.count)
+            .map(|ring| Circle::planned(&mut planner, self.directions(ring)))
+            .collect();
+        let rings: Vec<Vec<Complex64>> = circles
+            .par_iter()
+            .enumerate()
+            .map(|(ring, circle)| self.amplitudes(wake, ring, circle))
+            .collect();
+        let amplitudes = || rings.iter().flatten().map(Complex64::norm_sqr);
+        let count = rings.iter().map(Vec::len).sum::<usize>().max(1);
+        let least = self.least.powi(2) * amplitudes().sum::<f64>() / count as f64;
+        let mut out = PlaneWaves::default();
+        let centre = self.centre(wake);
+        for (ring, amplitudes) in rings.iter().enumerate() {
+            let k = self.wavenumber(ring);
+            let omega = angular_frequency(k, wake.depth);
+            let turn = TAU / amplitudes.len() as f64;
+            for (n, amplitude) in amplitudes.iter().enumerate() {
+                if amplitude.norm_sqr() > least {
+                    let (sin, cos) = (turn * n as f64).sin_cos();
+                    // Against the clock from the heading is to port.
+                    let k = wake.track.turned([k * cos, -self.side * k * sin]);
+                    let phase = Complex64::cis(-(k[0] * centre[0] + k[1] * centre[1]));
+                    out.push(k, omega, amplitude * phase);
+                }
+            }
+        }
+        out
+    }
+
+    /// The centre of the circle (x, y) \[m\].
+    fn centre(&self, wake: &KelvinWake) -> [f64; 2] {
+        let port = wake.track.port();
+        [0, 1].map(|a| wake.track.position[a] - self.side * self.radius * port[a])
+    }
+
+    /// k dk dβ B R/(2πU) Σₘ Jₘ(kR) ŵ(m − ωR/U) e^{imβ} of the directions β of a ring.
+    fn amplitudes(&self, wake: &KelvinWake, ring: usize, circle: &Circle) -> Vec<Complex64> {
+        let k = self.wavenumber(ring);
+        let omega = angular_frequency(k, wake.depth);
+        let count = circle.len();
+        let mut values = vec![Complex64::ZERO; count];
+        let turned = omega * self.radius / wake.speed;
+        let bessel = bessel_functions(k * self.radius);
+        let fall = self.fall(k);
+        let window = |m: f64| self.window(wake, fall, m - turned);
+        for (m, &value) in bessel.iter().enumerate() {
+            values[m % count] += window(m as f64) * value;
+            if m > 0 {
+                let odd = if m % 2 == 1 { -value } else { value };
+                values[(count - m % count) % count] += window(-(m as f64)) * odd;
+            }
+        }
+        circle.sum(&mut values);
+        let along = (omega / wake.speed).min(k);
+        let area = k * self.step * TAU / count as f64;
+        // B R/(2πU), B = (U/π) · source.
+        let strength = wake.source(along, k, area * self.radius / (TAU * PI));
+        values.iter_mut().for_each(|value| *value *= strength);
+        values
+    }
+
+    /// Middle and width of the onset of the oldest waves k \[m\].
+    ///
+    /// Waves longer than any steady one are not sent on the way, but a sharp onset would send them ahead of all others: theirs
+    /// is as wide as the time since allows.
+    fn fall(&self, k: f64) -> [f64; 2] {
+        let [from, to] = self.onset;
+        let middle = 0.5 * (from + to);
+        let steady = rise((k / self.longest - LONG[0]) / (LONG[1] - LONG[0]));
+        [middle, 2.0 * middle + (to - from - 2.0 * middle) * steady]
+    }
+
+    /// ŵ(q): w rises along the hull, as a straight wake fades there, and falls over the onset.
+    fn window(&self, wake: &KelvinWake, fall: [f64; 2], q: f64) -> Complex64 {
+        let [middle, width] = fall.map(|s| s / self.radius);
+        let hull = wake.hull.length() / self.radius;
+        if q.abs() < 1e-6 {
+            return Complex64::new(middle, 0.0);
+        }
+        let fall = Complex64::cis(q * middle) * step_spectrum(q * width);
+        (fall - step_spectrum(q * hull)) / Complex64::new(0.0, q)
+    }
+}
+
+/// Smooth step from 0 to 1, s³ (10 − 15 s + 6 s²); 1 where s is not a number.
+fn rise(s: f64) -> f64 {
+    let s = if s.is_nan() { 1.0 } else { s.clamp(0.0, 1.0) };
+    s * s * s * (10.0 + s * (6.0 * s - 15.0))
+}
+
+/// Largest group over phase speed of the waves from a wavenumber on.
+fn group_share(wake: &KelvinWake, wavenumber: f64) -> f64 {
+    let omega = angular_frequency(wavenumber, wake.depth);
+    group_speed(wavenumber, wake.depth) * wavenumber / omega
+}
+
+/// Spectrum of the slope of the smooth step s³ (10 − 15 s + 6 s²) of width 1 around 0, 30 ∫ s²(1 − s)² e^{iqt} dt.
+///
+/// ```text
+/// 15 j₂(z)/z²,     z = q/2
+/// ```
+fn step_spectrum(q: f64) -> f64 {
+    let z = 0.5 * q;
+    let square = z * z;
+    if square < 0.1 {
+        // The series of j₂, whose closed form cancels here.
+        return 1.0 - square / 14.0 * (1.0 - square / 36.0 * (1.0 - square / 66.0));
+    }
+    let (sin, cos) = z.sin_cos();
+    15.0 * ((3.0 / square - 1.0) * sin / z - 3.0 * cos / square) / square
+}
+
+/// J₀(z), J₁(z) … until they are below rounding, z at least 0.
+///
+/// Miller's method: the recurrence downward from an order where they vanish, scaled so that J₀ + 2J₂ + 2J₄ + … = 1.
+fn bessel_functions(z: f64) -> Vec<f64> {
+    if z <= 0.0 {
+        return vec![1.0];
+    }
+    let kept = (z + 10.0 * z.cbrt() + 20.0).ceil() as usize;
+    let start = kept + 20 + 10 * z.cbrt().ceil() as usize;
+    let mut values = vec![0.0; start + 2];
+    values[start] = 1e-300;
+    for m in (1..=start).rev() {
+        values[m - 1] = 2.0 * m as f64 / z * values[m] - values[m + 1];
+        if values[m - 1].abs() > 1e200 {
+            values[m - 1..].iter_mut().for_each(|v| *v *= 1e-300);
+        }
+    }
+    let sum = values[0] + 2.0 * values.iter().skip(2).step_by(2).sum::<f64>();
+    values.truncate(kept + 1);
+    values.iter_mut().for_each(|v| *v /= sum);
+    values
+}
+
+#[cfg(test)]
+mod tests;

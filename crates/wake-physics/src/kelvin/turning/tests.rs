@@ -1,0 +1,189 @@
+use super::*;
+use crate::hull::Hull;
+use crate::track::Track;
+use crate::waves::{Quantity, Transfer, harmonic_sum};
+
+/// A boat of 5 m/s, transverse waves of 16 m; the filter leaves 0.2 % at the end of the band of 2 m pixels.
+fn boat(heading: f64, radius: f64) -> KelvinWake {
+    KelvinWake {
+        hull: Hull::wigley(20.0, 4.0, 1.5),
+        speed: 5.0,
+        track: Track::turning([20.0, 40.0], heading, 0.0, radius.recip()),
+        depth: f64::INFINITY,
+        filter_depth: 4.0,
+    }
+}
+
+fn raster() -> Raster {
+    Raster::image(91, 91, 2.0)
+}
+
+/// Every eleventh pixel of some rows.
+fn pixels() -> Vec<[usize; 2]> {
+    let rows = [3, 24, 43, 58, 84];
+    let of_row = |i: usize| (1..8).map(move |j| [i, 11 * j]);
+    rows.into_iter().flat_map(of_row).collect()
+}
+
+fn elevation(wake: &KelvinWake, pixels: &[[usize; 2]]) -> Vec<f64> {
+    let transfer = Transfer {
+        depth: wake.depth,
+        incidence: 0.5,
+        relaxation_rate: 1.0,
+        steepness: 4.5,
+    };
+    let waves = wake.waves(&wake.plan(&raster(), 1e-3));
+    assert!(waves.len() > 100);
+    let quantities = [Quantity::Elevation];
+    harmonic_sum(&waves, &transfer, &quantities, &raster(), pixels).remove(0)
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Largest difference over the root of the mean square.
+fn largest(a: &[f64], b: &[f64]) -> f64 {
+    let pairs = a.iter().zip(b);
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / rms(b)
+}
+
+/// Against the sum over a moving point: at every step of the track it sends rings J₀(kr) of all wavelengths,
+///
+/// ```text
+/// ζ = Re (1/U) ∫ w(s) ∫ B(k) J₀(k|x − x(s)|) e^{−iωs/U} k dk ds
+/// ```
+///
+/// by the midpoint rule in s and in k, both finer than the waves. Nothing but B, w and x(s) is shared.
+#[test]
+fn the_rings_of_a_moving_source_add_to_the_wake() {
+    for radius in [250.0, -400.0] {
+        let wake = boat(20.0, radius);
+        let plan = Rings::of(&wake, &raster(), 1e-6).unwrap();
+        let all = pixels();
+        let fast = elevation(&wake, &all);
+        let steady = wake.steady_waves();
+        let band = raster().nyquist_wavenumber();
+        let (rings, step) = (1000, 0.5);
+        let of_ring = |n: usize| {
+            let k = band * (n as f64 + 0.5) / rings as f64;
+            let omega = angular_frequency(k, wake.depth);
+            // The source of the steady wave of this length; shorter waves than the longest have none of their own.
+            let u = steady.last(k).unwrap_or(0.0);
+            let wave = steady.at(u);
+            let along = if k > wave.wavenumber {
+                wave.along
+            } else {
+                (omega / wake.speed).min(k)
+            };
+            (
+                k,
+                omega,
+                wake.source(along, k, wake.speed / PI) * k * band / rings as f64,
+            )
+        };
+        let waves: Vec<_> = (0..rings).map(of_ring).collect();
+        let steps = ((plan.fall(0.0)[1] + 10.0) / step) as usize;
+        let direct: Vec<f64> = all
+            .par_iter()
+            .map(|&[i, j]| {
+                let mut sum = Complex64::ZERO;
+                for n in 0..steps {
+                    let s = -10.0 + (n as f64 + 0.5) * step;
+                    let begun = rise(s / 20.0 + 0.5);
+                    let there = (wake.track.position, 20.0, -s, radius.recip());
+                    let from = Track::turning(there.0, there.1, there.2, there.3).position;
+                    let distance = (raster().x(j) - from[0]).hypot(raster().y(i) - from[1]);
+                    for (k, omega, source) in &waves {
+                        let [middle, width] = plan.fall(*k);
+                        let weight = begun * (1.0 - rise((s - middle) / width + 0.5));
+                        if weight > 0.0 {
+                            let phase = Complex64::cis(-omega * s / wake.speed);
+                            sum += source * phase * (weight * libm::j0(k * distance));
+                        }
+                    }
+                }
+                sum.re * step / wake.speed
+            })
+            .collect();
+        assert!(rms(&direct) > 1e-3);
+        let far = largest(&fast, &direct);
+        // The sharp end of the band, where e^{−kd} is 1 % of its value at the longest waves, is summed by other rules.
+        assert!(far < 1e-2, "{radius}: {far:e}");
+    }
+}
+
+/// A wide turn is a straight track: the difference falls with the radius, to the first order.
+#[test]
+fn on_a_wide_turn_the_wake_is_that_of_a_straight_track() {
+    let straight = KelvinWake {
+        track: Track::new([20.0, 40.0], 20.0, 0.0),
+        ..boat(20.0, 1.0)
+    };
+    // Clear of the hull, where both fade in their own way, and within the wedge.
+    let astern: Vec<[usize; 2]> = pixels()
+        .into_iter()
+        .filter(|&[i, j]| {
+            let place = [raster().x(j), raster().y(i)];
+            straight.track.seen_from_ship(place)[0] < -60.0
+        })
+        .collect();
+    assert!(astern.len() > 10);
+    let expected = elevation(&straight, &astern);
+    let radii = [2e4, 1e5];
+    let far = radii.map(|radius| largest(&elevation(&boat(20.0, radius), &astern), &expected));
+    // The waves of the cusp come from 1.5 times the distance astern, so from 350 m: they are 0.056·350²/R off to the side,
+    // with 0.34 of a radian a metre. The sharp end of the band, where k e^{−kd} is 3.6 % of its value at the longest waves,
+    // is summed by other rules. Peaks are three times the root of the mean square.
+    for (radius, far) in radii.into_iter().zip(far) {
+        let off = 0.34 * 0.056 * 350.0f64.powi(2) / radius;
+        assert!(far < 3.0 * (off + 0.036), "{radius}: {far:e}");
+    }
+    assert!(far[0] > 3.0 * far[1], "{far:?}");
+}
+
+/// To port as to starboard, mirrored; and whatever the heading.
+#[test]
+fn mirrored_and_turned_ships_have_mirrored_and_turned_wakes() {
+    let at = |heading: f64, place: [f64; 2], radius: f64| KelvinWake {
+        track: Track::turning(place, heading, 0.0, radius.recip()),
+        ..boat(0.0, radius)
+    };
+    let starboard = elevation(&at(0.0, [0.0, 40.0], 300.0), &pixels());
+    let mirrored: Vec<[usize; 2]> = pixels().iter().map(|&[i, j]| [i, 90 - j]).collect();
+    let port = elevation(&at(0.0, [0.0, 40.0], -300.0), &mirrored);
+    assert!(largest(&port, &starboard) < 1e-4);
+    // A quarter turn: (x, y) to (y, −x).
+    let turned: Vec<[usize; 2]> = pixels().iter().map(|&[i, j]| [j, 90 - i]).collect();
+    let north = elevation(&at(0.0, [0.0, 40.0], 300.0), &pixels());
+    let east = elevation(&at(90.0, [40.0, 0.0], 300.0), &turned);
+    assert!(largest(&east, &north) < 1e-4);
+}
+
+#[test]
+fn bessel_functions_are_those_of_the_library() {
+    for z in [0.0, 1e-3, 0.7, 12.0, 235.5, 4000.0] {
+        let values = bessel_functions(z);
+        for m in [0, 1, 2, 5, 11, 100, 230, 3990, 4010] {
+            let expected = libm::jn(m, z);
+            let value = values.get(m as usize).copied().unwrap_or(0.0);
+            assert!(
+                (value - expected).abs() < 1e-12,
+                "J{m}({z}) = {value:e}, {expected:e}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_window_is_the_transform_of_its_steps() {
+    let rule = crate::quadrature::GaussLegendre::new(64);
+    for q in [0.0, 0.1, 0.6, 0.7, 3.0, 40.0] {
+        let sum = rule.integrate([-0.5, 0.5], |t| {
+            let s = t + 0.5;
+            30.0 * (s * (1.0 - s)).powi(2) * (q * t).cos()
+        });
+        // The series of small arguments ends at z⁸/(14·36·66·104): 3e-11 at its largest.
+        assert!((step_spectrum(q) - sum).abs() < 1e-10, "{q}");
+    }
+}
