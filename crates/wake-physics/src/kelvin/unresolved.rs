@@ -193,6 +193,11 @@ impl UnresolvedWaves {
     /// The variances at a place (x, y) \[m\], which fade over the hull as the waves do; `None` outside the rays.
     pub(crate) fn at(&self, place: [f64; 2]) -> Option<Roughness> {
         let [ahead, port] = self.track.seen_from_ship(place);
+        // Behind a ship that turns the waves are those of a straight track along the tangent there.
+        let there = match self.track.turn() {
+            None => self.track,
+            Some(_) => self.track.at(ahead),
+        };
         if port.abs() >= self.widest * -ahead {
             return None;
         }
@@ -206,7 +211,7 @@ impl UnresolvedWaves {
             let waves = &branch[ray];
             let variance = shown * waves.variance(-ahead);
             let [along, across] = waves.direction;
-            let [x, y] = self.track.turned([along, across.copysign(port)]);
+            let [x, y] = there.turned([along, across.copysign(port)]);
             let slopes = [x * x, x * y, y * y].map(|product| variance * product);
             for (sum, slope) in out.slopes.iter_mut().zip(slopes) {
                 *sum += slope;
