@@ -1,4 +1,4 @@
-//! Fields for other tools: NumPy arrays, TIFF with the size of the pixels, images and arrays of other crates.
+//! Fields for other tools: `NumPy` arrays, TIFF with the size of the pixels, images and arrays of other crates.
 //!
 //! ```
 //! use wake_physics::{Field, Raster};
@@ -15,10 +15,10 @@ use crate::raster::Field;
 use image::{ImageBuffer, Luma};
 use std::path::Path;
 
-/// What the header of a NumPy file is aligned to \[bytes\].
+/// What the header of a `NumPy` file is aligned to \[bytes\].
 const NPY_ALIGNMENT: usize = 64;
 
-/// Writes a field as a NumPy array of `float32`, `[rows, columns]`: format 1.0, read by `numpy.load`.
+/// Writes a field as a `NumPy` array of `float32`, `[rows, columns]`: format 1.0, read by `numpy.load`.
 ///
 /// # Errors
 ///

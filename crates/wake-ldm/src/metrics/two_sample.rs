@@ -296,7 +296,11 @@ impl Network {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#[allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "a test that cannot go on has failed, and small whole numbers are exact"
+)]
 mod tests {
     use super::*;
 

@@ -95,8 +95,7 @@ pub fn crest_variance(image: &Field, expected: &Field) -> Option<f64> {
         let mean = left.clone().sum::<f64>() / pixels.len() as f64;
         left.map(|v| (v - mean).powi(2)).sum::<f64>() / pixels.len() as f64
     };
-    let [troughs, crests] =
-        [&order[..quarter], &order[order.len() - quarter..]].map(|pixels| variance(pixels));
+    let [troughs, crests] = [&order[..quarter], &order[order.len() - quarter..]].map(variance);
     (troughs > 0.0).then(|| crests / troughs)
 }
 
