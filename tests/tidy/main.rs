@@ -4,6 +4,7 @@
 //! `DRAW=1 cargo test --test tidy` writes picture and page anew.
 
 mod imports;
+mod pages;
 mod picture;
 mod scene_keys;
 
@@ -184,6 +185,55 @@ fn the_page_of_scene_keys_is_that_of_the_code() {
     let (page, wrong) = scene_keys::page(&root().join("crates/wake-physics/src/scene"));
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     is_drawn("docs/scene_keys.md", &page);
+}
+
+#[test]
+fn links_of_all_pages_lead_somewhere() {
+    let mut all = pages::pages(&root().join("docs"));
+    all.insert(root().join("README.md"));
+    all.extend(CRATES.map(|name| root().join("crates").join(name).join("README.md")));
+    assert!(all.len() > 40, "only {} pages", all.len());
+    let broken: Vec<String> = all
+        .iter()
+        .flat_map(|page| pages::broken_links(page))
+        .collect();
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+/// Every page is in the book, decisions by way of their own list.
+#[test]
+fn the_book_has_every_page() {
+    let docs = root().join("docs");
+    let mut listed = BTreeSet::from([docs.join("SUMMARY.md")]);
+    for (folder, list) in [("", "SUMMARY.md"), ("decisions", "decisions/README.md")] {
+        let text = fs::read_to_string(docs.join(list)).expect("a list of pages");
+        let links = pages::links(&text).into_iter();
+        listed.extend(links.map(|link| docs.join(folder).join(link)));
+    }
+    assert_eq!(pages::pages(&docs), listed);
+}
+
+/// The code of the front page is compiled where it stands a second time, in the documentation tests of the crates.
+#[test]
+fn code_of_the_front_page_is_compiled() {
+    let blocks_of =
+        |name: &str| pages::rust_blocks(&fs::read_to_string(root().join(name)).expect(name));
+    let tested = [
+        "crates/wake-physics/README.md",
+        "crates/wake-ldm/README.md",
+        "crates/wake-ldm/src/dataset/mod.rs",
+    ];
+    let tested: Vec<Vec<String>> = tested.iter().flat_map(|name| blocks_of(name)).collect();
+    let shown = blocks_of("README.md");
+    assert_eq!(shown.len(), 3, "quickstarts of the front page");
+    for block in shown {
+        let code: Vec<&String> = block.iter().filter(|line| !line.is_empty()).collect();
+        let stands = tested.iter().any(|tested| {
+            let tested: Vec<&String> = tested.iter().filter(|line| !line.is_empty()).collect();
+            tested.windows(code.len()).any(|lines| lines == code)
+        });
+        assert!(stands, "in no documentation test:\n{}", block.join("\n"));
+    }
 }
 
 /// Asserts that a file of the documentation is what the code makes of it, or writes it where `DRAW` is set.

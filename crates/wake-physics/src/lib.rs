@@ -46,6 +46,11 @@
 //! square, and for the image before speckle the root mean square of the difference relative to the mean.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+/// The examples of the README are tests of the documentation, too.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 // In the order of the data flow; docs/architecture.md is the same list.
 mod error;
 pub mod constants;

@@ -62,6 +62,26 @@ impl Picture {
         }
     }
 
+    /// A picture from red, green and blue of 8 bits, `[rows, columns, 3]`.
+    ///
+    /// # Panics
+    ///
+    /// If they are not whole rows.
+    #[must_use]
+    pub fn from_rgb(bytes: &[u8], columns: usize) -> Self {
+        let (pixels, rest) = bytes.as_chunks::<3>();
+        let rows = pixels.len() / columns.max(1);
+        assert!(
+            rest.is_empty() && rows * columns == pixels.len(),
+            "bytes of whole rows"
+        );
+        Self {
+            rows,
+            columns,
+            pixels: pixels.to_vec(),
+        }
+    }
+
     /// Rows and columns.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
@@ -365,5 +385,6 @@ mod tests {
         assert_eq!(read.dimensions(), (7, 6));
         assert_eq!(read.get_pixel(3, 2).0, WAKE);
         assert_eq!(read.get_pixel(0, 5).0, [9; 3]);
+        assert_eq!(Picture::from_rgb(read.as_raw(), 7), picture);
     }
 }

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# One share of a data set a task of a Slurm array; the last job joins them.
+#
+#   make=$(sbatch --parsable --array=0-15 docs/scale/slurm.sh)
+#   sbatch --dependency=afterok:$make docs/scale/slurm.sh merge
+#
+#SBATCH --job-name=wakes
+#SBATCH --ntasks=1
+#SBATCH --requeue
+set -euo pipefail
+program=${PROGRAM:-target/release/examples/make_dataset}
+out=${OUT:-out/make_dataset}
+if [ "${1:-}" = merge ]; then
+  exec "$program" --merge --out "$out"
+fi
+# A task that was killed continues where it stopped.
+exec "$program" --grid "${GRID:-ranges}" --count "${COUNT:-1000000}" --seed "${SEED:-7}" \
+  --jobs "${SLURM_CPUS_ON_NODE:-1}" --shard "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT" --out "$out"

@@ -1,0 +1,169 @@
+//! The pictures of the documentation: the gallery, the stages from hull to image, and twenty seconds of a wake.
+//!
+//! ```text
+//! cargo build --release --examples
+//! cargo run --release --example gallery
+//! ```
+//!
+//! Writes `gallery.png`, `stages.png` and `wake.gif`. The last picture of the gallery is drawn by the example `detector`,
+//! which must be built beside this one.
+
+#[path = "../common/exit.rs"]
+mod exit;
+mod film;
+#[path = "../common/progress.rs"]
+mod progress;
+mod stages;
+
+use clap::Parser;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use wake_ldm::{WakeSampler, device_named};
+use wake_physics::grey::{GreyScale, Mapping};
+use wake_physics::picture::Picture;
+use wake_physics::{Field, Scene, Simulation, output, simulate};
+
+/// Draw the pictures of the documentation.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// Folder of the pictures, made if absent
+    #[arg(long, value_name = "DIR", default_value = "docs/images")]
+    out: PathBuf,
+}
+
+/// Sides of a picture of the gallery \[pixels\].
+const SIDE: usize = 256;
+/// Pictures in a row.
+const ACROSS: usize = 3;
+
+/// Scenes of the gallery: a file or the default, what is changed, and what is written above.
+const SCENES: [(&str, &[&str], &str); 4] = [
+    (
+        "default",
+        &["sea.wind_speed=3", "ship.position=[250, 250]"],
+        "X band, 2.5 m pixels, 4 looks; wind 3 m/s",
+    ),
+    (
+        "airborne",
+        &[
+            "ship.heading=250",
+            "ship.position=[-130, -45]",
+            "ship.speed=7",
+            "sea.wind_speed=4",
+        ],
+        "Aircraft, 1.5 m pixels; ship of 120 m, wind 4 m/s",
+    ),
+    (
+        "satellite/terrasar_x",
+        &[],
+        "TerraSAR-X, 1 look; the ship's echo off its wake",
+    ),
+    (
+        "satellite/sentinel_1",
+        &[],
+        "Sentinel-1, 10 m pixels; bright edges of the wake",
+    ),
+];
+
+fn main() -> ExitCode {
+    exit::code(|| run(&Arguments::parse()))
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+    output::make_folder(&arguments.out)?;
+    let bar = progress::bar(3, "pictures");
+    let out = |name: &str| arguments.out.join(name);
+    gallery(&arguments.out)?.write(&out("gallery.png"))?;
+    bar.inc(1);
+    stages::sheet()?.write(&out("stages.png"))?;
+    bar.inc(1);
+    output::write_atomically(&out("wake.gif"), &film::film()?)?;
+    bar.finish_and_clear();
+    Ok(exit::say(&format!(
+        "written to {}",
+        arguments.out.display()
+    ))?)
+}
+
+fn gallery(out: &Path) -> Result<Picture, Box<dyn Error>> {
+    let size = [format!("grid.rows={SIDE}"), format!("grid.columns={SIDE}")];
+    let mut pictures = Vec::new();
+    for (file, changes, caption) in SCENES {
+        let scene = Scene::read(&PathBuf::from(format!("assets/scenes/{file}.toml")))?;
+        let scene = scene.with_assignments(&size)?.with_assignments(changes)?;
+        pictures.push(labelled(&simulate(&scene)?).captioned(caption));
+    }
+    let sampler = WakeSampler::pretrained(&device_named("flex")?)?;
+    let image = sampler.sample(
+        "a ship at 10 m/s toward 120 degrees, wind 3 m/s toward 60 degrees",
+        7,
+    )?;
+    let mut picture = Picture::from_levels(&filling(&image.speckled), SIDE);
+    picture.draw_labels(&image.labels);
+    pictures.push(picture.captioned("Generated from a sentence by the diffusion model"));
+    pictures.push(found(out)?.captioned("Found by the detector, which saw simulated wakes only"));
+    Ok(Picture::sheet(&pictures, ACROSS))
+}
+
+/// The image with its labels.
+fn labelled(simulation: &Simulation) -> Picture {
+    let mut picture =
+        Picture::from_levels(&filling(&simulation.speckled), simulation.raster.columns);
+    picture.draw_labels(&simulation.labels);
+    picture
+}
+
+/// Levels in amplitude between those that one pixel in a hundred lies below and one in two hundred above: for people, who
+/// compare nothing.
+fn filling(field: &Field) -> Vec<u8> {
+    let mut sorted = field.values.clone();
+    sorted.sort_unstable_by(f32::total_cmp);
+    let db = |share: f64| {
+        let value = sorted[(share * (sorted.len() - 1) as f64) as usize];
+        10.0 * f64::from(value).max(1e-9).log10()
+    };
+    let grey = GreyScale {
+        darkest_db: db(0.01),
+        brightest_db: db(0.995),
+        mapping: Mapping::Amplitude,
+    };
+    let level = |&value: &f32| grey.level(f64::from(value));
+    field.values.iter().map(level).collect()
+}
+
+/// What the detector finds in a simulated image, drawn by the example `detector`.
+fn found(out: &Path) -> Result<Picture, Box<dyn Error>> {
+    let scene = Scene::default().with_assignments(&[
+        "grid.rows=256",
+        "grid.columns=256",
+        "grid.spacing=4",
+        "sea.wind_speed=4",
+        "ship.heading=200",
+        "ship.position=[-120, -250]",
+    ])?;
+    let simulation = simulate(&scene)?;
+    let folder = tempfile::tempdir_in(out)?;
+    let image = folder.path().join("image.png");
+    let levels = simulation.levels(&simulation.quick_look());
+    output::write_png(&image, &levels, SIDE, SIDE)?;
+    let detector = std::env::current_exe()?.with_file_name("detector");
+    let run = Command::new(&detector)
+        .arg("detect")
+        .arg(&image)
+        .arg("--out")
+        .arg(folder.path().join("found"))
+        .output()
+        .map_err(|e| {
+            format!(
+                "cannot start {}: {e}; build the examples first",
+                detector.display()
+            )
+        })?;
+    if !run.status.success() {
+        return Err(String::from_utf8_lossy(&run.stderr).into());
+    }
+    let drawn = image::open(folder.path().join("found/image.png"))?.into_rgb8();
+    Ok(Picture::from_rgb(drawn.as_raw(), SIDE))
+}

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# An engineer of machine learning: a labelled data set in two shards, joined, and ten steps of training on it.
+. "$(dirname "$0")/common.sh"
+clone
+cargo build --quiet --release --example make_dataset --example train
+programs=${CARGO_TARGET_DIR:-target}/release/examples
+for shard in 0 1; do
+  "$programs/make_dataset" --count 24 --shard "$shard/2" --out "$scratch/set"
+done
+"$programs/make_dataset" --merge --out "$scratch/set"
+made "$scratch"/set/{metadata.jsonl,coco.json,data.yaml,dataset.json,images/000023.png,labels/000023.txt}
+"$programs/train" mean --data "$scratch/set" --steps 10 --batch 4 --out "$scratch/model"
+made "$scratch"/model/{config.json,prior.safetensors,mean.jsonl}
+echo "ml_engineer: a data set and ten steps"

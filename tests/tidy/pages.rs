@@ -1,0 +1,127 @@
+//! The pages of the documentation: links, the book's table of contents, code in the front page.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Every Markdown page below a folder.
+pub(crate) fn pages(folder: &Path) -> BTreeSet<PathBuf> {
+    let mut found = BTreeSet::new();
+    for entry in fs::read_dir(folder).expect("a folder of pages") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            found.extend(pages(&path));
+        } else if path.extension().is_some_and(|end| end == "md") {
+            found.insert(path);
+        }
+    }
+    found
+}
+
+/// Links of a page that lead nowhere: no file there, or no heading of that name.
+pub(crate) fn broken_links(page: &Path) -> Vec<String> {
+    let text = fs::read_to_string(page).expect("a page");
+    let folder = page.parent().expect("a folder");
+    let mut broken = Vec::new();
+    for target in links(&text) {
+        if target.contains("://") {
+            continue;
+        }
+        let (file, heading) = target.split_once('#').unwrap_or((&target, ""));
+        let file = match file {
+            "" => page.to_owned(),
+            file => folder.join(file),
+        };
+        let is_heading = |text: &str| {
+            text.lines()
+                .any(|line| anchor(line) == Some(heading.to_owned()))
+        };
+        let there = match fs::read_to_string(&file) {
+            Ok(text) => heading.is_empty() || is_heading(&text),
+            Err(_) => heading.is_empty() && file.exists(),
+        };
+        if !there {
+            broken.push(format!("{}: {target}", page.display()));
+        }
+    }
+    broken
+}
+
+/// Targets of the links and pictures of a page, code excepted.
+pub(crate) fn links(text: &str) -> Vec<String> {
+    let mut targets = Vec::new();
+    let mut fenced = false;
+    for line in text.lines() {
+        fenced ^= line.trim_start().starts_with("```");
+        if fenced || line.starts_with("    ") {
+            continue;
+        }
+        // Every second piece between backticks is code.
+        let prose: String = line.split('`').step_by(2).collect();
+        let ends = prose.match_indices("](").map(|(at, _)| &prose[at + 2..]);
+        targets.extend(ends.filter_map(|rest| Some(rest[..rest.find(')')?].to_owned())));
+    }
+    targets
+}
+
+/// The name under which a heading is linked.
+fn anchor(line: &str) -> Option<String> {
+    let title = line.strip_prefix('#')?.trim_start_matches('#').trim();
+    let letters = title.to_lowercase();
+    let kept = letters
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    Some(kept.map(|c| if c == ' ' { '-' } else { c }).collect())
+}
+
+/// Blocks of Rust in a page: their lines, without those that documentation hides.
+pub(crate) fn rust_blocks(text: &str) -> Vec<Vec<String>> {
+    let mut blocks = Vec::new();
+    let mut block: Option<Vec<String>> = None;
+    for line in text.lines() {
+        let line = line
+            .strip_prefix("//!")
+            .map_or(line, |rest| rest.strip_prefix(' ').unwrap_or(rest));
+        match (&mut block, line.strip_prefix("```")) {
+            (None, Some(kind)) => {
+                block = ["", "rust", "no_run"].contains(&kind).then(Vec::new);
+                if block.is_none() {
+                    // Another language: collected and dropped.
+                    block = Some(vec!["not Rust".to_owned()]);
+                }
+            }
+            (Some(lines), Some(_)) => {
+                if lines.first().is_none_or(|line| line != "not Rust") {
+                    blocks.push(std::mem::take(lines));
+                }
+                block = None;
+            }
+            (Some(lines), None) if !(line == "#" || line.starts_with("# ")) => {
+                lines.push(line.to_owned())
+            }
+            _ => {}
+        }
+    }
+    blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_are_found_outside_code() {
+        let text = "[a](b.md) and `[c](d.md)` ![e](f.png)\n```text\n[g](h.md)\n```\n[i](#j)";
+        assert_eq!(links(text), ["b.md", "f.png", "#j"]);
+        assert_eq!(
+            anchor("## How far the arms open").as_deref(),
+            Some("how-far-the-arms-open")
+        );
+    }
+
+    #[test]
+    fn blocks_are_those_of_rust_without_hidden_lines() {
+        let text = "//! ```\n//! let a = 1;\n//! # hidden();\n//! ```\n```text\nno\n```\n```rust\n# fn main() {\nb();\n```";
+        assert_eq!(rust_blocks(text), [["let a = 1;"], ["b();"]]);
+    }
+}
