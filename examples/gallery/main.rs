@@ -164,6 +164,6 @@ fn found(out: &Path) -> Result<Picture, Box<dyn Error>> {
     if !run.status.success() {
         return Err(String::from_utf8_lossy(&run.stderr).into());
     }
-    let drawn = image::open(folder.path().join("found/image.png"))?.into_rgb8();
-    Ok(Picture::from_rgb(drawn.as_raw(), SIDE))
+    let drawn = image::open(folder.path().join("found/image.wakes.png"))?.into_rgb8();
+    Ok(Picture::from_rgb(drawn.as_raw(), drawn.width() as usize))
 }
