@@ -1,10 +1,10 @@
 //! Twenty seconds of a wake: the water beside its radar image.
 
 use crate::stages::signed;
-use gif::{Encoder, Frame, Repeat};
+use gif::{Encoder, EncodingError, Frame, Repeat};
 use std::error::Error;
 use wake_physics::picture::Picture;
-use wake_physics::{Field, Scene, Simulator};
+use wake_physics::{Field, Result, Scene, Simulator};
 
 /// Frames, half a second of the sea each.
 const FRAMES: u32 = 40;
@@ -12,69 +12,48 @@ const FRAMES: u32 = 40;
 const STEP: f64 = 0.5;
 /// Sides of each half \[pixels\].
 const SIDE: usize = 176;
-/// Greys of the film: fewer make it smaller.
-const GREYS: u8 = 32;
+/// Levels of a pixel that share a grey of the film: fewer greys make it smaller.
+const LEVELS: u8 = 8;
 
 /// The film as a GIF.
-pub(crate) fn film() -> Result<Vec<u8>, Box<dyn Error>> {
+pub(crate) fn film() -> std::result::Result<Vec<u8>, Box<dyn Error>> {
     let mut simulator = Simulator::default();
-    let mut bytes = Vec::new();
-    let mut encoder: Option<Encoder<&mut Vec<u8>>> = None;
-    let mut target = Some(&mut bytes);
-    for n in 0..FRAMES {
-        let time = f64::from(n) * STEP;
-        let simulation = simulator.simulate(&scene(time)?)?;
-        let picture = Picture::sheet(
-            &[
-                Picture::from_levels(&signed(&simulation.elevation), SIDE)
-                    .captioned(&format!("Water, {time:.0} s")),
-                Picture::from_levels(&contrast(&simulation.intensity), SIDE)
-                    .captioned("Radar, no speckle"),
-            ],
-            2,
-        );
-        let [rows, columns] = picture.size();
-        let pixels = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
-        let indices: Vec<u8> = pixels
-            .map(|(i, j)| picture.at(i, j)[0] / (256 / u16::from(GREYS)) as u8)
-            .collect();
-        let (width, height) = (columns as u16, rows as u16);
-        if let Some(target) = target.take() {
-            let palette: Vec<u8> = (0..GREYS)
-                .flat_map(|g| [(255 * u16::from(g) / u16::from(GREYS - 1)) as u8; 3])
-                .collect();
-            let mut begun = Encoder::new(target, width, height, &palette)?;
-            begun.set_repeat(Repeat::Infinite)?;
-            encoder = Some(begun);
-        }
-        let mut frame = Frame::from_indexed_pixels(width, height, indices, None);
-        // In hundredths of a second.
-        frame.delay = (100.0 * STEP) as u16;
-        encoder
-            .as_mut()
-            .expect("begun with the first frame")
-            .write_frame(&frame)?;
-        simulator.reclaim(simulation);
-    }
-    drop(encoder);
-    Ok(bytes)
+    let frames: Result<Vec<Picture>> = (0..FRAMES)
+        .map(|n| frame(&mut simulator, f64::from(n) * STEP))
+        .collect();
+    Ok(encoded(&frames?)?)
 }
 
-fn scene(time: f64) -> wake_physics::Result<Scene> {
+/// Water and image at a time \[s\].
+fn frame(simulator: &mut Simulator, time: f64) -> Result<Picture> {
+    let simulation = simulator.simulate(&scene(time)?)?;
+    let water = Picture::from_levels(&signed(&simulation.elevation), SIDE);
+    let image = Picture::from_levels(&contrast(&simulation.intensity), SIDE);
+    simulator.reclaim(simulation);
+    Ok(Picture::sheet(
+        &[
+            water.captioned(&format!("Water, {time:.0} s")),
+            image.captioned("Radar, no speckle"),
+        ],
+        2,
+    ))
+}
+
+fn scene(time: f64) -> Result<Scene> {
     Scene::default().with_assignments(&[
-        format!("grid.rows={SIDE}"),
-        format!("grid.columns={SIDE}"),
-        "grid.spacing=3.5".to_owned(),
-        "sea.wind_speed=4".to_owned(),
-        "sea.wind_toward=130".to_owned(),
-        "ship.length=100".to_owned(),
-        "ship.beam=15".to_owned(),
-        "ship.draft=6".to_owned(),
-        "ship.speed=8".to_owned(),
-        "ship.heading=60".to_owned(),
-        "ship.position=[20, 20]".to_owned(),
-        "model.terms=all".to_owned(),
-        format!("sea.time={time}"),
+        &format!("grid.rows={SIDE}"),
+        &format!("grid.columns={SIDE}"),
+        "grid.spacing=3.5",
+        "sea.wind_speed=4",
+        "sea.wind_toward=130",
+        "ship.length=100",
+        "ship.beam=15",
+        "ship.draft=6",
+        "ship.speed=8",
+        "ship.heading=60",
+        "ship.position=[20, 20]",
+        "model.terms=all",
+        &format!("sea.time={time}"),
     ])
 }
 
@@ -83,4 +62,25 @@ fn contrast(field: &Field) -> Vec<u8> {
     let scale = 255.0 / (2.5 * field.mean().max(1e-12));
     let level = |&value: &f32| (f64::from(value) * scale).clamp(0.0, 255.0) as u8;
     field.values.iter().map(level).collect()
+}
+
+/// Pictures without colours as a film that begins again.
+fn encoded(pictures: &[Picture]) -> std::result::Result<Vec<u8>, EncodingError> {
+    let [rows, columns] = pictures[0].size();
+    let palette: Vec<u8> = (0..=u8::MAX / LEVELS)
+        .flat_map(|grey| [grey * LEVELS + LEVELS / 2; 3])
+        .collect();
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, columns as u16, rows as u16, &palette)?;
+    encoder.set_repeat(Repeat::Infinite)?;
+    for picture in pictures {
+        let pixels = (0..rows).flat_map(|i| (0..columns).map(move |j| picture.at(i, j)));
+        let indices: Vec<u8> = pixels.map(|colour| colour[0] / LEVELS).collect();
+        let mut frame = Frame::from_indexed_pixels(columns as u16, rows as u16, indices, None);
+        // In hundredths of a second.
+        frame.delay = (100.0 * STEP) as u16;
+        encoder.write_frame(&frame)?;
+    }
+    drop(encoder);
+    Ok(bytes)
 }

@@ -57,12 +57,12 @@ const SCENES: [(&str, &[&str], &str); 4] = [
     ),
     (
         "satellite/terrasar_x",
-        &[],
+        &["ship.position=[-50, -100]"],
         "TerraSAR-X, 1 look; the ship's echo off its wake",
     ),
     (
         "satellite/sentinel_1",
-        &[],
+        &["ship.position=[350, 900]"],
         "Sentinel-1, 10 m pixels; bright edges of the wake",
     ),
 ];

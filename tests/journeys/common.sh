@@ -3,6 +3,8 @@ set -euo pipefail
 tree=$(cd "$(dirname "$0")/../.." && pwd)
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
+# How examples are built; CARGO_FLAGS="--workspace --features ndarray,train" takes what the tests have built.
+read -ra flags <<<"${CARGO_FLAGS:---release}"
 
 # The tracked files of the tree, in $scratch/clone.
 clone() {
@@ -16,4 +18,11 @@ made() {
   for file in "$@"; do
     [ -s "$file" ] || { echo "no $file" >&2; exit 1; }
   done
+}
+
+# Builds examples, and sets `programs` to where they are.
+examples() {
+  cargo build --quiet "${flags[@]}" "${@/#/--example=}"
+  case " ${flags[*]} " in *" --release "*) profile=release ;; *) profile=debug ;; esac
+  programs=${CARGO_TARGET_DIR:-$PWD/target}/$profile/examples
 }

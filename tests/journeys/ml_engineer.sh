@@ -2,8 +2,7 @@
 # An engineer of machine learning: a labelled data set in two shards, joined, and ten steps of training on it.
 . "$(dirname "$0")/common.sh"
 clone
-cargo build --quiet --release --example make_dataset --example train
-programs=${CARGO_TARGET_DIR:-target}/release/examples
+examples make_dataset train
 for shard in 0 1; do
   "$programs/make_dataset" --count 24 --shard "$shard/2" --out "$scratch/set"
 done
