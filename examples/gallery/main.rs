@@ -53,17 +53,21 @@ const SCENES: [(&str, &[&str], &str); 4] = [
             "ship.speed=7",
             "sea.wind_speed=4",
         ],
-        "Aircraft, 1.5 m pixels; ship of 120 m, wind 4 m/s",
+        "Aircraft, 1.5 m pixels; a ship of 120 m, wind 4 m/s",
     ),
     (
         "satellite/terrasar_x",
-        &["ship.position=[-50, -100]"],
-        "TerraSAR-X, 1 look; the ship's echo off its wake",
+        &[
+            "ship.position=[-90, -220]",
+            "grid.spacing=2.5",
+            "sea.wind_speed=3",
+        ],
+        "TerraSAR-X, 2.5 m pixels, 1 look; a ship of 60 m, its echo off its track",
     ),
     (
         "satellite/sentinel_1",
         &["ship.position=[350, 900]"],
-        "Sentinel-1, 10 m pixels; bright edges of the wake",
+        "Sentinel-1, 10 m pixels; the dark strip of turbulent water",
     ),
 ];
 
@@ -103,7 +107,7 @@ fn gallery(out: &Path) -> Result<Picture, Box<dyn Error>> {
     let mut picture = Picture::from_levels(&filling(&image.speckled), SIDE);
     picture.draw_labels(&image.labels);
     pictures.push(picture.captioned("Generated from a sentence by the diffusion model"));
-    pictures.push(found(out)?.captioned("Found by the detector, which saw simulated wakes only"));
+    pictures.push(found(out)?.captioned("Found by the detector in a simulated image"));
     Ok(Picture::sheet(&pictures, ACROSS))
 }
 

@@ -54,10 +54,7 @@ pub(crate) fn sheet() -> Result<Picture> {
         ),
         panel(
             &signed(&all.radial_velocity),
-            &format!(
-                "4 Toward the radar, rms {:.2} m/s",
-                all.radial_velocity.rms()
-            ),
+            &format!("4 Velocity, rms {:.2} m/s", all.radial_velocity.rms()),
         ),
         panel(&filling(&all.sigma0), "5 Backscatter σ0"),
         panel(&filling(&sharp.intensity), "6 Image if nothing moved"),

@@ -40,7 +40,7 @@ fn npy(field: &Field) -> Vec<u8> {
     bytes
 }
 
-/// Writes a field as a TIFF of 32-bit floats with the tags of `GeoTIFF` 1.1: size of the pixels and the place of the first, in
+/// Writes a field as a TIFF of 32-bit floats with the tags of GeoTIFF 1.1: size of the pixels and the place of the first, in
 /// metres of x and y, in a plane of no place on Earth.
 ///
 /// # Errors

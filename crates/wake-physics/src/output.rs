@@ -5,6 +5,8 @@
 
 use crate::error::{Error, Result};
 use crate::raster::Field;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
 use num_complex::Complex32;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -171,28 +173,20 @@ fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) 
 ///
 /// If there are not rows × columns pixels.
 pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
-    write_encoded(path, pixels, [rows, columns], image::ExtendedColorType::L8)
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::L8)
+        .map_err(|e| file_error("encode", path, &e))?;
+    write_atomically(path, &bytes)
 }
 
 /// Writes a PNG of red, green and blue, 8 bits each: `[rows, columns, 3]`.
+///
+/// Mostly grey speckle: without filters the three equal bytes of a pixel compress to little more than one.
 pub(crate) fn write_rgb_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
-    write_encoded(
-        path,
-        pixels,
-        [rows, columns],
-        image::ExtendedColorType::Rgb8,
-    )
-}
-
-fn write_encoded(
-    path: &Path,
-    pixels: &[u8],
-    [rows, columns]: [usize; 2],
-    colours: image::ExtendedColorType,
-) -> Result<()> {
     let mut bytes = Vec::new();
-    let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    image::ImageEncoder::write_image(encoder, pixels, columns as u32, rows as u32, colours)
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter)
+        .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::Rgb8)
         .map_err(|e| file_error("encode", path, &e))?;
     write_atomically(path, &bytes)
 }
