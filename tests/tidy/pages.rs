@@ -97,7 +97,7 @@ pub(crate) fn rust_blocks(text: &str) -> Vec<Vec<String>> {
                 block = None;
             }
             (Some(lines), None) if !(line == "#" || line.starts_with("# ")) => {
-                lines.push(line.to_owned())
+                lines.push(line.to_owned());
             }
             _ => {}
         }

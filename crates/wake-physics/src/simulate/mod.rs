@@ -11,6 +11,7 @@ mod accuracy;
 mod clock;
 mod direct;
 mod linear_sea;
+mod radar;
 mod simulation;
 mod speckling;
 mod stages;

@@ -1,0 +1,125 @@
+//! How much those terms change the image that no wave carries: the turbulent wake, its edges, waves that no pixel carries.
+
+use crate::models::Models;
+use crate::raster::Raster;
+use crate::scattering::Backscatter;
+use crate::turbulent::current::WakeEdge;
+use crate::wakes::Wake;
+use std::f64::consts::{PI, SQRT_2};
+
+/// Step of the differences that give the slope of ln σ⁰ \[1\].
+pub(super) const SLOPE_STEP: f64 = 0.05;
+
+/// Points along each side of the image where the turbulent wake is looked at.
+const DAMPING_POINTS: usize = 48;
+
+/// Root of the mean square of the damping by all turbulent wakes over the image.
+pub(super) fn damping(models: &Models) -> f64 {
+    if models.wakes.iter().all(|wake| wake.turbulent.speed == 0.0) {
+        return 0.0;
+    }
+    rms_over(&models.image, |place| {
+        let of = |wake: &Wake| {
+            let seen = wake.turbulent.track.seen_from_ship(place);
+            wake.turbulent.damping(seen)
+        };
+        // What is left is the product: 1 − (1 − a)(1 − b) = a + b (1 − a).
+        models
+            .wakes
+            .iter()
+            .map(of)
+            .fold(0.0, |all, one| all + one * (1.0 - all))
+    })
+}
+
+/// What the current of the wake changes over the image, see [`Survey::edge`].
+pub(super) fn edge(models: &Models) -> [f64; 2] {
+    let of = |edge: &WakeEdge| {
+        let to_port = |seen: [f64; 2]| edge.track.at(seen[0]).port().map(f64::abs);
+        let change = |place| {
+            let seen = edge.track.seen_from_ship(place);
+            let [port_x, port_y] = to_port(seen);
+            let along_sight = port_x * models.incidence.sin();
+            // Velocity bunching gathers by R/V times the slope of the velocity along azimuth.
+            let gathered = models.range_to_velocity * along_sight * port_y;
+            (edge.factor(seen) - 1.0).abs() + gathered * edge.divergence(seen).abs()
+        };
+        let velocity = |place| {
+            let seen = edge.track.seen_from_ship(place);
+            to_port(seen)[0] * models.incidence.sin() * edge.velocity(seen)
+        };
+        [
+            rms_over(&models.image, change),
+            rms_over(&models.image, velocity),
+        ]
+    };
+    let edges = models.wakes.iter().filter_map(|wake| wake.edge.as_ref());
+    // Where wakes cross their changes add, at most.
+    edges
+        .map(of)
+        .fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
+}
+
+/// What the waves of the ship that pixels do not carry change over the image, see [`Survey::unresolved`].
+pub(super) fn unresolved(models: &Models, backscatter: &Backscatter) -> [f64; 2] {
+    if models.unresolved.is_empty() {
+        return [0.0; 2];
+    }
+    let curvature = curvature_of_sigma(backscatter);
+    let change = |place| {
+        let rough = models.roughness(place).unwrap_or_default();
+        let terms = rough.slopes.iter().zip(curvature);
+        terms
+            .map(|(variance, curvature)| variance * curvature)
+            .sum()
+    };
+    let narrow = models.resolution().at(0.0) / (SQRT_2 * PI);
+    let width = models.image.spacing.hypot(narrow);
+    let wider = |place| {
+        let rough = models.roughness(place).unwrap_or_default();
+        let smear = models.range_to_velocity.powi(2) * rough.radial(models.incidence);
+        smear / (smear + width * width)
+    };
+    [
+        rms_over(&models.image, change),
+        rms_over(&models.image, wider),
+    ]
+}
+
+/// ½∂²σ⁰/∂s² over σ⁰ for variances xx, xy and yy of the slopes, on the calm facet.
+pub(super) fn curvature_of_sigma(backscatter: &Backscatter) -> [f64; 3] {
+    let sigma = |x: f64, y: f64| {
+        let [bragg, specular] = backscatter.coarse_parts([x * SLOPE_STEP, y * SLOPE_STEP]);
+        bragg + specular
+    };
+    let calm = sigma(0.0, 0.0);
+    if calm <= 0.0 {
+        return [0.0; 3];
+    }
+    let square = SLOPE_STEP * SLOPE_STEP * calm;
+    let mixed = sigma(1.0, 1.0) + sigma(-1.0, -1.0) - sigma(1.0, -1.0) - sigma(-1.0, 1.0);
+    [
+        0.5 * (sigma(1.0, 0.0) + sigma(-1.0, 0.0) - 2.0 * calm) / square,
+        0.25 * mixed / square,
+        0.5 * (sigma(0.0, 1.0) + sigma(0.0, -1.0) - 2.0 * calm) / square,
+    ]
+}
+
+/// Root of the mean square of a function of the place (x, y) over the image, looked at on a coarse raster.
+pub(super) fn rms_over(image: &Raster, of: impl Fn([f64; 2]) -> f64) -> f64 {
+    let (rows, columns) = (
+        image.rows.min(DAMPING_POINTS),
+        image.columns.min(DAMPING_POINTS),
+    );
+    let mut sum = 0.0;
+    for i in 0..rows {
+        for j in 0..columns {
+            let (x, y) = (
+                image.x(j * image.columns / columns),
+                image.y(i * image.rows / rows),
+            );
+            sum += of([x, y]).powi(2);
+        }
+    }
+    (sum / (rows * columns) as f64).sqrt()
+}
