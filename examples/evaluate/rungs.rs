@@ -7,7 +7,7 @@ use crate::source::{Constant, Expected, Gaussian, ImageSource, OtherSea, Result,
 use crate::statistics::mean;
 use burn::tensor::Device;
 use serde::Serialize;
-use wake_ldm::metrics::{TwoSample, TwoSampleOptions, two_sample};
+use wake_ldm::train::{TwoSample, TwoSampleOptions, two_sample};
 use wake_physics::measure::{SeaShape, crest_variance, sea_shape};
 use wake_physics::{Field, Scene};
 

@@ -1,8 +1,8 @@
 //! Where the files of a data set lie, and what it says of itself.
 
-use super::folder::shuffled;
 use super::recipe::{Draw, Recipe};
 use super::scenes::{PAPER_SCENES, Simulated};
+use super::shuffle::shuffled;
 use crate::error::{Error, Result, check_range};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -28,6 +28,7 @@ mod scenes;
 mod ordered;
 mod pair;
 mod prompts;
+mod shuffle;
 
 // Pairs, position by position.
 mod mixture;
@@ -46,8 +47,6 @@ mod write;
 mod loader;
 
 pub use draws::Draws;
-#[cfg(feature = "train")]
-pub(crate) use folder::shuffled;
 pub use folder::{Epochs, Folder};
 pub use layout::{Manifest, Shard};
 pub use loader::{Batch, Batches, Loader, ToBatch};
@@ -58,6 +57,8 @@ pub use prompts::Prompts;
 pub use recipe::{Draw, Recipe};
 pub use sampled::Sampled;
 pub use scenes::Simulated;
+#[cfg(feature = "train")]
+pub(crate) use shuffle::shuffled;
 pub use source::{Finite, Source};
 pub use write::{Progress, write};
 

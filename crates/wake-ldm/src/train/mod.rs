@@ -22,6 +22,9 @@ mod fine_tune;
 mod folder;
 mod metrics;
 
+// What can be told apart.
+mod two_sample;
+
 pub use checkpoint::{Checkpoint, Tensors};
 pub use fine_tune::{FineTune, FineTuneOptions, Frozen};
 pub use folder::{RunFolder, fingerprint};
@@ -31,6 +34,7 @@ pub use optimizer::{AdamOptions, Rate};
 pub use run::{Run, RunOptions, Task, Terms};
 pub use tasks::{FlowTask, PriorTask, WordsTask};
 pub use trainer::{StepReport, Trainer, TrainerOptions};
+pub use two_sample::{TwoSample, TwoSampleOptions, two_sample};
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;

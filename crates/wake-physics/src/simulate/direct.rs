@@ -3,7 +3,7 @@
 use super::clock::{Clock, Seconds};
 use super::simulation::Method;
 use super::stages::{Backdrop, Stages};
-use super::strips::Strip;
+use super::strip::Strip;
 use super::surface_fields::{SurfaceFields, Wanted};
 use crate::computed::Parts;
 use crate::error::{Error, Result};

@@ -15,6 +15,7 @@ mod radar;
 mod simulation;
 mod speckling;
 mod stages;
+mod strip;
 mod strips;
 mod surface_fields;
 

@@ -3,7 +3,7 @@
 use super::accuracy::{Accuracy, Reached};
 use super::clock::{Clock, Seconds};
 use super::simulation::Method;
-use super::strips::Strip;
+use super::strip::Strip;
 use super::surface_fields::{SurfaceFields, Wanted, quantities};
 use crate::kelvin::{self, KelvinWake, WakePlan};
 use crate::models::Models;

@@ -11,72 +11,15 @@ use super::clock::{Clock, Seconds};
 use super::simulation::Method;
 use super::speckling::Exposure;
 use super::stages::{Backdrop, Drawn, Stages};
+use super::strip::Strip;
 use super::surface_fields::{SurfaceFields, Wanted};
-use crate::computed::{Parts, means_over};
+use crate::computed::means_over;
 use crate::models::Models;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
 use crate::workspace::Workspace;
 use std::ops::Range;
-
-/// Margins between a strip's image and the edge of what is computed for it.
-const OVERLAP: usize = 2;
-
-/// One strip.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Strip {
-    /// Rows of the image.
-    pub(super) delivered: Range<usize>,
-    /// Rows of the computed image that they are made of; the last may be the first of the next strip as well.
-    pub(super) image: Range<usize>,
-    /// Those of them that belong to no other strip.
-    own: Range<usize>,
-    /// Rows of the computed pixels with their margin.
-    pub(super) raster: Range<usize>,
-}
-
-impl Strip {
-    /// All rows.
-    pub(super) fn whole(models: &Models, plan: &Plan) -> Self {
-        Self {
-            delivered: 0..models.delivered.rows,
-            image: 0..models.image.rows,
-            own: 0..models.image.rows,
-            raster: 0..models.image.rows + 2 * plan.sizes.margin[0],
-        }
-    }
-
-    /// The strips of a plan, from the first row to the last.
-    pub(super) fn all(models: &Models, plan: &Plan) -> Vec<Self> {
-        let count = plan.sizes.strips;
-        let whole = Self::whole(models, plan);
-        let parts = Parts::new(&models.image, &models.delivered);
-        let margin = plan.sizes.margin[0];
-        let one = |n: usize| {
-            let [start, end] = [n, n + 1].map(|n| n * whole.delivered.end / count);
-            let mut own = parts.rows(&(start..end)).start..parts.rows(&(end..end + 1)).start;
-            let mut image = parts.rows(&(start..end));
-            // Around the rows of the strip lie margin rows, then the overlap.
-            let mut raster = image.start.saturating_sub((OVERLAP - 1) * margin)
-                ..(image.end + (OVERLAP + 1) * margin).min(whole.raster.end);
-            if n == 0 {
-                (own.start, image.start, raster.start) = (0, 0, 0);
-            }
-            if n + 1 == count {
-                (own.end, image.end, raster.end) =
-                    (whole.own.end, whole.image.end, whole.raster.end);
-            }
-            Self {
-                delivered: start..end,
-                image,
-                own,
-                raster,
-            }
-        };
-        (0..count).map(one).collect()
-    }
-}
 
 /// A scene before speckle: everything at the pixels of the image.
 #[derive(Default)]

@@ -5,13 +5,14 @@ use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor, TensorData};
 use wake_physics::Field;
 
+use super::optimizer::Rate;
+use super::trainer::{Trainer, TrainerOptions};
 use crate::error::{Error, Result, check_range};
 use crate::nn::conv::{conv1x1, conv3x3, convolve};
 use crate::nn::norm::GroupNorm;
 use crate::nn::resample::Downsample;
 use crate::noise::NoiseSource;
 use crate::noise::uniform::PLACES;
-use crate::train::{Rate, Trainer, TrainerOptions};
 
 /// Channels after each halving of the patch.
 const WIDTHS: [usize; 3] = [16, 32, 64];
