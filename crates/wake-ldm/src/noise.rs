@@ -46,6 +46,7 @@ pub(crate) mod uniform {
     #[cfg(feature = "train")]
     pub(crate) const LEVELS: u32 = 2000;
     /// Places of patches in a two-sample test.
+    #[cfg(feature = "train")]
     pub(crate) const PLACES: u32 = 2002;
     /// Latent pixels of examples.
     #[cfg(feature = "train")]
@@ -193,14 +194,15 @@ mod tests {
             (STEP_STREAM, u32::MAX - STEP_STREAM),
         ];
         let uniform = [
-            (uniform::VALUES, 1 << 31),
             one(uniform::SEEDS),
             one(uniform::WORDINGS),
             one(uniform::PROMPTS),
             one(uniform::LEVELS),
             one(uniform::CELLS),
+            one(uniform::PLACES),
             one(uniform::STEPS),
-            (uniform::ORDER, u32::MAX - uniform::ORDER),
+            (uniform::ORDER, uniform::VALUES - uniform::ORDER),
+            (uniform::VALUES, u32::MAX - uniform::VALUES),
         ];
         for streams in [&normal[..], &uniform] {
             let ends = streams.windows(2).all(|w| w[0].0 + w[0].1 <= w[1].0);

@@ -7,6 +7,7 @@ use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::survey::Survey;
 use crate::turbulent::TurbulentWake;
+use crate::turbulent::current::WakeEdge;
 use crate::wakes::Wake;
 use crate::window::sinc;
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,10 @@ const THRESHOLD: f64 = 5.0;
 
 /// Resolution ρ of a Gaussian exp(−(πy/ρ)²) over its width at half power: π/(2√ln 2).
 const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
+
+/// Standard deviations of the damping, smeared, beyond which edges are not looked for: their current has fallen to
+/// e⁻⁸ of its largest.
+const FARTHEST_EDGE: f64 = 8.0;
 
 /// Least standard deviation of a pixel that counts: the rounding of the fields.
 const LEAST_NOISE: f64 = 1e-6;
@@ -92,6 +97,7 @@ pub(super) struct Background {
     noise: f64,
     waves_drawn: bool,
     dark_line_drawn: bool,
+    edges_drawn: bool,
     /// Mean velocity toward the radar [m/s].
     pub(super) velocity: f64,
 }
@@ -137,6 +143,7 @@ impl Background {
             noise: 0.0,
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
+            edges_drawn: drawn(Term::Edge),
             velocity,
         };
         let sea: f64 = survey
@@ -166,7 +173,7 @@ impl Background {
     /// How far a wake is seen that opens by `half_angle` \[rad\].
     pub(super) fn extent(&self, wake: &Wake, half_angle: f64) -> Extent {
         let step = WINDOW as f64 * self.raster.spacing;
-        let band = DarkLine::new(self, wake.turbulent);
+        let band = DarkLine::new(self, wake.turbulent, wake.edge);
         let wake = &wake.kelvin;
         let rays = self.rays(wake);
         let turns = wake.track.turn().is_some();
@@ -190,6 +197,7 @@ impl Background {
                         track: there,
                         ..band.wake
                     },
+                    band.edge,
                 );
                 self.row(wake, distance, half_angle, &rays, &band)
             } else {
@@ -341,24 +349,30 @@ struct Row {
     line: [f64; 2],
 }
 
-/// The dark line as the radar shows it: the turbulent wake, smeared in azimuth.
+/// The turbulent wake as the radar shows it, smeared in azimuth: its dark line and its edges.
 struct DarkLine {
     wake: TurbulentWake,
-    /// Share of the intensity that it takes away at full damping, 0 if it is not drawn.
-    share: f64,
+    /// The edges, if they are drawn.
+    edge: Option<WakeEdge>,
+    /// Share of the intensity that full damping takes away, 0 if the dark line is not drawn.
+    damped: f64,
+    /// Share of the intensity that the edges multiply.
+    multiplied: f64,
     /// Standard deviation of the smear across the track \[m\].
     smear: f64,
 }
 
 impl DarkLine {
-    fn new(background: &Background, wake: TurbulentWake) -> Self {
+    fn new(background: &Background, wake: TurbulentWake, edge: Option<WakeEdge>) -> Self {
         let deviation = background.resolution / (SQRT_2 * PI);
         Self {
-            share: if background.dark_line_drawn {
+            edge: edge.filter(|_| background.edges_drawn),
+            damped: if background.dark_line_drawn {
                 background.share * background.transfer.bragg_share
             } else {
                 0.0
             },
+            multiplied: background.share,
             // The track's port side leans on azimuth by its y component.
             smear: deviation * wake.track.port()[1].abs(),
             wake,
@@ -371,21 +385,57 @@ impl DarkLine {
         [own, own.hypot(self.smear)]
     }
 
-    /// Two standard deviations \[m\].
+    /// Two standard deviations of the damping \[m\]; three with edges, which are strongest at two.
     fn half_width(&self, distance: f64) -> f64 {
-        2.0 * self.deviations(distance)[1]
+        let reach = if self.edge.is_some() { 3.0 } else { 2.0 };
+        reach * self.deviations(distance)[1]
     }
 
     /// Mean square of the change over a window around a place `off` the track \[m\], `width` wide.
     fn mean_square(&self, distance: f64, off: f64, width: f64) -> f64 {
-        let [own, wide] = self.deviations(distance);
-        let centre = crate::turbulent::centre_damping(self.wake.speed, distance);
-        let depth = self.share * centre * own / wide;
         let square = |n: usize| {
             let at = off + ((n as f64 + 0.5) / WINDOW as f64 - 0.5) * width;
-            (-(at / wide).powi(2)).exp()
+            (self.edges(distance, at) - self.damping(distance, at)).powi(2)
         };
-        depth * depth * (0..WINDOW).map(square).sum::<f64>() / WINDOW as f64
+        (0..WINDOW).map(square).sum::<f64>() / WINDOW as f64
+    }
+
+    /// What damping takes away at a place.
+    fn damping(&self, distance: f64, at: f64) -> f64 {
+        let [own, wide] = self.deviations(distance);
+        let centre = crate::turbulent::centre_damping(self.wake.speed, distance);
+        self.damped * centre * own / wide * (-0.5 * (at / wide).powi(2)).exp()
+    }
+
+    /// What the edges add at a place to what damping leaves there, by a sum over the smear: steps of half its deviation, or a
+    /// third of that of the damping.
+    fn edges(&self, distance: f64, at: f64) -> f64 {
+        let [own, wide] = self.deviations(distance);
+        let Some(edge) = self.edge.filter(|_| at.abs() < FARTHEST_EDGE * wide) else {
+            return 0.0;
+        };
+        let forward = -distance - 0.5 * self.wake.length;
+        let damped = self.damped / self.multiplied;
+        let change = |port: f64| {
+            let left = 1.0 - damped * self.wake.damping([forward, port]);
+            left * (edge.factor([forward, port]) - 1.0)
+        };
+        let step = (0.5 * self.smear).min(own / 3.0);
+        let half = if step > 0.0 {
+            (3.0 * self.smear / step).ceil() as i32
+        } else {
+            0
+        };
+        let weighed = (-half..=half).map(|n| {
+            let shift = f64::from(n) * step;
+            let weight = match n {
+                0 => 1.0,
+                _ => (-0.5 * (shift / self.smear).powi(2)).exp(),
+            };
+            [weight * change(at - shift), weight]
+        });
+        let [sum, weights] = weighed.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        self.multiplied * sum / weights
     }
 }
 
@@ -408,7 +458,9 @@ mod tests {
         };
         let line = DarkLine {
             wake,
-            share: 0.7,
+            edge: None,
+            damped: 0.7,
+            multiplied: 1.0,
             smear: 12.0,
         };
         let astern = |distance: f64| -distance - 50.0;
@@ -419,7 +471,7 @@ mod tests {
                 let damping = wake.damping([astern(distance), off - s]);
                 (sum + weight(s) * damping, weights + weight(s))
             });
-            line.share * sum / weights
+            line.damped * sum / weights
         };
         for (distance, off, width) in [
             (300.0, 0.0, 40.0),

@@ -180,6 +180,37 @@ fn no_wave_and_no_dark_line_have_no_box() {
     );
 }
 
+/// The turbulent wake with its edges, without waves: the same, over the windows on the track.
+#[test]
+fn the_contrast_of_edges_is_that_of_the_expected_image() {
+    let terms = "model.terms=[\"sea\", \"turbulent\", \"edge\", \"tilt_average\", \"specular\", \"bunching\", \"coherence\", \"speckle\"]";
+    for (heading, wind_toward) in [(20, 100), (60, 150), (50, 320)] {
+        let place = [
+            terms,
+            "ship.edge=true",
+            "ship.edge_time=900",
+            &format!("ship.heading={heading}"),
+            &format!("sea.wind_toward={wind_toward}"),
+        ];
+        let with = scene(&place);
+        let without = with.with_assignments(&["ship.edge=false"]).unwrap();
+        let stated = change(visibility(&with));
+        assert!(stated > 1.2 * change(visibility(&without)), "{heading}");
+        // Windows of 64 m on the track and beside it reach 96 m.
+        let length = length_m(&with);
+        let inside: Vec<bool> = places(&with)
+            .into_iter()
+            .map(|[astern, aside]| astern > 0.0 && astern + 195.0 <= length && aside.abs() <= 96.0)
+            .collect();
+        let seen = rms(&expected_change(&with), &inside);
+        println!("heading {heading} wind toward {wind_toward}: stated {stated:.4} seen {seen:.4}");
+        assert!(
+            (0.7..1.3).contains(&(stated / seen)),
+            "heading {heading}: stated {stated:.4} seen {seen:.4}"
+        );
+    }
+}
+
 /// A wake across 4 km, its waves alone.
 fn across_the_image(wind: u32, heading: u32) -> Scene {
     scene(&[
