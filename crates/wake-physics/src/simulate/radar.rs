@@ -14,6 +14,9 @@ use crate::scene::Term;
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
+/// Share of the expected mean σ⁰ for which the table is made at first: chosen, the mean that is there is rarely lower.
+const LOWEST_MEAN: f64 = 0.8;
+
 impl Stages<'_> {
     /// What breaking waves, the wake's edges and gusts do to σ⁰.
     pub(super) fn modulate(
@@ -85,7 +88,7 @@ impl Stages<'_> {
             BackscatterTable::covering_or(last, backscatter.clone(), (slopes, reach), asked * mean)
         };
         let mut sigma0 = workspace.field(&self.raster);
-        let mut table = table_for(last_table.take(), self.plan.mean_sigma0);
+        let mut table = table_for(last_table.take(), LOWEST_MEAN * self.plan.mean_sigma0);
         table.fill_sigma0(&mut sigma0, &facets);
         // The mean is known now; without a sea near nadir it is far from the one that was expected.
         let mean = sigma0.mean();
@@ -159,6 +162,32 @@ impl Stages<'_> {
             let noise = self.models.noise as f32;
             let pixels = intensity.values.par_iter_mut().with_min_len(1 << 14);
             pixels.for_each(|value| *value += noise);
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::LOWEST_MEAN;
+    use crate::scene::Scene;
+    use crate::simulate::simulate;
+
+    /// Otherwise every table of σ⁰ is made twice, and none can be used again. The upper limit is the mean's two digits,
+    /// and the part of the image that a strong wake darkens.
+    #[test]
+    fn the_expected_mean_is_that_of_the_image() {
+        for changes in [
+            &[][..],
+            &["sea.wind_speed=3"],
+            &["sea.wind_speed=7", "radar.polarization=HH"],
+            &["radar.incidence=20"],
+            &["ship.speed=6", "radar.frequency=1.27e9"],
+        ] {
+            let scene = Scene::default().with_assignments(changes).unwrap();
+            let simulation = simulate(&scene).unwrap();
+            let ratio = simulation.sigma0.mean() / simulation.plan.mean_sigma0;
+            assert!((LOWEST_MEAN..1.25).contains(&ratio), "{changes:?}: {ratio}");
         }
     }
 }

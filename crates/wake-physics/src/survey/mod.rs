@@ -83,17 +83,21 @@ impl Survey {
         let no_wind_waves = wind_waves.is_empty();
         let mut sea = wind_waves;
         sea.extend_from_slice(&swell);
-        let (mut wake, mut wake_slopes) = (Vec::new(), SlopeCovariance::NONE);
+        let (mut wake, mut wake_slopes) = (Vec::new(), [SlopeCovariance::NONE; 2]);
         for one in &models.wakes {
             let (waves, crowding) = sampled_wake(&one.kelvin, &models.image);
-            wake_slopes = wake_slopes.plus(&slopes(&waves).times(crowding));
+            let over_image = slopes(&waves);
+            wake_slopes[0] = wake_slopes[0].plus(&over_image);
+            wake_slopes[1] = wake_slopes[1].plus(&over_image.times(crowding));
             wake.extend(waves);
         }
         let backscatter = models.backscatter(true, true);
-        let resolved = slopes(&sea).plus(&wake_slopes);
+        // Where the wake is, terms matter most; the mean is that of the whole image.
+        let [mean_slopes, resolved] = wake_slopes.map(|wake| slopes(&sea).plus(&wake));
+        let mean = backscatter.mean_over(&mean_slopes);
         let sensitivity = backscatter.sensitivity(&resolved);
         let (tilt, curvature) = slope_of_ln_sigma(&backscatter);
-        let total = sensitivity.mean[0] + sensitivity.mean[1];
+        let total = mean[0] + mean[1];
         // Where nothing scatters all that is added is all there is.
         let over_mean = |value: f64| match value {
             v if v > 0.0 && total > 0.0 => v / total,
@@ -117,17 +121,13 @@ impl Survey {
             modulation: ModulationTransfer {
                 transfer: models.transfer,
                 tilt,
-                bragg_share: if total > 0.0 {
-                    sensitivity.mean[0] / total
-                } else {
-                    0.0
-                },
+                bragg_share: if total > 0.0 { mean[0] / total } else { 0.0 },
                 range_to_velocity: models.range_to_velocity,
             },
             curvature,
             resolution: models.resolution(),
             damping: damping(models),
-            mean: sensitivity.mean,
+            mean,
             backscatter: [sensitivity.tilt_average, sensitivity.specular],
             modulation_variance: modulation_variance(models),
             spacing: models.image.spacing,
