@@ -287,19 +287,7 @@ fn a_checkpoint_of_another_model_is_refused() {
 
 #[test]
 fn long_gradients_are_shortened_to_the_largest_norm() {
-    let device = Device::flex().autodiff();
-    let layer = burn::nn::LinearConfig::new(2, 1)
-        .with_bias(false)
-        .init(&device);
-    let options = TrainerOptions {
-        rate: Rate {
-            peak: 0.1,
-            warmup: 0,
-            steps: 1,
-        },
-        ..TrainerOptions::default()
-    };
-    let mut trainer = Trainer::new(layer, options, vec![device]);
+    let mut trainer = of_a_plane(1);
     // The gradient of 30 w₀ + 40 w₁ has the norm 50.
     let report = trainer.step(|layer, device, _| {
         let slope = Tensor::<2>::from_floats([[30.0], [40.0]], device);
