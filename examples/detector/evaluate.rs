@@ -31,12 +31,25 @@ pub(crate) struct Options {
     /// Weights of the network, by default those in the repository
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
+    /// Weights of another run, as a row of the table of what transfer needs; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = rung)]
+    rung: Vec<(String, PathBuf)>,
     /// flex, ndarray, wgpu or cuda, where compiled in
     #[arg(long, default_value = "flex")]
     device: String,
     /// Folder of the results, made if absent
     #[arg(long, value_name = "DIR", default_value = "out/detector")]
     out: PathBuf,
+}
+
+/// A name and a file.
+fn rung(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, file)) if !name.is_empty() && !file.is_empty() => {
+            Ok((name.to_owned(), PathBuf::from(file)))
+        }
+        _ => Err("expected NAME=FILE".to_owned()),
+    }
 }
 
 /// Seed of held-out images: no run trains on it.
@@ -61,10 +74,14 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
         spacing: None,
         least_score: 0.01,
     };
-    let finders = [
+    let mut finders = vec![
         ("network", Finder::Network(Box::new(model), search)),
         ("Radon", Finder::Radon),
     ];
+    for (name, file) in &options.rung {
+        let model = Model::load(Some(file), device_named(&options.device)?)?;
+        finders.push((name, Finder::Network(Box::new(model), search)));
+    }
     let mut real = Vec::new();
     if let Some(folder) = &options.real {
         let clear = labels::read(folder, false)?;
@@ -75,7 +92,10 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
     }
     std::fs::create_dir_all(&options.out)
         .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
-    let mut report = Report::default();
+    let mut report = Report {
+        rungs: options.rung.iter().map(|(name, _)| name.clone()).collect(),
+        ..Report::default()
+    };
     for recipe in [Recipe::Detector, Recipe::Painted] {
         simulated(&finders, recipe, options, &mut report)?;
     }
@@ -102,6 +122,7 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
 #[derive(Default)]
 struct Report {
     rows: Vec<Value>,
+    rungs: Vec<String>,
     visibility: Vec<String>,
 }
 
@@ -132,7 +153,8 @@ impl Report {
              | images | number | wakes | found by | AP | AP boxes | recall | at score |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
         );
         let number = |value: &Value| value.as_f64().map_or("–".to_owned(), |x| format!("{x:.3}"));
-        for row in &self.rows {
+        let of_rung = |row: &&Value| self.rungs.iter().any(|rung| row["finder"] == **rung);
+        for row in self.rows.iter().filter(|row| !of_rung(row)) {
             // Writing into a string cannot fail.
             let _ = writeln!(
                 text,
@@ -152,6 +174,43 @@ impl Report {
              intensity (docs/labels.md), of painted ones by the signal over noise of a filter that knows the wake.\n",
         );
         text.push_str(&self.visibility.join(""));
+        if !self.rungs.is_empty() {
+            text.push_str(&self.transfer());
+        }
+        text
+    }
+
+    /// A table of average precision by what the images of training showed, a column each set of images.
+    fn transfer(&self) -> String {
+        let mut sets: Vec<&Value> = Vec::new();
+        for row in &self.rows {
+            if !sets.contains(&&row["images"]) {
+                sets.push(&row["images"]);
+            }
+        }
+        let name = |set: &&&Value| set.as_str().unwrap_or_default().to_owned();
+        let titles: Vec<String> = sets.iter().map(|set| name(&set)).collect();
+        let mut text = format!(
+            "\n## What transfer needs\n\nThe same network trained on other images, AP by the ray rule (and recall).\n\n| trained on | {} |\n| --- |{}\n",
+            titles.join(" | "),
+            " --- |".repeat(titles.len()),
+        );
+        for rung in &self.rungs {
+            let cell = |set: &&Value| {
+                let found = |row: &&Value| row["finder"] == **rung && row["images"] == **set;
+                self.rows.iter().find(found).map_or("–".to_owned(), |row| {
+                    let number = |key: &str| row[key].as_f64().unwrap_or(0.0);
+                    let (precision, recall) = (
+                        number("average_precision"),
+                        number("recall_at_half_false_alarm"),
+                    );
+                    format!("{precision:.3} ({recall:.2})")
+                })
+            };
+            let cells: Vec<String> = sets.iter().map(cell).collect();
+            // Writing into a string cannot fail.
+            let _ = writeln!(text, "| {rung} | {} |", cells.join(" | "));
+        }
         text
     }
 }

@@ -29,10 +29,11 @@ mod paint;
 mod progress;
 mod radon;
 mod recipes;
+mod repeated;
+mod sample;
 mod score;
 mod sea;
 mod show;
-mod sample;
 mod targets;
 mod train;
 

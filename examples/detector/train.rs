@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::json;
-use std::sync::Mutex;
-use wake_ldm::dataset::{Batches, Loader};
+use std::sync::{Arc, Mutex};
+use wake_ldm::dataset::{Batches, Loader, Source};
 use wake_ldm::device_named;
 use wake_ldm::train::{AdamOptions, Checkpoint, Metrics, Rate, Trainer, TrainerOptions};
 use wake_ldm::weights::{Layout, Precision, load, save_as};
@@ -14,6 +14,7 @@ use wake_ldm::weights::{Layout, Precision, load, save_as};
 use super::network::Network;
 use super::progress;
 use super::recipes::Recipe;
+use super::repeated::Repeated;
 use super::sample::{Draw, Sample};
 use super::targets::{Batch, Prepared};
 
@@ -27,6 +28,9 @@ pub(crate) struct Options {
     /// Images to learn from
     #[arg(long, default_value_t = 40_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     images: u32,
+    /// Different images, which come again when all were seen; by default all are different
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
+    distinct: Option<u32>,
     /// What the images show
     #[arg(long, value_enum, default_value_t = Recipe::Mixed)]
     recipe: Recipe,
@@ -73,7 +77,7 @@ pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
     let mut trainer = Trainer::new(network, trainer_options, vec![device]);
     let state = json!({
         "seed": options.seed, "recipe": options.recipe.name(), "images": options.images, "batch": BATCH,
-        "size": SIZE, "rate": options.rate, "weights": options.weights,
+        "distinct": options.distinct, "size": SIZE, "rate": options.rate, "weights": options.weights,
     });
     let checkpoints = options.out.join("checkpoints");
     if let Some(checkpoint) = Checkpoint::newest(&checkpoints)? {
@@ -82,7 +86,12 @@ pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&options.out)
         .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut batches = Loader::new(options.recipe.source(options.seed, SIZE)?)
+    let source = options.recipe.source(options.seed, SIZE)?;
+    let source: Arc<dyn Source> = match options.distinct {
+        Some(count) => Arc::new(Repeated::new(source, count as usize)),
+        None => source,
+    };
+    let mut batches = Loader::new(source)
         .batch(BATCH)
         .threads(threads)
         .start(trainer.steps() as u64)
