@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use wake_ldm::dataset::{Manifest, Progress, Recipe, Shard, merge, shard_folder, write};
+use wake_physics::Plan;
 
 /// Number of scenes in the paper's grid.
 const PAPER_COUNT: u64 = 3456;
@@ -77,6 +78,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             Some(shard) => shard_folder(&arguments.out, shard),
             None => arguments.out.clone(),
         };
+        tell_cost(&manifest)?;
         let made = make(&folder, &manifest, arguments)?;
         (folder, manifest, made)
     };
@@ -116,6 +118,30 @@ fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
         shard: arguments.shard,
         ..Manifest::new(recipe, arguments.seed, count)?.with_val_share(arguments.val_share)?
     })
+}
+
+/// Scenes that are planned before a set is made.
+const PLANNED: u64 = 8;
+/// Seconds of a core above which what a set costs is said first.
+const LONG: f64 = 600.0;
+
+/// Says what a large set costs, by the plans of its first scenes.
+fn tell_cost(manifest: &Manifest) -> wake_ldm::Result<()> {
+    let (source, indices) = (manifest.source()?, manifest.indices());
+    let planned = PLANNED.min(indices.end - indices.start).max(1);
+    let mut seconds = 0.0;
+    for index in indices.start..indices.start + planned {
+        seconds += Plan::new(&source.scene(index)?)?.cost().core_seconds;
+    }
+    let each = seconds / planned as f64;
+    let total = each * (indices.end - indices.start) as f64;
+    if total > LONG {
+        exit::note(&format!(
+            "note: some {each:.2} s of a core for each image, {:.1} core-hours in all; --shard shares them among machines",
+            total / 3600.0
+        ));
+    }
+    Ok(())
 }
 
 /// Makes what is missing under a progress bar; returns how many images that were.

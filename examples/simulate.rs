@@ -62,9 +62,6 @@ struct Arguments {
     json: bool,
 }
 
-/// Pixels of a simulation that takes half a second or longer.
-const MANY_PIXELS: usize = 1 << 21;
-
 #[derive(Clone, Copy, ValueEnum)]
 enum MethodName {
     Fast,
@@ -95,8 +92,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let scene = scene.with_assignments(&arguments.set)?;
     // A scene that cannot be simulated leaves no folder behind.
     let plan = Plan::new(&scene)?;
-    if let Some(warning) = cost(&plan) {
-        exit::note(&warning);
+    let cost = plan.cost();
+    if cost.is_high() {
+        exit::note(&format!("note: {cost}"));
     }
     output::make_folder(&arguments.out)?;
     let simulation = match arguments.method {
@@ -135,20 +133,6 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         exit::say(&summary(&simulation, &arguments.out))?;
     }
     Ok(())
-}
-
-/// What is said before a simulation that takes long.
-fn cost(plan: &Plan) -> Option<String> {
-    let [rows, columns] = plan.sizes.computed;
-    let pixels = rows * columns;
-    let image = (rows - 2 * plan.sizes.margin[0]) * (columns - 2 * plan.sizes.margin[1]);
-    (pixels > MANY_PIXELS).then(|| {
-        format!(
-            "note: {rows} x {columns} pixels are computed, {:.1} times those of the image: seconds to minutes; lower \
-             grid.rows, grid.columns or radar.range_to_velocity, or raise grid.spacing",
-            pixels as f64 / image as f64
-        )
-    })
 }
 
 fn write_fields(simulation: &Simulation, form: Export, out: &Path) -> wake_physics::Result<()> {

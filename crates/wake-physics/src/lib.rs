@@ -97,7 +97,7 @@ pub mod measure;
 pub use error::{Error, Result, quoted, sentence};
 pub use labels::labels_of;
 pub use memory::available as available_memory;
-pub use plan::{Plan, PlannedTerm, Sizes};
+pub use plan::{Cost, Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
 pub use scene::Scene;
 pub use simulate::{

@@ -101,7 +101,7 @@ impl Models {
         );
         let counts_unresolved = counts_unresolved(scene);
         let waves = wakes.iter().filter(|_| counts_unresolved);
-        let band = [image.nyquist_wavenumber(), two_scale.split_wavenumber()];
+        let band = unresolved_band(&image, &two_scale);
         let unresolved = DirectionalSpectrum::new(&WindSea {
             spectrum: crate::scene::SpectrumModel::Elfouhaily,
             ..sea
@@ -149,6 +149,11 @@ impl Models {
             averaged_slopes: SlopeCovariance::NONE,
             image,
         }
+    }
+
+    /// Wavenumbers of the ships' waves that the pixels do not carry and that tilt shorter ones [rad/m].
+    pub(crate) fn unresolved_band(&self) -> [f64; 2] {
+        unresolved_band(&self.image, &self.two_scale)
     }
 
     /// What the ship's waves that the pixels do not carry have at a place (x, y) \[m\], if any reach it.
@@ -287,6 +292,10 @@ fn response(scene: &Scene) -> Option<ImpulseResponse> {
     let needed = *terms != Terms::Rule(TermRule::Needed)
         || response.pixel_correlation(scene.grid.spacing) > INDEPENDENT;
     needed.then_some(response)
+}
+
+fn unresolved_band(image: &Raster, two_scale: &TwoScale) -> [f64; 2] {
+    [image.nyquist_wavenumber(), two_scale.split_wavenumber()]
 }
 
 /// Whether the waves that pixels do not carry count: where an impulse response is asked for, also if pixels of their own do

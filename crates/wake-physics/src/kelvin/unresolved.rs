@@ -222,6 +222,11 @@ impl UnresolvedWaves {
         Some(out)
     }
 
+    /// Tangent of the angle from the track to the outermost ray.
+    pub(crate) fn widest(&self) -> f64 {
+        self.widest
+    }
+
     /// The largest slope variance at a distance astern of midship \[m\].
     pub(crate) fn steepest(&self, distance: f64) -> f64 {
         let waves = self.branches.iter().flatten();

@@ -6,6 +6,8 @@
 
 mod clip;
 mod curve;
+mod dark_line;
+mod short_waves;
 mod visibility;
 
 use crate::kelvin::half_angle;

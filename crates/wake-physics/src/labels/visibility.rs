@@ -1,5 +1,7 @@
 //! How far a wake is seen, and how clearly: its expected contrast against sea and speckle, without an image.
 
+use super::dark_line::DarkLine;
+use super::short_waves::{Profile, ShortWaves};
 use crate::kelvin::{KelvinWake, Ray};
 use crate::models::Models;
 use crate::modulation::{ModulationTransfer, smear};
@@ -7,14 +9,13 @@ use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::survey::Survey;
 use crate::turbulent::TurbulentWake;
-use crate::turbulent::current::WakeEdge;
 use crate::wakes::Wake;
 use crate::window::sinc;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, SQRT_2, TAU};
+use std::f64::consts::TAU;
 
 /// Side of the windows in which a wake is looked for \[pixels\]: chosen.
-const WINDOW: usize = 16;
+pub(super) const WINDOW: usize = 16;
 
 /// A window shows the wake from this ratio on, of the root of the summed squares of what the wake changes to the standard
 /// deviation of a pixel: chosen; five deviations of a filter that knows the pattern, about ⅓ of one in each pixel.
@@ -22,10 +23,6 @@ const THRESHOLD: f64 = 5.0;
 
 /// Resolution ρ of a Gaussian exp(−(πy/ρ)²) over its width at half power: π/(2√ln 2).
 const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
-
-/// Standard deviations of the damping, smeared, beyond which edges are not looked for: their current has fallen to
-/// e⁻⁸ of its largest.
-const FARTHEST_EDGE: f64 = 8.0;
 
 /// Least standard deviation of a pixel that counts: the rounding of the fields.
 const LEAST_NOISE: f64 = 1e-6;
@@ -81,23 +78,25 @@ struct ImagedRay {
 /// The sea that a wake is seen against.
 #[derive(Debug)]
 pub(super) struct Background {
-    transfer: ModulationTransfer,
+    pub(super) transfer: ModulationTransfer,
     raster: Raster,
     /// Largest wavenumber that the computed pixels carry [rad/m].
     largest: f64,
     /// Share of the intensity that waves change: the rest are breaking waves and the radar's noise.
-    share: f64,
+    pub(super) share: f64,
     /// Resolution in range where it is not the pixel \[m\].
     range_resolution: f64,
     /// Side of the squares that the image is the mean over, where finer pixels are computed \[m\].
     square: f64,
     /// Azimuth resolution of the moving sea \[m\].
-    resolution: f64,
+    pub(super) resolution: f64,
     /// Standard deviation of one pixel over its mean.
     noise: f64,
     waves_drawn: bool,
-    dark_line_drawn: bool,
-    edges_drawn: bool,
+    pub(super) dark_line_drawn: bool,
+    pub(super) edges_drawn: bool,
+    /// What the waves make that the pixels do not carry, if they are drawn.
+    short_waves: Option<ShortWaves>,
     /// Mean velocity toward the radar [m/s].
     pub(super) velocity: f64,
 }
@@ -129,11 +128,17 @@ impl Background {
         if !drawn(Term::Bunching) {
             transfer.range_to_velocity = 0.0;
         }
+        let added: f64 = [Term::Breaking, Term::Noise]
+            .into_iter()
+            .zip(survey.added)
+            .filter(|(term, _)| drawn(*term))
+            .map(|(_, added)| added)
+            .sum();
         let mut background = Self {
             transfer,
             raster: models.delivered,
             largest: models.image.nyquist_wavenumber(),
-            share: 1.0 / (1.0 + survey.added.iter().sum::<f64>()),
+            share: 1.0 / (1.0 + added),
             resolution,
             range_resolution,
             square: match models.response {
@@ -144,6 +149,7 @@ impl Background {
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
             edges_drawn: drawn(Term::Edge),
+            short_waves: ShortWaves::new(&models, drawn),
             velocity,
         };
         let sea: f64 = survey
@@ -176,6 +182,7 @@ impl Background {
         let band = DarkLine::new(self, wake.turbulent, wake.edge);
         let wake = &wake.kelvin;
         let rays = self.rays(wake);
+        let short = self.short_waves.as_ref().and_then(|short| short.of(wake));
         let turns = wake.track.turn().is_some();
         let half_length = 0.5 * wake.hull.length();
         let farthest = (wake.track.farthest_astern(&self.raster) - half_length).max(0.0);
@@ -184,6 +191,9 @@ impl Background {
         for n in 0..(farthest / step).ceil() as usize {
             // Middle of the row of windows, astern of the stern.
             let distance = (n as f64 + 0.5) * step;
+            let profile = short
+                .as_ref()
+                .map(|short| short.profile(wake, distance + half_length));
             let row = if turns {
                 // Waves and dark line lie there as beside a straight track along the tangent.
                 let there = wake.track.at(-distance - half_length).straight();
@@ -199,9 +209,9 @@ impl Background {
                     },
                     band.edge,
                 );
-                self.row(wake, distance, half_angle, &rays, &band)
+                self.row(wake, distance, half_angle, &rays, (&band, profile.as_ref()))
             } else {
-                self.row(wake, distance, half_angle, &rays, &band)
+                self.row(wake, distance, half_angle, &rays, (&band, profile.as_ref()))
             };
             let end = distance + 0.5 * step + 2.0 * half_length;
             let seen = |square: f64| WINDOW as f64 * square.sqrt() >= THRESHOLD * self.noise;
@@ -265,7 +275,7 @@ impl Background {
         distance: f64,
         half_angle: f64,
         rays: &[ImagedRay],
-        band: &DarkLine,
+        (band, short): (&DarkLine, Option<&Profile>),
     ) -> Row {
         let width = WINDOW as f64 * self.raster.spacing;
         let half_length = 0.5 * wake.hull.length();
@@ -297,11 +307,12 @@ impl Background {
             if !self.holds(wake.track.on_sea([-from_midship, off])) {
                 continue;
             }
-            let dark = band.mean_square(distance, off, width);
-            row.largest = [row.largest[0].max(waves), row.largest[1].max(dark)];
-            row.wedge = [row.wedge[0] + waves + dark, row.wedge[1] + 1.0];
+            let [dark, short, both] = band.mean_squares(distance, off, width, short);
+            let all = waves + both;
+            row.largest = [row.largest[0].max(waves + short), row.largest[1].max(dark)];
+            row.wedge = [row.wedge[0] + all, row.wedge[1] + 1.0];
             if off.abs() <= half_band.max(0.5 * width) {
-                row.line = [row.line[0] + waves + dark, row.line[1] + 1.0];
+                row.line = [row.line[0] + all, row.line[1] + 1.0];
             }
         }
         row
@@ -349,145 +360,10 @@ struct Row {
     line: [f64; 2],
 }
 
-/// The turbulent wake as the radar shows it, smeared in azimuth: its dark line and its edges.
-struct DarkLine {
-    wake: TurbulentWake,
-    /// The edges, if they are drawn.
-    edge: Option<WakeEdge>,
-    /// Share of the intensity that full damping takes away, 0 if the dark line is not drawn.
-    damped: f64,
-    /// Share of the intensity that the edges multiply.
-    multiplied: f64,
-    /// Standard deviation of the smear across the track \[m\].
-    smear: f64,
-}
-
-impl DarkLine {
-    fn new(background: &Background, wake: TurbulentWake, edge: Option<WakeEdge>) -> Self {
-        let deviation = background.resolution / (SQRT_2 * PI);
-        Self {
-            edge: edge.filter(|_| background.edges_drawn),
-            damped: if background.dark_line_drawn {
-                background.share * background.transfer.bragg_share
-            } else {
-                0.0
-            },
-            multiplied: background.share,
-            // The track's port side leans on azimuth by its y component.
-            smear: deviation * wake.track.port()[1].abs(),
-            wake,
-        }
-    }
-
-    /// Standard deviations of the damping across the track, without and with the smear \[m\].
-    fn deviations(&self, distance: f64) -> [f64; 2] {
-        let own = 0.5 * crate::turbulent::width(self.wake.beam, distance);
-        [own, own.hypot(self.smear)]
-    }
-
-    /// Two standard deviations of the damping \[m\]; three with edges, which are strongest at two.
-    fn half_width(&self, distance: f64) -> f64 {
-        let reach = if self.edge.is_some() { 3.0 } else { 2.0 };
-        reach * self.deviations(distance)[1]
-    }
-
-    /// Mean square of the change over a window around a place `off` the track \[m\], `width` wide.
-    fn mean_square(&self, distance: f64, off: f64, width: f64) -> f64 {
-        let square = |n: usize| {
-            let at = off + ((n as f64 + 0.5) / WINDOW as f64 - 0.5) * width;
-            (self.edges(distance, at) - self.damping(distance, at)).powi(2)
-        };
-        (0..WINDOW).map(square).sum::<f64>() / WINDOW as f64
-    }
-
-    /// What damping takes away at a place.
-    fn damping(&self, distance: f64, at: f64) -> f64 {
-        let [own, wide] = self.deviations(distance);
-        let centre = crate::turbulent::centre_damping(self.wake.speed, distance);
-        self.damped * centre * own / wide * (-0.5 * (at / wide).powi(2)).exp()
-    }
-
-    /// What the edges add at a place to what damping leaves there, by a sum over the smear: steps of half its deviation, or a
-    /// third of that of the damping.
-    fn edges(&self, distance: f64, at: f64) -> f64 {
-        let [own, wide] = self.deviations(distance);
-        let Some(edge) = self.edge.filter(|_| at.abs() < FARTHEST_EDGE * wide) else {
-            return 0.0;
-        };
-        let forward = -distance - 0.5 * self.wake.length;
-        let damped = self.damped / self.multiplied;
-        let change = |port: f64| {
-            let left = 1.0 - damped * self.wake.damping([forward, port]);
-            left * (edge.factor([forward, port]) - 1.0)
-        };
-        let step = (0.5 * self.smear).min(own / 3.0);
-        let half = if step > 0.0 {
-            (3.0 * self.smear / step).ceil() as i32
-        } else {
-            0
-        };
-        let weighed = (-half..=half).map(|n| {
-            let shift = f64::from(n) * step;
-            let weight = match n {
-                0 => 1.0,
-                _ => (-0.5 * (shift / self.smear).powi(2)).exp(),
-            };
-            [weight * change(at - shift), weight]
-        });
-        let [sum, weights] = weighed.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
-        self.multiplied * sum / weights
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{DarkLine, bunched};
-    use crate::track::Track;
-    use crate::turbulent::TurbulentWake;
+    use super::bunched;
     use std::f64::consts::TAU;
-
-    /// The mean square over windows across the track, by sums over the damping itself and a Gaussian smear, at places
-    /// ten times closer. The window's 16 places leave a thousandth where it is no wider than the line.
-    #[test]
-    fn the_dark_line_of_a_window_is_that_of_the_smeared_wake() {
-        let wake = TurbulentWake {
-            track: Track::new([0.0, 0.0], 0.0, 0.0),
-            speed: 8.0,
-            length: 100.0,
-            beam: 15.0,
-        };
-        let line = DarkLine {
-            wake,
-            edge: None,
-            damped: 0.7,
-            multiplied: 1.0,
-            smear: 12.0,
-        };
-        let astern = |distance: f64| -distance - 50.0;
-        let smeared = |distance: f64, off: f64| -> f64 {
-            let weight = |s: f64| (-0.5 * (s / line.smear).powi(2)).exp();
-            let steps = (-600..=600).map(|n| 0.1 * f64::from(n));
-            let (sum, weights) = steps.fold((0.0, 0.0), |(sum, weights), s| {
-                let damping = wake.damping([astern(distance), off - s]);
-                (sum + weight(s) * damping, weights + weight(s))
-            });
-            line.damped * sum / weights
-        };
-        for (distance, off, width) in [
-            (300.0, 0.0, 40.0),
-            (300.0, 35.0, 40.0),
-            (2000.0, -20.0, 30.0),
-        ] {
-            let at = |n: i32| off + ((f64::from(n) + 0.5) / 160.0 - 0.5) * width;
-            let squares = (0..160).map(|n| smeared(distance, at(n)).powi(2));
-            let expected = squares.sum::<f64>() / 160.0;
-            let found = line.mean_square(distance, off, width);
-            assert!(
-                (found / expected - 1.0).abs() < 2e-3,
-                "{distance} {off}: {found} {expected}"
-            );
-        }
-    }
 
     /// The fundamental of displaced echoes by counting them: places y + (C/k) sin(ky) of even sources.
     #[test]

@@ -4,10 +4,12 @@
 //! [`Accuracy`](crate::Accuracy).
 
 mod budget;
+mod cost;
 mod estimates;
 mod terms;
 
 pub(crate) use budget::SHARES;
+pub use cost::Cost;
 pub use terms::PlannedTerm;
 
 use crate::error::Result;
@@ -42,6 +44,8 @@ pub struct Plan {
     pub sizes: Sizes,
     /// What a user should know about this scene.
     pub notes: Vec<String>,
+    /// Pixels of the image.
+    pub(crate) image_pixels: usize,
     /// One a ship.
     pub(crate) wakes: Vec<WakePlan>,
     /// Mean σ⁰ expected \[1\].
@@ -99,6 +103,12 @@ impl Plan {
         self.terms.iter().any(|t| t.term == term && t.used)
     }
 
+    /// What a simulation costs by this plan.
+    #[must_use]
+    pub fn cost(&self) -> Cost {
+        Cost::new(self.sizes.computed, self.image_pixels)
+    }
+
     /// Sum of the estimates of the terms left out of the image before speckle.
     #[must_use]
     pub fn left_out(&self) -> f64 {
@@ -139,6 +149,7 @@ impl Plan {
         let directions = zones.map(|z| z.directions.map(f64::to_degrees));
         let nodes = |of: fn(&WakePlan) -> usize| wakes.iter().map(of).sum();
         Ok(Self {
+            image_pixels: models.delivered.len(),
             sizes: Sizes {
                 computed_spacing: raster.spacing,
                 strips,

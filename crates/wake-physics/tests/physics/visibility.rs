@@ -211,6 +211,38 @@ fn the_contrast_of_edges_is_that_of_the_expected_image() {
     }
 }
 
+/// Waves that the pixels do not carry roughen the wedge: it is the brighter the nearer to the track, and the label says so: to the two digits of
+/// its means over slopes, and what its windows of 64 m blur of a wedge some 100 m wide.
+#[test]
+fn the_contrast_of_short_waves_is_that_of_the_expected_image() {
+    let terms = "model.terms=[\"sea\", \"unresolved\", \"tilt_average\", \"specular\", \"bunching\", \"coherence\", \"speckle\", \"response\"]";
+    for (sensor, heading, incidence) in [
+        ("alos-2-sm10", 40, 35),
+        ("sentinel-1-iw", 20, 35),
+        ("novasar-1", 356, 28),
+    ] {
+        let with = scene(&[
+            terms,
+            &format!("radar.sensor=\"{sensor}\""),
+            &format!("radar.incidence={incidence}"),
+            "ship.position=[300, 560]",
+            &format!("ship.heading={heading}"),
+            "sea.wind_speed=5",
+        ]);
+        let stated = change(visibility(&with));
+        let without = with
+            .with_assignments(&[&terms.replace("\"unresolved\", ", "")])
+            .unwrap();
+        assert!(change(visibility(&without)) < 1e-9, "{sensor}");
+        let seen = rms(&expected_change(&with), &wedge(&with, length_m(&with)));
+        println!("{sensor} heading {heading}: stated {stated:.4} seen {seen:.4}");
+        assert!(
+            (0.85..1.15).contains(&(stated / seen)),
+            "{sensor} heading {heading}: stated {stated:.4} seen {seen:.4}"
+        );
+    }
+}
+
 /// A wake across 4 km, its waves alone.
 fn across_the_image(wind: u32, heading: u32) -> Scene {
     scene(&[

@@ -1,0 +1,179 @@
+//! The turbulent wake as the radar shows it.
+
+use super::short_waves::Profile;
+use super::visibility::{Background, WINDOW};
+use crate::turbulent::TurbulentWake;
+use crate::turbulent::current::WakeEdge;
+use std::f64::consts::{PI, SQRT_2};
+
+/// Standard deviations of the damping, smeared, beyond which edges are not looked for: their current has fallen to
+/// e⁻⁸ of its largest.
+const FARTHEST_EDGE: f64 = 8.0;
+
+/// The turbulent wake as the radar shows it, smeared in azimuth: its dark line and its edges.
+pub(super) struct DarkLine {
+    pub(super) wake: TurbulentWake,
+    /// The edges, if they are drawn.
+    pub(super) edge: Option<WakeEdge>,
+    /// Share of the intensity that full damping takes away, 0 if the dark line is not drawn.
+    damped: f64,
+    /// Share of the intensity that the edges multiply.
+    multiplied: f64,
+    /// Standard deviation of the smear across the track \[m\].
+    smear: f64,
+}
+
+impl DarkLine {
+    pub(super) fn new(
+        background: &Background,
+        wake: TurbulentWake,
+        edge: Option<WakeEdge>,
+    ) -> Self {
+        let deviation = background.resolution / (SQRT_2 * PI);
+        Self {
+            edge: edge.filter(|_| background.edges_drawn),
+            damped: if background.dark_line_drawn {
+                background.share * background.transfer.bragg_share
+            } else {
+                0.0
+            },
+            multiplied: background.share,
+            // The track's port side leans on azimuth by its y component.
+            smear: deviation * wake.track.port()[1].abs(),
+            wake,
+        }
+    }
+
+    /// Standard deviations of the damping across the track, without and with the smear \[m\].
+    fn deviations(&self, distance: f64) -> [f64; 2] {
+        let own = 0.5 * crate::turbulent::width(self.wake.beam, distance);
+        [own, own.hypot(self.smear)]
+    }
+
+    /// Two standard deviations of the damping \[m\]; three with edges, which are strongest at two.
+    pub(super) fn half_width(&self, distance: f64) -> f64 {
+        let reach = if self.edge.is_some() { 3.0 } else { 2.0 };
+        reach * self.deviations(distance)[1]
+    }
+
+    /// Mean squares of the change over a window around a place `off` the track \[m\], `width` wide: by the turbulent wake, by
+    /// the ship's short waves, and by both.
+    pub(super) fn mean_squares(
+        &self,
+        distance: f64,
+        off: f64,
+        width: f64,
+        short: Option<&Profile>,
+    ) -> [f64; 3] {
+        let mut sums = [0.0; 3];
+        for n in 0..WINDOW {
+            let at = off + ((n as f64 + 0.5) / WINDOW as f64 - 0.5) * width;
+            let dark = self.edges(distance, at) - self.damping(distance, at);
+            let short = short.map_or(0.0, |profile| self.short(profile, at));
+            for (sum, change) in sums.iter_mut().zip([dark, short, dark + short]) {
+                *sum += change * change;
+            }
+        }
+        sums.map(|sum| sum / WINDOW as f64)
+    }
+
+    /// What the ship's short waves add at a place, smeared.
+    fn short(&self, profile: &Profile, at: f64) -> f64 {
+        if at.abs() > profile.reach() + 3.0 * self.smear {
+            return 0.0;
+        }
+        self.multiplied * self.smeared(profile.step(), at, |port| profile.at(port))
+    }
+
+    /// What damping takes away at a place.
+    fn damping(&self, distance: f64, at: f64) -> f64 {
+        let [own, wide] = self.deviations(distance);
+        let centre = crate::turbulent::centre_damping(self.wake.speed, distance);
+        self.damped * centre * own / wide * (-0.5 * (at / wide).powi(2)).exp()
+    }
+
+    /// What the edges add at a place to what damping leaves there.
+    fn edges(&self, distance: f64, at: f64) -> f64 {
+        let [own, wide] = self.deviations(distance);
+        let Some(edge) = self.edge.filter(|_| at.abs() < FARTHEST_EDGE * wide) else {
+            return 0.0;
+        };
+        let forward = -distance - 0.5 * self.wake.length;
+        let damped = self.damped / self.multiplied;
+        let change = |port: f64| {
+            let left = 1.0 - damped * self.wake.damping([forward, port]);
+            left * (edge.factor([forward, port]) - 1.0)
+        };
+        self.multiplied * self.smeared(own / 3.0, at, change)
+    }
+
+    /// The mean of a change over the smear, by a sum in steps of half its deviation, or of `finest`.
+    fn smeared(&self, finest: f64, at: f64, change: impl Fn(f64) -> f64) -> f64 {
+        let step = (0.5 * self.smear).min(finest);
+        let half = if step > 0.0 {
+            (3.0 * self.smear / step).ceil() as i32
+        } else {
+            0
+        };
+        let weighed = (-half..=half).map(|n| {
+            let shift = f64::from(n) * step;
+            let weight = match n {
+                0 => 1.0,
+                _ => (-0.5 * (shift / self.smear).powi(2)).exp(),
+            };
+            [weight * change(at - shift), weight]
+        });
+        let [sum, weights] = weighed.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        sum / weights
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::DarkLine;
+    use crate::track::Track;
+    use crate::turbulent::TurbulentWake;
+
+    /// The mean square over windows across the track, by sums over the damping itself and a Gaussian smear, at places
+    /// ten times closer. The window's 16 places leave a thousandth where it is no wider than the line.
+    #[test]
+    fn the_dark_line_of_a_window_is_that_of_the_smeared_wake() {
+        let wake = TurbulentWake {
+            track: Track::new([0.0, 0.0], 0.0, 0.0),
+            speed: 8.0,
+            length: 100.0,
+            beam: 15.0,
+        };
+        let line = DarkLine {
+            wake,
+            edge: None,
+            damped: 0.7,
+            multiplied: 1.0,
+            smear: 12.0,
+        };
+        let astern = |distance: f64| -distance - 50.0;
+        let smeared = |distance: f64, off: f64| -> f64 {
+            let weight = |s: f64| (-0.5 * (s / line.smear).powi(2)).exp();
+            let steps = (-600..=600).map(|n| 0.1 * f64::from(n));
+            let (sum, weights) = steps.fold((0.0, 0.0), |(sum, weights), s| {
+                let damping = wake.damping([astern(distance), off - s]);
+                (sum + weight(s) * damping, weights + weight(s))
+            });
+            line.damped * sum / weights
+        };
+        for (distance, off, width) in [
+            (300.0, 0.0, 40.0),
+            (300.0, 35.0, 40.0),
+            (2000.0, -20.0, 30.0),
+        ] {
+            let at = |n: i32| off + ((f64::from(n) + 0.5) / 160.0 - 0.5) * width;
+            let squares = (0..160).map(|n| smeared(distance, at(n)).powi(2));
+            let expected = squares.sum::<f64>() / 160.0;
+            let found = line.mean_squares(distance, off, width, None)[0];
+            assert!(
+                (found / expected - 1.0).abs() < 2e-3,
+                "{distance} {off}: {found} {expected}"
+            );
+        }
+    }
+}
