@@ -79,18 +79,23 @@ impl Models {
         let sea = wind_sea(scene);
         let delivered = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
         let response = response(scene);
-        let wakes = Wake::of(scene);
+        let spectrum = DirectionalSpectrum::new(&sea);
+        // Whatever spectrum the resolved waves have, the short ones are Elfouhaily's.
+        let short_waves = Elfouhaily::new(scene.sea.wind_speed, scene.sea.fetch);
+        let steepness = steepness(
+            &short_waves,
+            bragg_wavenumber(&scene.radar),
+            spectrum.wind(),
+        );
+        let wakes = Wake::of(scene, steepness);
         let computed = Computed::new(&scene.grid, &delivered, response.as_ref(), &wakes);
         let image = computed.raster;
         let incidence = scene.radar.incidence.to_radians();
-        // Whatever spectrum the resolved waves have, the short ones are Elfouhaily's.
-        let short_waves = Elfouhaily::new(scene.sea.wind_speed, scene.sea.fetch);
         let permittivity = permittivity::sea_water(
             scene.radar.frequency,
             scene.sea.temperature,
             scene.sea.salinity,
         );
-        let spectrum = DirectionalSpectrum::new(&sea);
         let two_scale = TwoScale::new(
             incidence,
             TAU * scene.radar.frequency / SPEED_OF_LIGHT,
@@ -130,11 +135,7 @@ impl Models {
                 depth: scene.sea.depth,
                 incidence,
                 relaxation_rate: relaxation(scene),
-                steepness: steepness(
-                    &short_waves,
-                    bragg_wavenumber(&scene.radar),
-                    spectrum.wind(),
-                ),
+                steepness,
             },
             counts_unresolved,
             unresolved: waves

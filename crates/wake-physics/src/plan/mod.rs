@@ -217,3 +217,136 @@ impl std::fmt::Display for Plan {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn raster(rows: usize, columns: usize) -> Raster {
+        Raster::image(rows, columns, 5.0)
+    }
+
+    fn plan(keys: &[&str]) -> Plan {
+        let small = ["grid.rows=32", "grid.columns=48"];
+        let scene = Scene::default().with_assignments(&small).unwrap();
+        Plan::new(&scene.with_assignments(keys).unwrap()).unwrap()
+    }
+
+    /// One piece up to 2²⁵ pixels; beyond it strips of at most half as many, and none without a row of the image.
+    #[test]
+    fn strips_hold_at_most_half_of_what_one_piece_may() {
+        let image = raster(4000, 4000);
+        assert_eq!(strips(&raster(4096, 8192), &image), 1);
+        assert_eq!(strips(&raster(4097, 8192), &image), 3);
+        for rows in [8192, 10_000, 32_768] {
+            let computed = raster(rows, 10_000);
+            let count = strips(&computed, &image);
+            assert!(computed.len().div_ceil(count) <= 1 << 24, "{rows}");
+            assert!(computed.len().div_ceil(count - 1) > 1 << 24, "{rows}");
+        }
+        assert_eq!(strips(&raster(1 << 20, 1 << 10), &raster(3, 9)), 3);
+    }
+
+    /// Counted by hand. One piece: 160 bytes a pixel. In strips of 1000/4 rows with six margins of 10: 160 bytes on
+    /// (250 + 60) rows of 2000, 24 on all that is computed, 52 on the image of 900 × 1900.
+    #[test]
+    fn memory_is_counted() {
+        let (computed, image) = (raster(1000, 2000), raster(900, 1900));
+        assert_eq!(needed(&computed, &image, (1, 10)), 160 * 2_000_000);
+        let strips = 160 * 310 * 2000 + 24 * 2_000_000 + 52 * 1_710_000;
+        assert_eq!(needed(&computed, &image, (4, 10)), strips);
+    }
+
+    /// Only terms that are not used are left out, and speckle is no part of the image before speckle.
+    #[test]
+    fn what_is_left_out_is_summed_without_speckle() {
+        let mut plan = plan(&[]);
+        for term in &mut plan.terms {
+            (term.used, term.estimate) = match term.term {
+                Term::Sea => (true, 1.0),
+                Term::Kelvin => (false, 0.25),
+                Term::Specular => (false, 0.5),
+                Term::Speckle => (false, 8.0),
+                _ => (true, 16.0),
+            };
+        }
+        assert!((plan.left_out() - 0.75).abs() < 1e-15);
+        assert!(plan.uses(Term::Sea) && !plan.uses(Term::Kelvin) && !plan.uses(Term::Speckle));
+        plan.terms.clear();
+        assert!(!plan.uses(Term::Sea));
+    }
+
+    /// The mean over all seas draws none of them, and averages over what they would have done.
+    #[test]
+    fn the_mean_over_all_seas_draws_no_sea() {
+        let rough = [
+            "model.terms=all",
+            "sea.swell_height=1",
+            "sea.gust_strength=0.1",
+        ];
+        let one = plan(&rough);
+        assert!(one.uses(Term::Sea) && one.sizes.sea_lattice != [0, 0]);
+        assert!(one.uses(Term::Swell) && one.uses(Term::Gusts));
+        let mean = one.clone().over_all_seas();
+        for term in [Term::Sea, Term::Swell, Term::Gusts, Term::Slicks] {
+            assert!(!mean.uses(term), "{term:?}");
+        }
+        for term in [
+            Term::TiltAverage,
+            Term::Specular,
+            Term::Coherence,
+            Term::Kelvin,
+        ] {
+            assert!(mean.uses(term), "{term:?}");
+        }
+        assert_eq!(mean.sizes.sea_lattice, [0, 0]);
+        // Displaced pixels smear: coherence is averaged over where bunching is computed, and only there.
+        for (terms, smeared) in [("[\"sea\", \"bunching\"]", true), ("[\"sea\"]", false)] {
+            let of_list = plan(&[&format!("model.terms={terms}")]).over_all_seas();
+            assert_eq!(of_list.uses(Term::Coherence), smeared, "{terms}");
+        }
+    }
+
+    /// Sizes are those of what is computed: the image and its margins.
+    #[test]
+    fn sizes_are_those_of_the_image_and_its_margins() {
+        let of_ship = plan(&[]);
+        let s = &of_ship.sizes;
+        let around = [32 + 2 * s.margin[0], 48 + 2 * s.margin[1]];
+        assert_eq!((s.computed, s.strips), (around, 1));
+        assert!((s.band - std::f64::consts::PI / s.computed_spacing).abs() < 1e-15);
+        assert!((0..2).all(|axis| s.sea_lattice[axis] >= s.computed[axis]));
+        let planned: usize = of_ship.wakes.iter().map(WakePlan::nodes).sum();
+        assert_eq!(s.wake_nodes[0] + s.wake_nodes[1], planned);
+        assert!(s.wake_nodes.iter().all(|&nodes| nodes > 0));
+        // Degrees to the track: transverse waves within 35.26°, divergent ones beyond.
+        let [low, high] = [0, 1].map(|end| s.wake_directions.iter().map(move |d| d[end]));
+        assert!(low.fold(90.0, f64::min) < 35.0 && high.fold(0.0, f64::max) > 36.0);
+        let empty = plan(&["model.terms=[]"]);
+        assert_eq!(
+            (empty.sizes.sea_lattice, empty.sizes.wake_nodes),
+            ([0, 0], [0, 0])
+        );
+    }
+
+    /// The table names each term once, and the sizes in their order.
+    #[test]
+    fn the_table_says_what_the_plan_holds() {
+        let plan = plan(&[]);
+        let text = plan.to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), plan.terms.len() + 2);
+        for (line, term) in lines[1..].iter().zip(&plan.terms) {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let used = if term.used { "yes" } else { "no" };
+            assert_eq!(words[..2], [term.term.name(), used], "{line}");
+        }
+        let [rows, columns] = plan.sizes.computed;
+        let beginning = format!("computed {rows} x {columns} pixels");
+        let last = lines[lines.len() - 1];
+        assert!(
+            last.starts_with(&beginning) && last.contains("one piece"),
+            "{last}"
+        );
+    }
+}

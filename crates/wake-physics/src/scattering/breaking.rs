@@ -26,17 +26,18 @@ const VISCOSITY_OF_AIR: f64 = 1.47e-5;
 /// Power n of the breaking of waves in their energy: n + 1 = 6 of a change of steepness becomes one of breaking.
 const BREAKING_POWER: f64 = 5.0;
 
-/// Strength of the modulation of the waves that break, 9/2 for a spectrum k⁻⁴.
-const STRENGTH: f64 = 4.5;
+/// Steepness of the action spectrum of the waves that break, as others have coded it: 9/2, of a spectrum k⁻⁴.
+const STEEPNESS: f64 = 4.5;
 
 /// Share of σ⁰ that comes from breaking waves in VV and HH where the edges of a wake are concerned: chosen.
 pub(crate) const SHARE: [f64; 2] = [0.2, 0.4];
 
-/// Response of Bragg waves to a divergence \[s\]: 4.5 over their rate of growth.
+/// Response of Bragg waves to a divergence \[s\]: `m_B/μ_B`.
 ///
 /// - `bragg_wavenumber` [rad/m]; `wind_speed` [m/s], above 0
-pub(crate) fn bragg_response(bragg_wavenumber: f64, wind_speed: f64) -> f64 {
-    STRENGTH / growth_rate(bragg_wavenumber, friction_velocity(wind_speed))
+/// - `steepness` `m_B` of their action spectrum \[1\], see [`steepness`](super::hydrodynamic::steepness)
+pub(crate) fn bragg_response(bragg_wavenumber: f64, wind_speed: f64, steepness: f64) -> f64 {
+    steepness / growth_rate(bragg_wavenumber, friction_velocity(wind_speed))
 }
 
 /// σ⁰ of breaking waves over the share q of the sea they cover \[1\].
@@ -83,7 +84,7 @@ pub fn response_time(radar_wavenumber: f64, wind_speed: f64) -> f64 {
     }
     let k = (0.1 * radar_wavenumber).min(std::f64::consts::TAU / 0.3);
     let rate = growth_rate(k, friction_velocity(wind_speed));
-    0.5 * (BREAKING_POWER + 1.0) * STRENGTH / rate
+    0.5 * (BREAKING_POWER + 1.0) * STEEPNESS / rate
 }
 
 /// Rate of exchange of a wave's energy with the wind μ [1/s].
@@ -192,9 +193,10 @@ mod tests {
             }
         }
         assert!(response_time(wavenumber(5.4e9), 0.0).is_infinite());
-        // Bragg waves alone, 5 m/s, with the strength of their own spectrum there: 61, 7 and 3.4 s.
-        for (k, strength, seconds) in [(30.5, 4.93, 61.0), (129.9, 4.11, 7.0), (232.0, 3.90, 3.4)] {
-            let found = bragg_response(k, 5.0) * strength / STRENGTH;
+        // Bragg waves alone, 5 m/s, with the steepness of their own spectrum there: 61, 7 and 3.4 s.
+        for (k, steepness, seconds) in [(30.5, 4.93, 61.0), (129.9, 4.11, 7.0), (232.0, 3.90, 3.4)]
+        {
+            let found = bragg_response(k, 5.0, steepness);
             assert!((found / seconds - 1.0).abs() < 0.05, "{k}: {found}");
         }
     }

@@ -89,10 +89,10 @@ impl Simulator {
         seconds.plan = clock.lap();
         let what = (scene, &models, &plan);
         let how = (method, Wanted::Fields);
-        let mut drawn = self.draw(what, how, (&mut clock, &mut seconds));
+        let (drawn, exposure) = self.draw(what, how, (&mut clock, &mut seconds));
         let mut speckled = self.workspace.field(&models.delivered);
         speckled.values.copy_from_slice(&drawn.intensity.values);
-        let speckling = Speckling::of(scene, &models, drawn.exposure.take());
+        let speckling = Speckling::of(scene, &models, exposure);
         let slc = if plan.uses(Term::Speckle) {
             speckling.apply(&mut speckled)
         } else {
@@ -180,8 +180,9 @@ impl Simulator {
     ) -> (Field, Option<Exposure>, Accuracy) {
         let mut clock = (Clock::start(), Seconds::default());
         let how = (Method::Fast, Wanted::Image);
-        let drawn = self.draw((scene, models, plan), how, (&mut clock.0, &mut clock.1));
-        (drawn.intensity, drawn.exposure, drawn.accuracy)
+        let clock = (&mut clock.0, &mut clock.1);
+        let (drawn, exposure) = self.draw((scene, models, plan), how, clock);
+        (drawn.intensity, exposure, drawn.accuracy)
     }
 
     /// Takes the blocks of a simulation back that is no longer needed: the next one of this size asks the system for

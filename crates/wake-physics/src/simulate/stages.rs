@@ -39,13 +39,15 @@ pub(super) struct Stages<'a> {
     pub(super) quantities: [Vec<Quantity>; 2],
 }
 
-/// What a scene looks like before speckle; all but the image on the raster with its margin.
+/// What a scene looks like before speckle: as computed, all but the image on the raster with its margin, or as delivered, all at
+/// the pixels of the image.
+#[derive(Default)]
 pub(super) struct Drawn {
     pub(super) fields: SurfaceFields,
     /// Velocity toward the radar [m/s].
     pub(super) radial_velocity: Field,
     pub(super) sigma0: Field,
-    /// Intensity of the computed image.
+    /// Intensity of the image.
     pub(super) intensity: Field,
     pub(super) accuracy: Accuracy,
 }
@@ -79,6 +81,21 @@ impl Backdrop {
 }
 
 impl Drawn {
+    /// The fields that are results, but for the image.
+    pub(super) fn outputs(&mut self) -> [&mut Field; 8] {
+        let f = &mut self.fields;
+        [
+            &mut f.elevation,
+            &mut f.slope_x,
+            &mut f.slope_y,
+            &mut f.velocity_x,
+            &mut f.velocity_y,
+            &mut f.velocity_z,
+            &mut self.radial_velocity,
+            &mut self.sigma0,
+        ]
+    }
+
     /// Puts the blocks of all fields back.
     pub(super) fn give_back(self, workspace: &mut Workspace) {
         let f = self.fields;

@@ -6,13 +6,12 @@
 //! displaced, twice the margin of the image.
 
 use super::Simulator;
-use super::accuracy::Accuracy;
 use super::clock::{Clock, Seconds};
 use super::simulation::Method;
 use super::speckling::Exposure;
 use super::stages::{Backdrop, Drawn, Stages};
 use super::strip::Strip;
-use super::surface_fields::{SurfaceFields, Wanted};
+use super::surface_fields::Wanted;
 use crate::computed::means_over;
 use crate::models::Models;
 use crate::plan::Plan;
@@ -21,80 +20,18 @@ use crate::scene::Scene;
 use crate::workspace::Workspace;
 use std::ops::Range;
 
-/// A scene before speckle: everything at the pixels of the image.
-#[derive(Default)]
-pub(super) struct Delivered {
-    pub(super) fields: SurfaceFields,
-    /// Velocity toward the radar [m/s].
-    pub(super) radial_velocity: Field,
-    pub(super) sigma0: Field,
-    /// Intensity of the image.
-    pub(super) intensity: Field,
-    /// What the impulse response looks at, where the image has one.
-    pub(super) exposure: Option<Exposure>,
-    pub(super) accuracy: Accuracy,
-}
-
-impl Delivered {
-    /// The fields that are results, but for the image.
-    fn outputs(&mut self) -> [&mut Field; 8] {
-        outputs(
-            &mut self.fields,
-            &mut self.radial_velocity,
-            &mut self.sigma0,
-        )
-    }
-}
-
-impl Drawn {
-    /// As [`Delivered::outputs`].
-    fn outputs(&mut self) -> [&mut Field; 8] {
-        outputs(
-            &mut self.fields,
-            &mut self.radial_velocity,
-            &mut self.sigma0,
-        )
-    }
-}
-
-fn outputs<'f>(
-    fields: &'f mut SurfaceFields,
-    radial_velocity: &'f mut Field,
-    sigma0: &'f mut Field,
-) -> [&'f mut Field; 8] {
-    let SurfaceFields {
-        elevation,
-        slope_x,
-        slope_y,
-        velocity_x,
-        velocity_y,
-        velocity_z,
-        ..
-    } = fields;
-    [
-        elevation,
-        slope_x,
-        slope_y,
-        velocity_x,
-        velocity_y,
-        velocity_z,
-        radial_velocity,
-        sigma0,
-    ]
-}
-
 impl Simulator {
-    /// All stages up to the intensity before speckle. The clock runs since the plan was made; without `Wanted::Fields`
-    /// there is only the image.
+    /// All stages up to the intensity before speckle, at the pixels of the image, and what the impulse response looks at
+    /// where the image has one. The clock runs since the plan was made; without `Wanted::Fields` there is only the image.
     pub(super) fn draw(
         &mut self,
         (scene, models, plan): (&Scene, &Models, &Plan),
         (method, wanted): (Method, Wanted),
         (clock, seconds): (&mut Clock, &mut Seconds),
-    ) -> Delivered {
+    ) -> (Drawn, Option<Exposure>) {
         let workspace = &mut self.workspace;
         let mut backdrop = Backdrop::new(workspace, scene, models, plan);
-        let mut out = Delivered::default();
+        let mut out = Drawn::default();
         for strip in &Strip::all(models, plan) {
             let stages = Stages::new((scene, models, plan), (method, wanted), strip);
             let mut drawn =
@@ -119,14 +56,14 @@ impl Simulator {
             }
             drawn.give_back(workspace);
         }
-        if let Some(response) = models.response {
+        let exposure = models.response.map(|response| {
             let sources = std::mem::take(&mut out.intensity);
             let exposure = Exposure::of(scene, models, response, sources);
             out.intensity = exposure.mean();
-            out.exposure = Some(exposure);
             seconds.imaging += clock.lap();
-        }
-        out
+            exposure
+        });
+        (out, exposure)
     }
 }
 
@@ -186,14 +123,14 @@ mod tests {
         scene.with_assignments(keys).unwrap()
     }
 
-    fn drawn(scene: &Scene, strips: usize) -> (Delivered, Vec<Strip>) {
+    fn drawn(scene: &Scene, strips: usize) -> (Drawn, Vec<Strip>) {
         let models = Models::new(scene);
         let mut plan = Plan::of(scene, &models, &Survey::new(scene, &models)).unwrap();
         plan.sizes.strips = strips;
         let mut clock = (Clock::start(), Seconds::default());
         let what = (scene, &models, &plan);
         let how = (Method::Fast, Wanted::Fields);
-        let out = Simulator::default().draw(what, how, (&mut clock.0, &mut clock.1));
+        let (out, _) = Simulator::default().draw(what, how, (&mut clock.0, &mut clock.1));
         (out, Strip::all(&models, &plan))
     }
 
