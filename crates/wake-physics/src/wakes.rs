@@ -108,9 +108,9 @@ mod tests {
     use super::*;
     use crate::models::Models;
 
-    /// The Bragg waves' part of an edge's response, in the sea and at the radar of a scene: m_B/μ_B computed elsewhere for a
-    /// fully developed sea at 5 m/s, 35°, to the digits printed (half a second of 61) and 4 % for a density of air that is not
-    /// stated. With 4.5 for m_B it would be 9 % less at L, 10 and 15 % more at C and X band.
+    /// The Bragg waves' part of an edge's response, in the sea and at the radar of a scene: steepness over rate of growth,
+    /// computed elsewhere for a fully developed sea at 5 m/s, 35°, to the digits printed (half a second of 61) and 4 % for a
+    /// density of air that is not stated. With a steepness of 4.5 it would be 9 % less at L, 10 and 15 % more at C and X band.
     #[test]
     fn edges_answer_with_the_steepness_of_their_own_short_waves() {
         for (gigahertz, seconds, rounding) in

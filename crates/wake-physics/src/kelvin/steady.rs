@@ -175,4 +175,29 @@ mod tests {
         }
         assert_eq!(SteadyWaves::new(10.0, f64::INFINITY).last(0.09), None);
     }
+
+    /// At the critical speed the curve begins with waves without end: X = √3 u, and the weight 3/(π h X) stays finite where
+    /// 1 − y/sinh y is below the rounding.
+    #[test]
+    fn weights_near_the_critical_speed_are_their_series() {
+        let waves = SteadyWaves {
+            nu: 1.0,
+            depth: 1.0,
+        };
+        for u in [1e-4, 1e-7, 1e-9] {
+            let x = 3f64.sqrt() * u;
+            let wave = waves.at(u);
+            // Terms of the order u², and the rounding of X − tanh X over X³.
+            let allowed = u * u + 1e-15 / (u * u);
+            assert!(
+                (wave.wavenumber / x - 1.0).abs() < allowed.min(1e-6),
+                "{u:e}"
+            );
+            let weight = 3.0 / (PI * x);
+            assert!(
+                (wave.weight / weight - 1.0).abs() < allowed.min(1e-6),
+                "{u:e}"
+            );
+        }
+    }
 }

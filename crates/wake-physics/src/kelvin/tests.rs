@@ -568,3 +568,50 @@ fn arms_open_at_the_kelvin_angle() {
         );
     }
 }
+
+/// The plan names the longest and the shortest of its waves: around the ship, below and above the critical speed of 14 m/s,
+/// and far astern at the cusp, where only waves of some 35° arrive.
+#[test]
+fn the_plan_names_its_longest_and_shortest_wave() {
+    let raster = Raster::image(24, 24, 2.0);
+    for (speed, depth, astern, port) in [
+        (8.0, f64::INFINITY, 0.0, 0.0),
+        (10.0, 20.0, 0.0, 0.0),
+        (20.0, 20.0, 0.0, 0.0),
+        (4.0, f64::INFINITY, 6000.0, 2120.0),
+    ] {
+        let wake = KelvinWake {
+            depth,
+            track: Track::new([astern, -port], 90.0, 0.0),
+            ..scene_ship(speed, 90.0)
+        };
+        let plan = wake.plan(&raster, 1e-3);
+        let waves = wake.waves(&plan);
+        let [mut smallest, mut largest] = [f64::INFINITY, 0.0];
+        for (x, y) in waves.kx.iter().zip(&waves.ky) {
+            let k = x.hypot(*y);
+            (smallest, largest) = (k.min(smallest), k.max(largest));
+        }
+        // Where the curve begins off the axis, with k = 0, the rounding of u shows there.
+        let allowed = if speed > 14.0 {
+            1e-6 * largest
+        } else {
+            1e-12 * smallest
+        };
+        assert!((plan.wavenumbers[0] - smallest).abs() <= allowed, "{speed}");
+        assert!(
+            (plan.wavenumbers[1] / largest - 1.0).abs() < 1e-12,
+            "{speed}"
+        );
+        assert!(largest <= raster.nyquist_wavenumber() * (1.0 + 1e-12));
+        // λ² is 3/2 at the cusp, less where phases turn by some tens of radians.
+        if astern > 0.0 {
+            let longest = wake.steady_waves().at(0.0).wavenumber;
+            assert!(
+                (1.01..1.5).contains(&(smallest / longest)),
+                "{}",
+                smallest / longest
+            );
+        }
+    }
+}

@@ -224,3 +224,37 @@ fn smallest(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
     }
     0.5 * (a + b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One place (ξ, 0) of deep water sees α = ν cosh u alone: its phase turns by |ξ| ν sinh u, twice that and 6 more bound
+    /// the integrand, with hull and decay their own.
+    #[test]
+    fn how_fast_waves_turn_on_the_track() {
+        let nu = crate::constants::GRAVITY / 25.0;
+        let waves = SteadyWaves::new(5.0, f64::INFINITY);
+        for (half_length, decay) in [(0.0, 0.0), (10.0, 3.0)] {
+            let reach = Reach::new(waves, vec![[-300.0, 0.0]], half_length, decay);
+            for u in [-1.5f64, 0.4, 2.0] {
+                let rate = nu * u.sinh().abs();
+                let [slow, fast] = [300.0 - half_length, 300.0 + half_length].map(|x| x * rate);
+                assert!((reach.slowest(u) / slow - 1.0).abs() < 1e-12, "{u}");
+                // k = ν cosh² u.
+                let bound = fast + slow + decay * 2.0 * nu * u.cosh() * u.sinh().abs() + 6.0;
+                assert!((reach.fastest(u) / bound - 1.0).abs() < 1e-12, "{u}");
+            }
+            assert!(reach.slowest(0.0) == 0.0 && (reach.fastest(0.0) - 6.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn zeros_and_valleys_are_found() {
+        assert!((root(|x| x.cos(), 1.0, 2.0) - PI / 2.0).abs() < 1e-14);
+        assert!((root(|x| -x.cos(), 1.0, 2.0) - PI / 2.0).abs() < 1e-14);
+        // Forty thirds of the interval.
+        let found = smallest(|x| (x - 0.3).abs(), -1.0, 2.0);
+        assert!((found - 0.3).abs() < 3.0 * (2f64 / 3.0).powi(40));
+    }
+}

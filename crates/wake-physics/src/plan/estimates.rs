@@ -188,3 +188,134 @@ impl<'a> Estimates<'a> {
 fn linear(waves: &[Weighed<'_>]) -> f64 {
     rms(waves, |w| w.modulation.total() * w.sharpest)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modulation::ModulationTransfer;
+    use crate::sar::AzimuthResolution;
+    use crate::waves::Transfer;
+
+    /// One wave of the sea along range and one of the wake along azimuth, both of ω = 1/s, tan θ = 3/4, and numbers of
+    /// their own for all else.
+    fn survey() -> Survey {
+        let wave = |k, variance| WaveSample {
+            k,
+            omega: 1.0,
+            variance,
+        };
+        Survey {
+            sea: vec![wave([0.1, 0.0], 0.04)],
+            swell: vec![wave([0.1, 0.0], 0.01)],
+            wake: vec![wave([0.0, 0.2], 1e-4)],
+            modulation: ModulationTransfer {
+                transfer: Transfer {
+                    depth: f64::INFINITY,
+                    incidence: 0.75f64.atan(),
+                    relaxation_rate: 1.0,
+                    steepness: 4.0,
+                },
+                tilt: [5.0, 0.0],
+                bragg_share: 0.5,
+                range_to_velocity: 50.0,
+            },
+            curvature: [3.0, 7.0],
+            resolution: AzimuthResolution {
+                nominal: 10.0 * PI,
+                coherence: 0.0,
+                defocus: 50.0 * PI,
+            },
+            damping: 0.11,
+            edge: [0.12, 0.5],
+            unresolved: [0.13, 0.14],
+            slicks: 0.15,
+            gusts: 0.16,
+            added: [0.17, 0.18],
+            response: 0.19,
+            mean: [1.0, 1.0],
+            backscatter: [0.21, 0.3],
+            modulation_variance: 0.0,
+            spacing: 4.0,
+            looks: 25.0,
+            absent: vec![(Term::Kelvin, "there is no ship")],
+        }
+    }
+
+    /// Worked out by hand. Modulation of the sea's wave: tilt 0.5 i, range bunching 0.4/3 i, hydrodynamic
+    /// 0.5 · (−0.4 i)/(1 − i) = 0.1 − 0.1 i; of the wake's: bunching −0.2 i · 50 · (−0.8 i) = −8, smeared to 1/e.
+    /// Heights 0.2 and 0.01 m.
+    #[test]
+    fn estimates_are_those_worked_out_by_hand() {
+        let one_over_e = (-1f64).exp();
+        let sea = 0.2 * (0.01 + (0.5 + 0.4 / 3.0 - 0.1f64).powi(2)).sqrt();
+        let wake = 0.01 * 8.0 * one_over_e;
+        // Contrast of the image: both and what the specular return changes.
+        let c = (sea * sea + wake * wake + 0.09).sqrt();
+        let product = (1.0 + c * c).sqrt();
+        // Width of a point: 4 m of the pixel and 10/√2 of the resolution.
+        let width = 66f64.sqrt();
+        // The rms acceleration toward the radar is √0.040064: the resolution's square grows by 2500 π² of it.
+        let acceleration: f64 = 0.04 + 0.64e-4;
+        let moving = 1.0 + 25.0 * acceleration;
+        let wider = 16.0 + 50.0 * moving;
+        let shifts = |height: f64, velocity: f64| [50.0 * velocity / width, height / 3.0];
+        let [sea_shift, wake_shift] = [shifts(0.2, 0.2), shifts(0.01, 0.008)];
+        let both = |axis: usize| sea_shift[axis].hypot(wake_shift[axis]) * c;
+        let of_sea = (sea + 3.0 * 0.04 * 0.01) * product + sea_shift[0].hypot(sea_shift[1]) * c;
+        let of_wake = (wake + 7.0 * 1e-4 * 0.04) * product + wake_shift[0].hypot(wake_shift[1]) * c;
+        // Half as high: a quarter of the second order.
+        let of_swell =
+            (0.5 * sea + 3.0 * 0.01 * 0.01) * product + 0.5 * sea_shift[0].hypot(sea_shift[1]) * c;
+        let survey = survey();
+        for effect in effects(&survey) {
+            let expected = match effect.term {
+                Term::Sea => of_sea,
+                Term::Swell => of_swell,
+                Term::Kelvin => of_wake,
+                Term::Edge => 0.12 + 50.0 * 0.5 / width * c,
+                Term::Slicks => 0.15 * 0.5,
+                Term::Breaking => 0.17,
+                Term::Gusts => 0.16 * product,
+                Term::Noise => 0.18,
+                Term::Unresolved => 0.13 * product + 0.14 * c,
+                Term::Turbulent => 0.11 * 0.5,
+                Term::TiltAverage => 0.21,
+                Term::Specular => 0.3,
+                Term::RangeBunching => 0.2 * 0.4 / 3.0 * (1.0 + c) + both(1),
+                Term::Hydrodynamic => 0.2 * 0.02f64.sqrt() * (1.0 + c),
+                Term::Bunching => 0.01 * 8.0 * (one_over_e + c) + both(0),
+                Term::Coherence => {
+                    let lost = 0.01 * 8.0 * (one_over_e - (-moving).exp());
+                    lost * product + 0.5 * (1.0 - 66.0 / wider) * 0.3
+                }
+                // These stand alone, and are no linear estimates.
+                Term::Response => (c - 1e-6) / 3.0,
+                Term::Speckle => (0.4 - 1e-6) / 3.0,
+            };
+            let expected = 3.0 * expected + 1e-6;
+            assert!(
+                (effect.estimate / expected - 1.0).abs() < 1e-12,
+                "{:?}: {} {expected}",
+                effect.term,
+                effect.estimate
+            );
+        }
+        // Speckle that neighbours share may be more than the contrast.
+        let mut smooth = survey;
+        smooth.response = 0.9;
+        let estimates = Estimates::new(&smooth);
+        assert!((estimates.of(Term::Response) - 0.9).abs() < 1e-15);
+    }
+
+    /// Every term once, and what is absent says so of itself alone.
+    #[test]
+    fn what_is_absent_is_told_of_its_own_term() {
+        let effects = effects(&survey());
+        let terms: Vec<Term> = effects.iter().map(|e| e.term).collect();
+        assert_eq!(terms, Term::ALL);
+        for effect in effects {
+            let reason = (effect.term == Term::Kelvin).then_some("there is no ship");
+            assert_eq!(effect.absent, reason, "{:?}", effect.term);
+        }
+    }
+}

@@ -287,7 +287,7 @@ mod tests {
         let one = plan(&rough);
         assert!(one.uses(Term::Sea) && one.sizes.sea_lattice != [0, 0]);
         assert!(one.uses(Term::Swell) && one.uses(Term::Gusts));
-        let mean = one.clone().over_all_seas();
+        let mean = one.over_all_seas();
         for term in [Term::Sea, Term::Swell, Term::Gusts, Term::Slicks] {
             assert!(!mean.uses(term), "{term:?}");
         }
@@ -348,5 +348,33 @@ mod tests {
             last.starts_with(&beginning) && last.contains("one piece"),
             "{last}"
         );
+    }
+
+    /// Ships share what the nodes may be wrong by: their bounds add up to that of one.
+    #[test]
+    fn ships_share_the_tolerance() {
+        let one = plan(&["model.terms=all"]);
+        let alone = one.wakes[0].error_bound;
+        let mut scene = Scene::default()
+            .with_assignments(&["grid.rows=32", "grid.columns=48"])
+            .unwrap();
+        scene.ships = vec![scene.ships[0].clone(); 3];
+        let three = Plan::new(&scene).unwrap();
+        let sum: f64 = three.wakes.iter().map(|wake| wake.error_bound).sum();
+        assert!(three.wakes.len() == 3 && (sum / alone - 1.0).abs() < 1e-12);
+    }
+
+    /// σ⁰ is what Bragg waves and mirrors return, both near nadir.
+    #[test]
+    fn the_mean_is_the_sum_of_both_returns() {
+        let scene = Scene::default()
+            .with_assignments(&["radar.incidence=15"])
+            .unwrap();
+        let models = Models::new(&scene);
+        let survey = Survey::new(&scene, &models);
+        let [bragg, specular] = survey.mean;
+        assert!(bragg > 0.0 && specular > 0.1 * bragg);
+        let plan = Plan::of(&scene, &models, &survey).unwrap();
+        assert!((plan.mean_sigma0 / (bragg + specular) - 1.0).abs() < 1e-15);
     }
 }

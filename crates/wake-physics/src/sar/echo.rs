@@ -101,7 +101,7 @@ impl Echo {
 fn add_point(image: &mut Field, [row, column]: [f64; 2], power: f64, variance: f64) {
     let sum = weight_sum(row, variance);
     // exp(−18) of the peak is below the rounding of f32.
-    let reach = 6.0 * variance.sqrt() + 1.0;
+    let reach = 6.0 * variance.sqrt();
     let first = (row - reach).ceil().max(0.0) as usize;
     let last = (row + reach).floor().min(image.rows as f64 - 1.0);
     let left = column.floor();

@@ -206,4 +206,20 @@ mod tests {
             }
         }
     }
+
+    /// Six standard deviations on either side, and one step more for the points between nodes; even, and two at least of each
+    /// of two.
+    #[test]
+    fn means_reach_six_standard_deviations() {
+        for (std, step) in [(0.1, 0.03), (0.2, 0.02), (0.05, 0.05), (0.06, 0.017)] {
+            let needed = 6.0 * std / step + 1.0;
+            let found = radius(std, step);
+            assert!(found.is_multiple_of(2), "{std} {step}");
+            assert!(
+                found as f64 >= needed && (found as f64) < needed + 2.0,
+                "{std} {step}: {found}"
+            );
+        }
+        assert_eq!([radius(0.0, 0.1), radius(1e-3, 0.1)], [0, 4]);
+    }
 }

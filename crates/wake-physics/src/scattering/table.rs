@@ -757,4 +757,57 @@ mod tests {
         };
         assert!(table.sigma0_field(&fields).values.is_empty());
     }
+
+    /// Facets lie three nodes and the reach of their average beyond the range, at both ends.
+    #[test]
+    fn facets_span_their_range() {
+        let backscatter = DEFAULT.backscatter();
+        let axes = backscatter.tilt.principal_axes();
+        let range = [[-0.21, 0.34], [-0.1, 0.07]];
+        for spacing in [0.02, 0.013] {
+            let facets = Facets::sample(&backscatter, &axes, range, spacing);
+            for (axis, [first, last]) in range.into_iter().enumerate() {
+                let beyond = spacing * (3 + facets.radius[axis]) as f64;
+                let lattice = &facets.lattice;
+                assert!((lattice.start[axis] - (first - beyond)).abs() < 1e-12);
+                let end = lattice.start[axis] + spacing * (lattice.nodes[axis] - 1) as f64;
+                // Up to two nodes more make their number odd.
+                let more = end - (last + beyond);
+                assert!((-1e-12..2.0 * spacing).contains(&more), "{spacing}: {more}");
+                assert!(!lattice.nodes[axis].is_multiple_of(2));
+            }
+        }
+    }
+
+    /// An error e^{−a/h}: from 10⁻³ to 10⁻⁴ the spacing falls to three quarters; never below half, nor by less than 0.85.
+    #[test]
+    fn the_next_spacing_follows_the_exponent() {
+        let average = |error: f64| Average {
+            lattice: SlopeLattice::sample([0.0; 2], 1.0, [1; 2], |_| 2.0),
+            largest: 2.0,
+            error,
+        };
+        let next = |error: f64, asked: f64| average(2.0 * error).next_spacing(2.0 * asked);
+        assert!((next(1e-3, 1e-4) - 0.75).abs() < 1e-12);
+        assert!((next(1e-1, 1e-8) - 0.5).abs() < 1e-12);
+        assert!((next(1e-4, 0.99e-4) - 0.85).abs() < 1e-12);
+        assert!((next(2.0, 1e-4) - 0.5).abs() < 1e-12);
+    }
+
+    /// An error that no number of facets reaches: the search ends, and says what it has. Plane facets need no table.
+    #[test]
+    fn what_cannot_be_reached_is_stated() {
+        let backscatter = DEFAULT.backscatter();
+        let range = [[-0.05, 0.05]; 2];
+        let asked = 1e-15 * mean(&backscatter);
+        let table = BackscatterTable::over(backscatter.clone(), range, asked);
+        assert!(table.error() > asked && table.error() < 1e-6 * mean(&backscatter));
+        let plane = Backscatter {
+            tilt: SlopeCovariance::NONE,
+            ..backscatter
+        };
+        let table = BackscatterTable::over(plane.clone(), range, asked);
+        assert_eq!((table.size(), table.error()), ([0; 2], 0.0));
+        assert_eq!(table.lookup([0.01, 0.02]), plane.parts([0.01, 0.02]));
+    }
 }
