@@ -129,3 +129,51 @@ fn small_models_come_back_in_every_precision() {
         assert!(worst <= allowed, "{precision:?}: {worst:e}");
     }
 }
+
+/// An index that is no index, or that of another kind of pipeline, is refused by name; a pipe in the place of a file is not
+/// waited for.
+#[test]
+fn a_folder_with_a_broken_index_is_refused() {
+    let entries = std::fs::read_dir(folder()).expect("the folder of fixtures");
+    let mut paths = entries.map(|entry| entry.unwrap().path());
+    let original = paths.find(|path| path.join("model_index.json").is_file());
+    let original = original.expect("a pipeline among the fixtures");
+    let temporary = tempfile::tempdir().unwrap();
+    let copy = temporary.path().join("pipeline");
+    for file in files_below(&original) {
+        let there = copy.join(file.strip_prefix(&original).unwrap());
+        std::fs::create_dir_all(there.parent().unwrap()).unwrap();
+        std::fs::copy(&file, &there).unwrap();
+    }
+    let (_, device) = devices().remove(0);
+    let refused = |text: &str| {
+        std::fs::write(copy.join("model_index.json"), text).unwrap();
+        Pipeline::load(&copy, &device).unwrap_err().to_string()
+    };
+    for text in [
+        "",
+        "garbage",
+        "[]",
+        "{\"_class_name\": 3}",
+        "{\"_class_name\": \"FluxPipeline\"}",
+    ] {
+        let message = refused(text);
+        assert!(message.contains("model_index.json"), "{text}: {message}");
+    }
+    std::fs::remove_file(copy.join("model_index.json")).unwrap();
+    assert!(Pipeline::load(&copy, &device).is_ok());
+    #[cfg(unix)]
+    for name in [
+        "model_index.json",
+        "unet/diffusion_pytorch_model.safetensors",
+    ] {
+        let pipe = copy.join(name);
+        let _ = std::fs::remove_file(&pipe);
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        let message = Pipeline::load(&copy, &device).unwrap_err().to_string();
+        let file = name.rsplit('/').next().unwrap();
+        assert!(message.contains(file), "{name}: {message}");
+        std::fs::remove_file(&pipe).unwrap();
+    }
+}

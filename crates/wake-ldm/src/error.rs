@@ -1,6 +1,7 @@
 //! The one error type of this crate.
 
 use std::path::PathBuf;
+use wake_physics::{quoted, sentence};
 
 /// What a fallible function of this crate returns.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -14,7 +15,11 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// An option that would change the numbers, and that this crate does not implement.
-    #[error("{option} = {value} is not supported; supported: {supported}")]
+    #[error(
+        "{} = {} is not supported; supported: {supported}",
+        quoted(option),
+        quoted(value)
+    )]
     Unsupported {
         option: String,
         value: String,
@@ -31,7 +36,7 @@ pub enum Error {
     },
 
     /// An option of the wrong kind, or at odds with another one.
-    #[error("{option} is {value}, expected {expected}")]
+    #[error("{} is {}, expected {expected}", quoted(option), sentence(value))]
     InvalidOption {
         option: String,
         value: String,
@@ -54,14 +59,14 @@ pub enum Error {
     },
 
     /// A file that should hold JSON does not.
-    #[error("{} is not valid JSON: {source}", path.display())]
+    #[error("{} is not valid JSON: {}", path.display(), sentence(&source.to_string()))]
     Json {
         path: PathBuf,
         source: serde_json::Error,
     },
 
     /// A weight file breaks the safetensors format, so nothing in it is trusted.
-    #[error("{} is not a valid safetensors file: {reason}", path.display())]
+    #[error("{} is not a valid safetensors file: {}", path.display(), sentence(&reason.to_string()))]
     InvalidSafetensors {
         path: PathBuf,
         #[source]
@@ -69,7 +74,7 @@ pub enum Error {
     },
 
     /// A weight that no training gives.
-    #[error("{} is damaged: tensor {tensor} holds {value}; all weights must be finite", path.display())]
+    #[error("{} is damaged: tensor {} holds {value}; all weights must be finite", path.display(), quoted(tensor))]
     InvalidWeight {
         path: PathBuf,
         tensor: String,
@@ -92,8 +97,9 @@ pub enum Error {
 
     /// No backend of this build has a device of this name.
     #[error(
-        "there is no device '{name}' in this build: it has {}; the features flex, ndarray, wgpu and cuda add others, \
+        "there is no device '{}' in this build: it has {}; the features flex, ndarray, wgpu and cuda add others, \
          and a GPU's number may follow, as in cuda:1",
+        quoted(name),
         compiled.join(", ")
     )]
     UnknownDevice {
@@ -110,11 +116,11 @@ pub enum Error {
     Scene(#[from] wake_physics::Error),
 
     /// The recipe of a data set is not understood.
-    #[error("cannot read the recipe: {message}")]
+    #[error("cannot read the recipe: {}", sentence(message))]
     Recipe { message: String },
 
     /// A folder is no data set, or not the one it should be; line 0 is the file or folder as a whole.
-    #[error("{}{}: {message}", path.display(), if *line > 0 { format!(", line {line}") } else { String::new() })]
+    #[error("{}{}: {}", path.display(), if *line > 0 { format!(", line {line}") } else { String::new() }, sentence(message))]
     Dataset {
         path: PathBuf,
         line: usize,
@@ -123,7 +129,7 @@ pub enum Error {
 
     /// A prompt from which no scene follows.
     #[error(
-        "the prompt {} states nothing of a scene; say, for example, whether there is a ship, its speed and heading, the \
+        "the prompt '{}' states nothing of a scene; say, for example, whether there is a ship, its speed and heading, the \
          wind, or the incidence",
         quoted(prompt)
     )]
@@ -207,26 +213,24 @@ impl std::fmt::Display for Misshapen {
         write!(
             f,
             "{}: expected {}, found {}",
-            self.name, self.expected, self.found
+            quoted(&self.name),
+            self.expected,
+            quoted(&self.found)
         )
     }
 }
 
 fn shorten(names: &[String]) -> String {
-    let mut text = names[..names.len().min(SHOWN)].join(", ");
+    let shown: Vec<String> = names
+        .iter()
+        .take(SHOWN)
+        .map(|name| sentence(name))
+        .collect();
+    let mut text = shown.join(", ");
     if names.len() > SHOWN {
         text.push_str(&format!(" and {} more", names.len() - SHOWN));
     }
     text
-}
-
-/// A text in quotation marks, escaped and cut to 80 characters.
-fn quoted(text: &str) -> String {
-    let mut shown: String = text.chars().take(80).flat_map(char::escape_debug).collect();
-    if text.chars().nth(80).is_some() {
-        shown.push('…');
-    }
-    format!("'{shown}'")
 }
 
 /// Checks that a number lies in a closed range.
@@ -249,6 +253,70 @@ pub(crate) fn check_range(name: &str, value: f64, min: f64, max: f64) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What others wrote reaches a terminal in short lines without control characters.
+    #[test]
+    fn foreign_text_is_escaped_and_cut() {
+        let foreign = format!("\u{1b}[31m\0\u{7}\n{}", "x".repeat(100_000));
+        let path = || PathBuf::from("weights.safetensors");
+        let json = format!("[\"{}\"]", "y\\u001b".repeat(10_000));
+        let mismatch = Mismatch {
+            missing: vec![foreign.clone()],
+            unexpected: vec![foreign.clone(); 3],
+            misshapen: vec![Misshapen {
+                name: foreign.clone(),
+                expected: "float [1]".to_owned(),
+                found: foreign.clone(),
+            }],
+        };
+        let errors = [
+            Error::Unsupported {
+                option: foreign.clone(),
+                value: foreign.clone(),
+                supported: "none".to_owned(),
+            },
+            Error::InvalidOption {
+                option: foreign.clone(),
+                value: foreign.clone(),
+                expected: "a number".to_owned(),
+            },
+            Error::Json {
+                path: path(),
+                source: serde_json::from_str::<Vec<u8>>(&json).unwrap_err(),
+            },
+            Error::InvalidSafetensors {
+                path: path(),
+                reason: foreign.clone().into(),
+            },
+            Error::InvalidWeight {
+                path: path(),
+                tensor: foreign.clone(),
+                value: f64::NAN,
+            },
+            Error::WeightsMismatch {
+                path: path(),
+                mismatch: Box::new(mismatch),
+            },
+            Error::UnknownDevice {
+                name: foreign.clone(),
+                compiled: vec!["flex"],
+            },
+            Error::Recipe {
+                message: foreign.clone(),
+            },
+            Error::Dataset {
+                path: path(),
+                line: 3,
+                message: foreign.clone(),
+            },
+            Error::NothingStated { prompt: foreign },
+        ];
+        for error in errors {
+            let text = error.to_string();
+            assert!(!text.chars().any(char::is_control), "{text}");
+            assert!(text.len() < 5000, "{}: {}", text.len(), &text[..200]);
+        }
+    }
 
     #[test]
     fn a_mismatch_names_its_tensors_and_counts_the_rest() {

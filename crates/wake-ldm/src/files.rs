@@ -13,6 +13,10 @@ const LONGEST_TEXT: u64 = 16 << 20;
 /// Reads a configuration file.
 pub(crate) fn read_text(path: &Path) -> Result<String> {
     let io = |source| unreadable(path, source);
+    // Opening a pipe would wait for somebody to write into it.
+    if !fs::metadata(path).map_err(io)?.is_file() {
+        return Err(io(std::io::Error::other("no regular file")));
+    }
     let mut text = String::new();
     let mut file = File::open(path).map_err(io)?.take(LONGEST_TEXT + 1);
     file.read_to_string(&mut text).map_err(io)?;

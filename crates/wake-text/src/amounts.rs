@@ -127,6 +127,9 @@ fn amount(sentence: &[Piece<'_>], at: usize) -> Option<Amount> {
         Kind::Figure => f64::NAN,
         _ => return None,
     };
+    let word = |back: usize| word_at(sentence, at.checked_sub(back)?);
+    let minus = word(1) == Some("minus") && !matches!(word(2), Some("or" | "plus"));
+    let number = if minus { -number } else { number };
     let unit = unit(sentence, at + 1);
     let (dimension, factor, words) =
         unit.map_or((None, 1.0, 0), |u| (Some(u.dimension), u.factor, u.words));

@@ -1,6 +1,7 @@
 //! What can go wrong, by whose fault it is.
 
 use std::path::PathBuf;
+use wake_physics::{quoted, sentence};
 
 /// Why a prompt could not be written or read, or a vocabulary not be loaded.
 #[non_exhaustive]
@@ -11,22 +12,26 @@ pub enum Error {
     #[error(transparent)]
     Scene(#[from] wake_physics::Error),
     /// A prompt states a value that no scene can have.
-    #[error("the prompt says '{words}', but {source}")]
+    #[error("the prompt says '{}', but {source}", quoted(words))]
     Impossible {
         words: String,
         source: wake_physics::Error,
     },
     /// A prompt says two things that cannot both hold.
-    #[error("the prompt contradicts itself: '{first}' and '{second}'; keep one of them")]
+    #[error(
+        "the prompt contradicts itself: '{}' and '{}'; keep one of them",
+        quoted(first),
+        quoted(second)
+    )]
     Contradiction { first: String, second: String },
     /// A file could not be read.
-    #[error("cannot read {}: {message}", path.display())]
+    #[error("cannot read {}: {}", path.display(), sentence(message))]
     File { path: PathBuf, message: String },
     /// A file could not be written.
-    #[error("cannot write {}: {message}", path.display())]
+    #[error("cannot write {}: {}", path.display(), sentence(message))]
     Write { path: PathBuf, message: String },
     /// A vocabulary file is broken.
-    #[error("{}, line {line}, column {column}: {message}", path.display())]
+    #[error("{}, line {line}, column {column}: {}", path.display(), sentence(message))]
     Vocabulary {
         path: PathBuf,
         line: usize,
@@ -43,3 +48,45 @@ pub enum Error {
 
 /// Result of this crate's fallible functions.
 pub type Result<T> = std::result::Result<T, Error>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What others wrote reaches a terminal in one short line without control characters.
+    #[test]
+    fn foreign_text_is_escaped_and_cut() {
+        let foreign = format!("\u{1b}[31m\0\u{7}\n{}", "x".repeat(100_000));
+        let path = PathBuf::from("vocab.json");
+        let scene = wake_physics::Scene::default().with_assignments(&["sea.wind_speed=-1"]);
+        let errors = [
+            Error::Impossible {
+                words: foreign.clone(),
+                source: scene.unwrap_err(),
+            },
+            Error::Contradiction {
+                first: foreign.clone(),
+                second: foreign.clone(),
+            },
+            Error::File {
+                path: path.clone(),
+                message: foreign.clone(),
+            },
+            Error::Write {
+                path: path.clone(),
+                message: foreign.clone(),
+            },
+            Error::Vocabulary {
+                path,
+                line: 1,
+                column: 2,
+                message: foreign,
+            },
+        ];
+        for error in errors {
+            let text = error.to_string();
+            assert!(!text.chars().any(char::is_control), "{text}");
+            assert!(text.len() < 1000, "{}", text.len());
+        }
+    }
+}

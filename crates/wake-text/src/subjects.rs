@@ -115,7 +115,9 @@ pub(crate) fn noun(word: &str) -> Option<Subject> {
             Subject::Length
         }
         "latitude" | "longitude" | "temperature" | "bearing" | "salinity" => Subject::Degrees,
-        "swell" | "current" | "currents" | "tide" | "tides" | "gust" | "gusts" | "rain"
+        "swell" | "swells" | "current" | "currents" | "tide" | "tides" | "gust" | "gusts"
+        | "gusting" | "gusty" | "beaufort" | "rain" | "band" | "polarization" | "polarisation"
+        | "hh" | "vv" | "hv" | "vh" | "speckle" | "looks" | "turn" | "turns" | "turning"
         | "slick" | "slicks" | "gale" | "storm" | "squall" | "submarine" | "iceberg" => {
             Subject::Other
         }

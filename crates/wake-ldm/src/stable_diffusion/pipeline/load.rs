@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use burn::tensor::Device;
+use serde_json::Value;
 use wake_text::{TOKENS, Tokenizer};
 
 use super::{Pipeline, PipelineParts};
 use crate::error::{Error, Result, check_range};
+use crate::files::read_text;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
 use crate::stable_diffusion::text::ClipText;
@@ -17,13 +19,15 @@ const CLIP_VOCABULARY: usize = 49408;
 
 impl Pipeline {
     /// Reads a folder with `text_encoder`, `unet`, `vae`, `scheduler` and (else CLIP's own)
-    /// `tokenizer`, as diffusers writes it, to f32.
+    /// `tokenizer`, as diffusers writes it, to f32. Its `model_index.json`, where there is one, must name a pipeline of
+    /// these parts.
     ///
     /// # Errors
     ///
     /// [`Error`] with the file, option or tensors that do not fit, or with two models that do not fit
     /// each other.
     pub fn load(folder: &Path, device: &Device) -> Result<Self> {
+        check_index(&folder.join("model_index.json"))?;
         let tokenizer = tokenizer(&folder.join("tokenizer"))?;
         let scheduler = SchedulerConfig::read(&folder.join("scheduler/scheduler_config.json"))?;
         let text_encoder = ClipText::from_folder(&folder.join("text_encoder"), device)?;
@@ -67,6 +71,29 @@ impl Pipeline {
         };
         Self::new(parts, device)
     }
+}
+
+/// Classes of diffusers that have the parts of this pipeline.
+const CLASSES: [&str; 2] = ["StableDiffusionPipeline", "StableDiffusionImg2ImgPipeline"];
+
+/// Refuses a folder whose index is broken, or names another kind of pipeline; none need be there.
+fn check_index(path: &Path) -> Result<()> {
+    if !path.exists() {
+        return Ok(());
+    }
+    let index: Value = serde_json::from_str(&read_text(path)?).map_err(|source| Error::Json {
+        path: path.to_owned(),
+        source,
+    })?;
+    let class = &index["_class_name"];
+    if class.as_str().is_some_and(|class| CLASSES.contains(&class)) {
+        return Ok(());
+    }
+    Err(Error::Unsupported {
+        option: "_class_name of model_index.json".to_owned(),
+        value: class.to_string(),
+        supported: CLASSES.join(", "),
+    })
 }
 
 /// The folder's tokenizer, or CLIP's where there is none.
