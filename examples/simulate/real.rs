@@ -1,0 +1,111 @@
+//! Real images of a folder, with the axes of their wakes where somebody labelled them.
+
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use wake_physics::measure::WakeAxis;
+use wake_physics::{Error, Field, Result};
+
+/// One image.
+pub(crate) struct Real {
+    pub(crate) name: String,
+    /// Its grey, taken as linear in amplitude.
+    pub(crate) amplitude: Field,
+    /// Its wakes by name, without the doubtful ones.
+    pub(crate) wakes: Vec<(String, WakeAxis)>,
+}
+
+/// `labels.json` of a folder; more keys are allowed.
+#[derive(Deserialize, Default)]
+struct Labels {
+    images: BTreeMap<String, Image>,
+}
+
+#[derive(Deserialize)]
+struct Image {
+    wakes: Vec<Wake>,
+}
+
+#[derive(Deserialize)]
+struct Wake {
+    id: String,
+    tip: [f64; 2],
+    axis_deg: f64,
+    confidence: String,
+}
+
+/// The PNG images of a folder by name, without those whose name ends in `_mask`.
+pub(crate) fn images(folder: &Path) -> Result<Vec<Real>> {
+    let labels = labels(&folder.join("labels.json"))?;
+    let mut images = Vec::new();
+    for path in pictures(folder)? {
+        let name = |part: Option<&std::ffi::OsStr>| {
+            part.unwrap_or_default().to_string_lossy().into_owned()
+        };
+        let wakes = labels.images.get(&name(path.file_name()));
+        let wakes = wakes.into_iter().flat_map(|image| &image.wakes);
+        let wakes = wakes.filter(|wake| wake.confidence != "doubtful");
+        images.push(Real {
+            name: name(path.file_stem()),
+            amplitude: grey(&path)?,
+            wakes: wakes
+                .map(|wake| {
+                    let axis = WakeAxis {
+                        tip: wake.tip,
+                        direction: wake.axis_deg,
+                    };
+                    (wake.id.clone(), axis)
+                })
+                .collect(),
+        });
+    }
+    Ok(images)
+}
+
+fn labels(path: &Path) -> Result<Labels> {
+    if !path.exists() {
+        return Ok(Labels::default());
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))?;
+    serde_json::from_str(&text).map_err(|e| unreadable(path, &e))
+}
+
+fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
+    let fail = |e: std::io::Error| unreadable(folder, &e);
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(fail)? {
+        let path = entry.map_err(fail)?.path();
+        let is_png = path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        if is_png && !stem.ends_with("_mask") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    if paths.is_empty() {
+        let none = std::io::Error::other("it holds no PNG image; name a folder of real images");
+        return Err(unreadable(folder, &none));
+    }
+    Ok(paths)
+}
+
+fn grey(path: &Path) -> Result<Field> {
+    let picture = image::open(path)
+        .map_err(|e| unreadable(path, &e))?
+        .into_luma8();
+    Ok(Field {
+        rows: picture.height() as usize,
+        columns: picture.width() as usize,
+        values: picture.into_raw().into_iter().map(f32::from).collect(),
+    })
+}
+
+fn unreadable(path: &Path, cause: &dyn std::fmt::Display) -> Error {
+    Error::File {
+        action: "read",
+        path: path.to_owned(),
+        message: cause.to_string(),
+    }
+}
