@@ -1,12 +1,14 @@
-//! SAR imaging and speckle, from 128 to 2048 pixels: `cargo bench --no-default-features --bench sar`.
+//! SAR imaging, impulse response and speckle, from 128 to 2048 pixels: `cargo bench --no-default-features --bench sar`.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
 use std::f64::consts::{SQRT_2, TAU};
+use wake_physics::sar::impulse::{Axis, Looks, Reflectivity};
 use wake_physics::sar::speckle::speckle;
-use wake_physics::sar::{AzimuthResolution, Imaging, Sources};
+use wake_physics::sar::{AzimuthResolution, Imaging, ImpulseResponse, Sources};
+use wake_physics::window::Window;
 use wake_physics::{Field, Raster};
 
 const SIZES: [usize; 5] = [128, 256, 512, 1024, 2048];
@@ -77,6 +79,43 @@ fn imaging(c: &mut Criterion) {
     group.finish();
 }
 
+/// Four looks through a response four sources wide, on the pixels of the image and on two a pixel.
+fn responses(c: &mut Criterion) {
+    let mut group = c.benchmark_group("response");
+    for size in SIZES {
+        for fine in [1, 2] {
+            let spacing = SPACING / fine as f64;
+            let axis = Axis {
+                resolution: 4.0 * spacing,
+                window: Window::Hamming(0.75),
+            };
+            let response = ImpulseResponse {
+                range: axis,
+                azimuth: axis,
+            };
+            let image = Raster::image(size, size, SPACING);
+            let [rows, columns] = response.guard(spacing);
+            let sources =
+                Raster::image(size * fine, size * fine, spacing).with_margin(rows, columns);
+            let intensity = Field::constant(&sources, 0.03);
+            let sources = Reflectivity {
+                raster: &sources,
+                intensity: &intensity,
+                points: &[],
+            };
+            let looks = Looks {
+                equivalent: f64::from(LOOKS),
+                seed: 1,
+            };
+            group.throughput(Throughput::Elements(image.len() as u64));
+            group.bench_function(BenchmarkId::new(format!("{fine} a pixel"), size), |b| {
+                b.iter(|| response.multilook(&sources, &image, &looks));
+            });
+        }
+    }
+    group.finish();
+}
+
 fn speckles(c: &mut Criterion) {
     let mut group = c.benchmark_group("speckle");
     for size in SIZES {
@@ -98,6 +137,6 @@ fn speckles(c: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = imaging, speckles
+    targets = imaging, responses, speckles
 }
 criterion_main!(benches);

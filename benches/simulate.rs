@@ -1,14 +1,24 @@
 //! A whole scene by size, from numbers to speckle and labels: the second and later scenes of a simulator, all fields and
-//! the image alone, and one call on fresh memory; and the peak memory of a process that simulates it:
+//! the image alone, and one call on fresh memory; the satellite scenes of 1,000 × 1,000 pixels; and the peak memory of a process that simulates it:
 //! `cargo bench --no-default-features --bench simulate`.
 
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use std::env;
+use std::path::Path;
 use std::process::Command;
 use wake_physics::{Scene, Simulator, simulate};
 
 /// Pixels along a side.
 const SIZES: [usize; 6] = [128, 256, 512, 1024, 2048, 4096];
+/// Scene files.
+const SATELLITES: [&str; 6] = [
+    "alos_2",
+    "cosmo_skymed",
+    "ers_2",
+    "novasar_1",
+    "sentinel_1",
+    "terrasar_x",
+];
 /// Set to a size, this program simulates once and prints its peak memory \[KiB\].
 const PEAK_OF: &str = "WAKE_PEAK_OF";
 
@@ -41,6 +51,24 @@ fn seconds(c: &mut Criterion) {
     group.finish();
 }
 
+/// The scenes of `assets/scenes/satellite`, all fields on fresh memory and the image alone.
+fn satellites(c: &mut Criterion) {
+    let mut group = c.benchmark_group("satellite");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat);
+    for name in SATELLITES {
+        let path = format!("assets/scenes/satellite/{name}.toml");
+        let scene = Scene::read(Path::new(&path)).expect("a scene file");
+        let mut simulator = Simulator::default();
+        group.bench_with_input(BenchmarkId::new("image", name), &scene, |b, scene| {
+            b.iter(|| simulator.image(scene).expect("a valid scene").speckled());
+        });
+        group.bench_with_input(BenchmarkId::new("once", name), &scene, |b, scene| {
+            b.iter(|| simulate(scene).expect("a valid scene"));
+        });
+    }
+    group.finish();
+}
+
 /// Peak memory of this process so far \[KiB\], where the system tells.
 fn peak_kib() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -65,6 +93,7 @@ fn main() {
     }
     let mut criterion = Criterion::default().configure_from_args();
     seconds(&mut criterion);
+    satellites(&mut criterion);
     criterion.final_summary();
     if !env::args().any(|argument| argument == "--list") {
         for size in SIZES {

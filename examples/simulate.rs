@@ -103,6 +103,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             exit::note(&format!("note: {cost}"));
         }
     }
+    let real = arguments.compare.as_deref().map(compare::real_rows);
+    let real = real.transpose()?;
     output::make_folder(&arguments.out)?;
     let (mut reports, mut rows, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     for (name, scene) in &scenes {
@@ -120,8 +122,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             pictures.push(quick_look(&simulation).captioned(name));
         }
     }
-    if let Some(folder) = &arguments.compare {
-        let real = compare::real_rows(folder)?;
+    if let Some(real) = real {
         let page = compare::page(&rows, &real);
         let out = |name: &str| arguments.out.join(name);
         output::write_atomically(&out("comparison.md"), page.as_bytes())?;

@@ -57,12 +57,8 @@ const SCENES: [(&str, &[&str], &str); 4] = [
     ),
     (
         "satellite/terrasar_x",
-        &[
-            "ship.position=[-90, -220]",
-            "grid.spacing=2.5",
-            "sea.wind_speed=3",
-        ],
-        "TerraSAR-X, 2.5 m pixels, 1 look; a ship of 60 m, its echo off its track",
+        &["ship.position=[-90, -220]", "sea.wind_speed=3"],
+        "TerraSAR-X, 2.5 m pixels, 5 looks; a ship of 60 m, its echo off its track",
     ),
     (
         "satellite/sentinel_1",

@@ -10,9 +10,8 @@ use wake_physics::{Field, Result, Simulation};
 
 /// Side of the windows of open sea \[pixels\].
 const SIDE: usize = 256;
-/// Stretches of a wake from its tip \[pixels\], and that of its arms.
+/// Stretches of a wake from its tip \[pixels\].
 const STRETCHES: [[f64; 2]; 3] = [[25.0, 85.0], [85.0, 170.0], [170.0, 300.0]];
-const ARMS: [f64; 2] = [25.0, 300.0];
 
 /// One image.
 #[derive(Serialize)]
@@ -37,7 +36,8 @@ struct Stated {
 struct Across {
     name: String,
     stretches: [Option<WakeProfile>; 3],
-    arms: [Option<Streak>; 2],
+    /// On either side of the axis.
+    arms: [[Option<Streak>; 2]; 3],
 }
 
 impl Row {
@@ -69,7 +69,7 @@ impl Row {
         let wakes = wakes.map(|(letter, axis)| Across {
             name: format!("{name} {letter}"),
             stretches: STRETCHES.map(|stretch| wake_profile(amplitude, &axis, stretch)),
-            arms: wake_arms(amplitude, &axis, ARMS),
+            arms: STRETCHES.map(|stretch| wake_arms(amplitude, &axis, stretch)),
         });
         Self {
             name: name.to_owned(),
@@ -134,8 +134,8 @@ pub(crate) fn page(simulated: &[Row], real: &[Row]) -> String {
         String::new(),
         "## Across wakes".into(),
         String::new(),
-        "| wake | dark line: strength | % | width | bright streak: strength | % | width | apart | arms: degrees (strength) |".into(),
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |".into(),
+        "| wake | dark line: strength | % | width | bright streak: strength | % | width | apart | arm: degrees (strength) | other arm |".into(),
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |".into(),
     ]);
     let wakes = simulated.iter().chain(real).flat_map(|row| &row.wakes);
     lines.extend(wakes.map(of_wake));
@@ -232,9 +232,12 @@ fn of_wake(wake: &Across) -> String {
         let apart = stretch.as_ref().and_then(apart);
         apart.map_or_else(|| "–".to_owned(), |apart| format!("{apart:.0}"))
     });
-    let arms = wake.arms.iter().map(|arm| match arm {
-        None => "–".to_owned(),
-        Some(arm) => format!("{:+.0} ({:.1})", arm.offset, arm.strength),
+    let arms = [0, 1].map(|side| {
+        let found = wake.arms.iter().map(|arms| match arms[side] {
+            None => "–".to_owned(),
+            Some(arm) => format!("{:+.0} ({:.1})", arm.offset, arm.strength),
+        });
+        found.collect::<Vec<_>>().join(" ")
     });
     format!(
         "| {} | {} | {} | {} | {} |",
@@ -242,7 +245,7 @@ fn of_wake(wake: &Across) -> String {
         streak(|profile| profile.dark),
         streak(|profile| profile.bright),
         apart.collect::<Vec<_>>().join(" "),
-        arms.collect::<Vec<_>>().join(" ")
+        arms.join(" | ")
     )
 }
 
@@ -276,9 +279,13 @@ fn range(wakes: &[&Across]) -> String {
         ]
         .join(" | ")
     };
-    let arms = || wakes.iter().flat_map(|wake| wake.arms.iter().flatten());
+    let arms = || {
+        wakes
+            .iter()
+            .flat_map(|wake| wake.arms.iter().flatten().flatten())
+    };
     format!(
-        "| **real, least to most** | {} | {} | {} | {} ({}) |",
+        "| **real, least to most** | {} | {} | {} | {} ({}) | |",
         of(|profile| profile.dark),
         of(|profile| profile.bright),
         text(profiles().filter_map(apart).collect(), 0),

@@ -226,6 +226,57 @@ fn a_drawn_picture_and_fields_for_other_tools_are_written_where_asked_for() {
     assert_eq!((overlay.width(), overlay.height()), (31, 24));
 }
 
+/// Each has a folder of its own; the table has a line of each, and of every image that is no mask.
+#[test]
+fn several_scenes_are_compared_with_real_images_in_one_table() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    for name in ["here", "here/again", "real"] {
+        std::fs::create_dir(at(name)).expect("a folder");
+    }
+    let size = "[grid]\nrows = 260\ncolumns = 256\n[ship]\nposition = [0, 200]\n";
+    let scenes = ["here/one.toml", "here/two.toml", "here/again/one.toml"].map(at);
+    for (seed, path) in scenes.iter().enumerate() {
+        std::fs::write(path, format!("seed = {seed}\n{size}")).expect("a file");
+    }
+    let [one, two, again] = scenes.each_ref().map(|path| text(path));
+    done("simulate", &["--scene", one], &at("alone"));
+    for name in ["real/tile.png", "real/tile_mask.png"] {
+        std::fs::copy(at("alone/image.png"), at(name)).expect("a copy");
+    }
+    let labels = r#"{"images": {"tile.png": {"wakes": [
+        {"id": "x", "tip": [130, 40], "axis_deg": 225, "confidence": "clear"},
+        {"id": "y", "tip": [90, 40], "axis_deg": 225, "confidence": "doubtful"}]}}}"#;
+    std::fs::write(at("real/labels.json"), labels).expect("a file");
+    let (real, out) = (at("real"), at("out"));
+    let compare = ["--scene", one, two, "--compare", text(&real)];
+    let printed = done("simulate", &compare, &out);
+    let page = std::fs::read_to_string(out.join("comparison.md")).expect("a table");
+    assert!(printed.contains(&page), "{printed}");
+    for line in [
+        "| one |",
+        "| two |",
+        "| tile |",
+        "| one a |",
+        "| two a |",
+        "| tile x |",
+    ] {
+        assert_eq!(page.matches(line).count(), 1, "{line} in {page}");
+    }
+    assert!(!page.contains("mask") && !page.contains("tile y"), "{page}");
+    for name in [
+        "one/image.png",
+        "two/labels.json",
+        "comparison.json",
+        "sheet.png",
+    ] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    refused(&["--scene", one, again], &["one.toml", "rename"]);
+    refused(&["--compare", text(&at("here"))], &["here", "PNG"]);
+    refused(&["--compare", text(&at("nowhere"))], &["nowhere"]);
+}
+
 /// Names of all files below a folder, in order.
 fn names(folder: &Path) -> Vec<String> {
     let names = files(folder).into_keys();

@@ -35,13 +35,13 @@ pub struct WakeAxis {
 /// A line of an image that is darker or brighter than the sea around it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Streak {
-    /// Distance of its middle from the axis, positive clockwise of it \[pixels\]; of an arm its angle \[deg\].
+    /// Distance of its middle from the axis, positive clockwise of it \[pixels\]; of an arm the angle \[deg\].
     pub offset: f64,
     /// Amplitude over that of the sea, less 1.
     pub contrast: f64,
     /// Difference from the sea over the standard deviation of one pixel of the sea, which no linear grey changes.
     pub strength: f64,
-    /// Width at half of the difference, in the unit of `offset`.
+    /// Width at half of the difference \[pixels\].
     pub width: f64,
 }
 
@@ -77,19 +77,27 @@ pub fn wake_profile(
 }
 
 /// The arms of a wake, counter-clockwise of its axis and clockwise of it, averaged along rays from the tip: the line that
-/// differs most from the sea on each side, 11 to 23° off the axis, bright or dark.
+/// differs most from the sea on each side, 11 to 23° off the axis, bright or dark. Its offset is an angle \[deg\], its width
+/// in pixels half-way along the stretch.
 ///
 /// - `amplitude`, `astern` as in [`wake_profile`]
 #[must_use]
-pub fn wake_arms(amplitude: &Field, axis: &WakeAxis, astern: [f64; 2]) -> [Option<Streak>; 2] {
-    let angle = |along: f64, across: f64| across.atan2(along).to_degrees();
-    let Some(profile) = Profile::new(amplitude, axis, astern, SEA, angle) else {
+pub fn wake_arms(amplitude: &Field, axis: &WakeAxis, [from, to]: [f64; 2]) -> [Option<Streak>; 2] {
+    // Arcs half-way along the stretch, in pixels.
+    let radius = 0.5 * (from + to);
+    let arc = |degrees: f64| radius * degrees.to_radians();
+    let angle = |along: f64, across: f64| radius * across.atan2(along);
+    let Some(profile) = Profile::new(amplitude, axis, [from, to], SEA.map(arc), angle) else {
         return [None; 2];
     };
     [[-ARMS[1], -ARMS[0]], ARMS].map(|side| {
         let strongest = [1.0, -1.0].into_iter();
-        let strongest = strongest.filter_map(|sign| profile.extreme(sign, side));
-        strongest.max_by(|a, b| a.strength.abs().total_cmp(&b.strength.abs()))
+        let strongest = strongest.filter_map(|sign| profile.extreme(sign, side.map(arc)));
+        let strongest = strongest.max_by(|a, b| a.strength.abs().total_cmp(&b.strength.abs()));
+        strongest.map(|arm| Streak {
+            offset: (arm.offset / radius).to_degrees(),
+            ..arm
+        })
     })
 }
 
@@ -327,8 +335,10 @@ mod tests {
             let angle = across.atan2(along).to_degrees();
             1.0 + 0.2 * bell(angle - 17.0, 1.5) - 0.15 * bell(angle + 19.0, 1.5)
         };
-        let [left, right] = wake_arms(&image(4, 2, pattern), &AXIS, [25.0, 250.0]);
+        let [left, right] = wake_arms(&image(4, 2, pattern), &AXIS, [85.0, 250.0]);
         let (left, right) = (left.unwrap(), right.unwrap());
+        // 1.5° are 4.4 pixels half-way, which three pixels widen by 2 %.
+        assert!((right.width / (2.355 * 4.4) - 1.0).abs() < 0.3, "{right:?}");
         assert!(
             (left.offset + 19.0).abs() <= 1.0 && left.contrast < -0.08,
             "{left:?}"
