@@ -57,3 +57,37 @@ fn take_choice(options: &mut Options, key: &str, [first, second]: [&str; 2]) -> 
     }
     Err(options.unsupported(key, &Value::from(name), &format!("{first}, {second}")))
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::stable_diffusion::scheduler::SchedulerConfig;
+    use std::path::Path;
+
+    /// Continuous steps are ln σ / 4, in the precision of f32, for models of v; models of the noise keep the steps of their
+    /// training.
+    #[test]
+    fn continuous_steps_are_logarithms_of_the_level() {
+        let steps = |prediction: &str, kind: &str| {
+            let text = format!(
+                r#"{{"_class_name": "EulerDiscreteScheduler", "prediction_type": "{prediction}", "timestep_type": "{kind}"}}"#
+            );
+            let config = SchedulerConfig::from_json(&text, Path::new("scheduler_config.json"));
+            let scheduler = config.unwrap().scheduler(7).unwrap();
+            let level = |i: usize| scheduler.noise_level(i);
+            let sigmas: Vec<f64> = (0..7).map(|i| level(i).noise / level(i).signal).collect();
+            (scheduler.timesteps().to_vec(), sigmas)
+        };
+        let (continuous, sigmas) = steps("v_prediction", "continuous");
+        assert_eq!(continuous.len(), 7);
+        for (step, sigma) in continuous.iter().zip(&sigmas) {
+            let expected = 0.25 * sigma.ln();
+            assert!(
+                (step - expected).abs() < 1e-6 * expected.abs().max(1.0),
+                "{step} {expected}"
+            );
+        }
+        let discrete = steps("v_prediction", "discrete").0;
+        assert!(discrete[0] > 900.0 && discrete != continuous);
+        assert_eq!(steps("epsilon", "continuous").0, discrete);
+    }
+}

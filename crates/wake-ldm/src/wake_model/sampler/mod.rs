@@ -218,8 +218,14 @@ impl WakeSampler {
             });
         }
         let mut seconds = SampleSeconds::default();
+        let mut last = begin;
+        let mut lap = || {
+            let now = Instant::now();
+            now.duration_since(std::mem::replace(&mut last, now))
+                .as_secs_f64()
+        };
         let scenes = self.resolved(inputs)?;
-        seconds.text = begin.elapsed().as_secs_f64();
+        seconds.text = lap();
         let base = Conditions::of_scene(&self.base_scene());
         let conditions: Vec<Conditions> = scenes
             .iter()
@@ -229,7 +235,7 @@ impl WakeSampler {
         let known = Known::new(&conditions, self.config.grid(), wake);
         let expected = self.model.prior.forward(&known);
         check_finite("the mean of the image", &expected.mean)?;
-        seconds.expect = begin.elapsed().as_secs_f64() - seconds.text;
+        seconds.expect = lap();
         let sources: Vec<NoiseSource> = scenes
             .iter()
             .map(|scene| NoiseSource::new(scene.seed))
@@ -237,12 +243,12 @@ impl WakeSampler {
         let noise = sea_noise(&scenes, &sources, &self.model.patches)?;
         let latents = self.denoise(&known, &expected, noise);
         check_finite("the latents of the image", &latents)?;
-        seconds.denoise = begin.elapsed().as_secs_f64() - seconds.text - seconds.expect;
+        seconds.denoise = lap();
         let grey = self.model.decode(latents, &expected);
         check_finite("the image", &grey)?;
         let pixels: Vec<f32> = grey.to_data().iter::<f32>().collect();
-        seconds.total = begin.elapsed().as_secs_f64();
-        seconds.decode = seconds.total - seconds.text - seconds.expect - seconds.denoise;
+        seconds.decode = lap();
+        seconds.total = seconds.text + seconds.expect + seconds.denoise + seconds.decode;
         Ok(Drawn {
             scenes,
             grey,
@@ -290,14 +296,18 @@ impl WakeSampler {
         let [batch, ..] = noise.dims();
         let mut x = noise;
         let prepared = self.model.flow.prepared(known);
-        for i in 0..self.steps {
-            let sigma = 1.0 - i as f64 / self.steps as f64;
+        for sigma in levels(self.steps) {
             let sigma = Tensor::full([batch], sigma, &self.device);
             let velocity = self.model.flow.velocity(x.clone(), sigma, &prepared);
             x = x - velocity * (FRAC_PI_2 / self.steps as f64);
         }
         expected.latents(x)
     }
+}
+
+/// Levels of noise that equal steps begin at: from 1 down to one step above 0.
+fn levels(steps: usize) -> impl Iterator<Item = f64> {
+    (0..steps).map(move |step| 1.0 - step as f64 / steps as f64)
 }
 
 /// What an image is drawn from.

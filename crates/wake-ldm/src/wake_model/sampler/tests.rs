@@ -4,6 +4,7 @@
 
 use burn::module::Param;
 use burn::tensor::Device;
+use wake_physics::grey::GreyScale;
 
 use super::*;
 
@@ -42,8 +43,68 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
         (variance * looks - 1.0).abs() < 5.0 * (12.0f64 / 65536.0).sqrt(),
         "{variance}"
     );
-    let seconds = image.seconds;
-    assert!(seconds.total >= seconds.text.max(seconds.denoise).max(seconds.decode));
+    let levels = image.levels();
+    let scale = GreyScale::default();
+    assert_eq!(levels.len(), image.speckled.values.len());
+    for (&level, &value) in levels.iter().zip(&image.speckled.values) {
+        let grey = 255.0 * scale.grey(f64::from(value));
+        assert!((grey - f64::from(level)).abs() <= 0.5, "{level} {grey}");
+    }
+    // Each stage takes some time, and all of it is theirs.
+    let s = image.seconds;
+    let stages = [s.text, s.expect, s.denoise, s.decode];
+    assert!(
+        stages
+            .iter()
+            .all(|&seconds| seconds > 0.0 && seconds < s.total),
+        "{s:?}"
+    );
+    assert!(
+        (stages.iter().sum::<f64>() / s.total - 1.0).abs() < 1e-12,
+        "{s:?}"
+    );
+}
+
+#[test]
+fn levels_fall_from_all_noise_in_equal_steps() {
+    assert_eq!(levels(4).collect::<Vec<_>>(), [1.0, 0.75, 0.5, 0.25]);
+    assert_eq!(levels(1).collect::<Vec<_>>(), [1.0]);
+}
+
+/// A velocity b everywhere carries the noise by −b π/2 over the quarter circle, in any number of steps.
+#[test]
+fn steps_follow_the_velocity_from_noise_to_latents() {
+    let mut sampler = sampler();
+    sampler.model.flow = sampler.model.flow.clone().map(&mut Constant);
+    let scene = sampler.base_scene();
+    let conditions = [Conditions::of_scene(&scene)];
+    let wake = expected_latents(&[scene], &sampler.model.patches).unwrap();
+    let known = Known::new(&conditions, sampler.config.grid(), wake);
+    let expected = sampler.model.prior.forward(&known);
+    let noise = expected.mean.clone().zeros_like() + 0.5;
+    let there = expected.latents(noise.clone() - 0.1 * FRAC_PI_2);
+    for steps in [1, 3] {
+        let sampler = sampler.clone().with_steps(steps).unwrap();
+        let found = sampler.denoise(&known, &expected, noise.clone());
+        let far: f32 = (found - there.clone()).abs().max().into_scalar();
+        let moved: f32 = (expected.latents(noise.clone()) - there.clone())
+            .abs()
+            .max()
+            .into_scalar();
+        assert!(
+            far < 1e-4 * moved && moved > 0.0,
+            "{steps}: {far:e} {moved}"
+        );
+    }
+}
+
+/// Leaves of a network its biases, all 0.1: what it says is 0.1 everywhere.
+struct Constant;
+
+impl burn::module::ModuleMapper for Constant {
+    fn map_float<const D: usize>(&mut self, weight: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        weight.map(|weight| weight.zeros_like() + if D == 1 { 0.1 } else { 0.0 })
+    }
 }
 
 /// What words that are all understood leave open is the base scene's, not what the model makes of them.
