@@ -137,7 +137,7 @@ impl Picture {
     }
 
     /// Draws the frame of a box (x, y, width, height).
-    pub fn draw_box(&mut self, [x, y, width, height]: [f64; 4], colour: Colour) {
+    fn draw_box(&mut self, [x, y, width, height]: [f64; 4], colour: Colour) {
         let (right, bottom) = (x + width, y + height);
         let corners = [[x, y], [right, y], [right, bottom], [x, bottom], [x, y]];
         for pair in corners.windows(2) {
@@ -146,14 +146,14 @@ impl Picture {
     }
 
     /// Draws two short lines through a place.
-    pub fn draw_cross(&mut self, [x, y]: Pixel, colour: Colour) {
+    fn draw_cross(&mut self, [x, y]: Pixel, colour: Colour) {
         let arm = (DASH - 1) as f64;
         self.draw_line([[x - arm, y], [x + arm, y]], colour);
         self.draw_line([[x, y - arm], [x, y + arm]], colour);
     }
 
     /// Draws a dashed line, cut to the picture; a line with an end that is not finite is not drawn.
-    pub fn draw_line(&mut self, line: [Pixel; 2], colour: Colour) {
+    fn draw_line(&mut self, line: [Pixel; 2], colour: Colour) {
         let Some([from, to]) = self.cut(line) else {
             return;
         };

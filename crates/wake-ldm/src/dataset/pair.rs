@@ -75,7 +75,7 @@ impl Simulated {
     /// # Errors
     ///
     /// [`Error::Text`](crate::Error::Text) if the scene is not valid.
-    pub fn pair_without_image(&self, index: u64) -> Result<Pair> {
+    pub(crate) fn pair_without_image(&self, index: u64) -> Result<Pair> {
         let scene = self.scene(index)?;
         Ok(Pair {
             index,
@@ -93,7 +93,7 @@ impl Simulated {
 
 impl Grey {
     /// The grey of a field of σ⁰ or intensity.
-    pub fn of_power(power: &Field, scale: &GreyScale) -> Self {
+    pub(super) fn of_power(power: &Field, scale: &GreyScale) -> Self {
         let grey = |&p: &f32| scale.grey(f64::from(p)) as f32;
         Self {
             rows: power.rows,

@@ -134,7 +134,7 @@ impl LatentSet {
     }
 
     /// The same pixels of the image expected of its scene.
-    pub fn expected_pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
+    pub(super) fn expected_pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
         self.some(&self.expected, index, cells)
     }
 

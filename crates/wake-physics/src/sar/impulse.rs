@@ -100,7 +100,7 @@ impl ImpulseResponse {
 
     /// Largest spacing of sources that carry the intensity \[m\], 1/(2B) of each axis.
     #[must_use]
-    pub fn carrying_spacing(&self) -> f64 {
+    pub(crate) fn carrying_spacing(&self) -> f64 {
         let carried = [self.range, self.azimuth].map(|axis| 0.5 / axis.bandwidth());
         carried[0].min(carried[1])
     }
@@ -108,7 +108,7 @@ impl ImpulseResponse {
     /// Largest spacing of the sources \[m\]: what carries the intensity, and ρ/4 of the coarser axis (chosen), so that
     /// brightness that comes of waves shorter than the response is the same on finer ones.
     #[must_use]
-    pub fn largest_spacing(&self) -> f64 {
+    pub(crate) fn largest_spacing(&self) -> f64 {
         let coarser = self.range.resolution.max(self.azimuth.resolution);
         (coarser / 4.0).min(self.carrying_spacing())
     }

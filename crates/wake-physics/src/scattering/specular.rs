@@ -102,8 +102,7 @@ impl Specular {
     /// ```text
     /// p_C² = p_{C/2}/(4π √det C)   ⇒   E[σ²] = strength² p_{C/2 + R}(tan θ, 0)/(4π √det C)
     /// ```
-    #[must_use]
-    pub fn rms_over(&self, resolved: &SlopeCovariance) -> f64 {
+    pub(crate) fn rms_over(&self, resolved: &SlopeCovariance) -> f64 {
         let narrow = self.covariance.times(0.5).plus(resolved).density();
         // 1/(4π √det C) is half the peak of p_C.
         let square = narrow.at(self.missing([0.0; 2])) * 0.5 * self.density.peak;

@@ -133,8 +133,8 @@ impl BackscatterTable {
     }
 
     /// Bragg and specular cross-section of a facet of resolved slope (`s_x`, `s_y`); exact outside the table.
-    #[must_use]
-    pub fn lookup(&self, slope: [f64; 2]) -> [f64; 2] {
+    #[cfg(test)]
+    fn lookup(&self, slope: [f64; 2]) -> [f64; 2] {
         [self.bragg(slope), self.backscatter.specular.sigma0(slope)]
     }
 

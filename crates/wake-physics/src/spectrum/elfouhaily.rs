@@ -84,7 +84,7 @@ pub fn inverse_wave_age(wind_speed: f64, fetch: f64) -> f64 {
 /// # Validity
 ///
 /// Deep water, Ω from 0.84 to 5. For younger seas γ keeps its value at Ω = 5. `α_m` turns negative for
-/// u* < `c_m`/e (wind below 2.7 m/s with the drag of Wu) and is then set to 0: see [`Self::lacks_short_waves`].
+/// u* < `c_m`/e (wind below 2.7 m/s with the drag of Wu) and is then set to 0: only the tail of the long waves is left.
 /// Without wind every value is 0.
 ///
 /// # References
@@ -153,12 +153,6 @@ impl Elfouhaily {
     #[must_use]
     pub fn peak_wavenumber(&self) -> f64 {
         self.peak_wavenumber
-    }
-
-    /// Whether the wind is too low for the short-wave part `B_h`, so that only the tail of the long waves is left.
-    #[must_use]
-    pub fn lacks_short_waves(&self) -> bool {
-        self.short_level <= 0.0
     }
 
     /// Phase speed c [m/s] in the form of this model: deep water, with surface tension.
@@ -427,7 +421,7 @@ mod tests {
     fn low_winds_stay_finite() {
         for wind in [0.0, 1e-200, 1e-3, 0.5, 2.0, 2.7] {
             let sea = Elfouhaily::new(wind, 4e4);
-            assert!(sea.lacks_short_waves(), "{wind}");
+            assert!(sea.short_level <= 0.0, "{wind}");
             for k in [0.0, 1e-6, 1.0, 370.0, 1e6] {
                 let psi = sea.density([k, 0.0], [1.0, 0.0]);
                 assert!(psi.is_finite() && psi >= 0.0, "{wind} {k}");
@@ -436,7 +430,7 @@ mod tests {
             assert!(up.is_finite() && cross >= 0.0);
         }
         assert_eq!(Elfouhaily::new(0.0, 4e4).slope_variance(0.0, 1e9), [0.0; 2]);
-        assert!(!Elfouhaily::new(2.72, 4e4).lacks_short_waves());
+        assert!(Elfouhaily::new(2.72, 4e4).short_level > 0.0);
     }
 
     /// The shortest fetch and the strongest wind lie beyond Ω = 5 and give a finite spectrum.

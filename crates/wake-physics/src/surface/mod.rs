@@ -169,8 +169,7 @@ impl Surface {
     }
 
     /// Whether there is no resolved wave.
-    #[must_use]
-    pub fn is_flat(&self) -> bool {
+    fn is_flat(&self) -> bool {
         self.carried <= 0.0
     }
 
@@ -185,12 +184,6 @@ impl Surface {
     #[must_use]
     pub fn left_out(&self) -> f64 {
         self.left_out
-    }
-
-    /// Rows and columns of the periodic lattice the FFTs run on.
-    #[must_use]
-    pub fn lattice_size(&self) -> [usize; 2] {
-        [self.lattice.rows, self.lattice.columns]
     }
 
     /// The waves one by one, for a harmonic sum: exactly those that [`Self::fields`] adds up.

@@ -193,7 +193,7 @@ fn key(kx: f64, ky: f64) -> (i64, i64) {
 fn mean_square_is_the_sum_over_waves() {
     let raster = Raster::image(24, 24, 2.5);
     let sea = surface(&SEA, &raster);
-    let [rows, columns] = sea.lattice_size();
+    let [rows, columns] = [sea.lattice.rows, sea.lattice.columns];
     let whole = Surface {
         raster: Raster::image(rows, columns, 2.5),
         ..sea

@@ -214,8 +214,7 @@ pub fn strengths(
 }
 
 /// [`harmonic_sum`] over a whole raster, as fields.
-#[must_use]
-pub fn harmonic_fields(
+pub(crate) fn harmonic_fields(
     waves: &PlaneWaves,
     transfer: &Transfer,
     quantities: &[Quantity],

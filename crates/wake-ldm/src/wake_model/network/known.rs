@@ -33,7 +33,7 @@ impl Known {
     ///
     /// - `cells`: which, for each scene
     /// - `wake`: at these pixels, `[batch, channels, rows, columns]`
-    pub fn of_cells(
+    pub(crate) fn of_cells(
         conditions: &[Conditions],
         grid: MapGrid,
         cells: &[Vec<usize>],

@@ -81,7 +81,7 @@ fn steps_follow_the_velocity_from_noise_to_latents() {
     let wake = expected_latents(&[scene], &sampler.model.patches).unwrap();
     let known = Known::new(&conditions, sampler.config.grid(), wake);
     let expected = sampler.model.prior.forward(&known);
-    let noise = expected.mean.clone().zeros_like() + 0.5;
+    let noise = expected.mean.zeros_like() + 0.5;
     let there = expected.latents(noise.clone() - 0.1 * FRAC_PI_2);
     for steps in [1, 3] {
         let sampler = sampler.clone().with_steps(steps).unwrap();
