@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use wake_ldm::device_named;
 
 use super::decode::{Detection, oriented_box};
@@ -15,10 +15,11 @@ use super::find::Search;
 use super::grey::Grey;
 use super::model::Model;
 use super::recipes::Recipe;
+use super::report::{FALSE_ALARMS, Report};
 use super::sample::{Sample, Wake};
 use super::score::{Curve, Found, Judged, Label, Ray, Rule, verdicts};
 use super::targets::FOUND;
-use super::{exit, labels, progress};
+use super::{exit, labels, progress, real_sea};
 
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
@@ -56,8 +57,6 @@ fn rung(text: &str) -> Result<(String, PathBuf), String> {
 pub(crate) const HELD_OUT: u64 = 900_001;
 /// Rows and columns of a simulated image.
 pub(crate) const SIZE: usize = 512;
-/// False alarms an image at which recall is told.
-const FALSE_ALARMS: f64 = 0.5;
 /// Images searched at a time.
 const AT_ONCE: u64 = 16;
 /// Contrast from which on a simulated wake is clear \[dB\].
@@ -83,9 +82,12 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
         finders.push((name, Finder::Network(Box::new(model), search)));
     }
     let mut real = Vec::new();
+    let mut sea = Vec::new();
     if let Some(folder) = &options.real {
         let clear = labels::read(folder, false)?;
         let both = labels::read(folder, true)?;
+        let names: Vec<String> = clear.iter().map(|(name, _)| name.clone()).collect();
+        sea = real_sea::windows(folder, &names)?;
         for ((name, clear), (_, both)) in clear.into_iter().zip(both) {
             real.push((Grey::read(&folder.join(&name))?, [clear, both]));
         }
@@ -104,6 +106,9 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
             judge_real(name, finder, &real, &options.out, &mut report)?;
         }
     }
+    if !sea.is_empty() {
+        report.sea = real_sea::told_apart(&sea)?;
+    }
     let write = |name: &str, text: String| {
         let path = options.out.join(name);
         std::fs::write(&path, text)
@@ -111,108 +116,11 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
     };
     write(
         "report.json",
-        format!("{:#}\n", Value::Array(report.rows.clone())),
+        format!("{:#}\n", json!({"rows": report.rows, "sea": report.sea})),
     )?;
     write("report.md", report.text())?;
     exit::say(&report.text())?;
     Ok(())
-}
-
-/// One row a finder and set of images.
-#[derive(Default)]
-struct Report {
-    rows: Vec<Value>,
-    rungs: Vec<String>,
-    visibility: Vec<String>,
-}
-
-impl Report {
-    /// Adds a row, and gives the curve by the ray rule.
-    fn add(&mut self, set: &str, finder: &str, images: &[Judged]) {
-        let (rays, boxes) = (Curve::new(images, Rule::Ray), Curve::new(images, Rule::Box));
-        let (right, wrong) = rays.totals();
-        let (recall, score) = rays.recall_at(FALSE_ALARMS).unwrap_or_default();
-        self.rows.push(json!({
-            "images": set, "finder": finder, "count": images.len(), "wakes": rays.labels,
-            "average_precision": rays.average_precision(), "average_precision_boxes": boxes.average_precision(),
-            "recall_at_half_false_alarm": recall, "at_score": Some(score).filter(|s| s.is_finite()),
-            "right": right, "false_alarms": wrong,
-        }));
-    }
-
-    fn text(&self) -> String {
-        let count = self
-            .rows
-            .first()
-            .map_or(0, |row| row["count"].as_u64().unwrap_or(0));
-        let mut text = format!(
-            "<!-- Written by: cargo run --release --example detector -- evaluate --images {count} --real DIR -->\n\n# Finding wakes\n\n\
-             AP: average precision by the ray rule (axis within 10°; tip within 60 pixels, or axis line within 25 pixels of tip \
-             and middle). AP boxes: oriented boxes from the tip to the end of what is visible, IoU 0.5. Recall: with at most half \
-             a false alarm an image.\n\n\
-             | images | number | wakes | found by | AP | AP boxes | recall | at score |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
-        );
-        let number = |value: &Value| value.as_f64().map_or("–".to_owned(), |x| format!("{x:.3}"));
-        let of_rung = |row: &&Value| self.rungs.iter().any(|rung| row["finder"] == **rung);
-        for row in self.rows.iter().filter(|row| !of_rung(row)) {
-            // Writing into a string cannot fail.
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {} | {} | {} | {} | {} |",
-                row["images"].as_str().unwrap_or_default(),
-                row["count"],
-                row["wakes"],
-                row["finder"].as_str().unwrap_or_default(),
-                number(&row["average_precision"]),
-                number(&row["average_precision_boxes"]),
-                number(&row["recall_at_half_false_alarm"]),
-                number(&row["at_score"]),
-            );
-        }
-        text.push_str(
-            "\nRecall by visibility, with at most half a false alarm an image: of simulated wakes by the expected change of the \
-             intensity (docs/labels.md), of painted ones by the signal over noise of a filter that knows the wake.\n",
-        );
-        text.push_str(&self.visibility.join(""));
-        if !self.rungs.is_empty() {
-            text.push_str(&self.transfer());
-        }
-        text
-    }
-
-    /// A table of average precision by what the images of training showed, a column each set of images.
-    fn transfer(&self) -> String {
-        let mut sets: Vec<&Value> = Vec::new();
-        for row in &self.rows {
-            if !sets.contains(&&row["images"]) {
-                sets.push(&row["images"]);
-            }
-        }
-        let name = |set: &&&Value| set.as_str().unwrap_or_default().to_owned();
-        let titles: Vec<String> = sets.iter().map(|set| name(&set)).collect();
-        let mut text = format!(
-            "\n## What transfer needs\n\nThe same network trained on other images, AP by the ray rule (and recall).\n\n| trained on | {} |\n| --- |{}\n",
-            titles.join(" | "),
-            " --- |".repeat(titles.len()),
-        );
-        for rung in &self.rungs {
-            let cell = |set: &&Value| {
-                let found = |row: &&Value| row["finder"] == **rung && row["images"] == **set;
-                self.rows.iter().find(found).map_or("–".to_owned(), |row| {
-                    let number = |key: &str| row[key].as_f64().unwrap_or(0.0);
-                    let (precision, recall) = (
-                        number("average_precision"),
-                        number("recall_at_half_false_alarm"),
-                    );
-                    format!("{precision:.3} ({recall:.2})")
-                })
-            };
-            let cells: Vec<String> = sets.iter().map(cell).collect();
-            // Writing into a string cannot fail.
-            let _ = writeln!(text, "| {rung} | {} |", cells.join(" | "));
-        }
-        text
-    }
 }
 
 /// A wake as the rules see it.

@@ -28,8 +28,10 @@ mod paint;
 #[path = "../common/progress.rs"]
 mod progress;
 mod radon;
+mod real_sea;
 mod recipes;
 mod repeated;
+mod report;
 mod sample;
 mod score;
 mod sea;

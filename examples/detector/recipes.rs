@@ -71,27 +71,53 @@ impl Recipe {
     ///
     /// Of the recipe or the model; the wake model draws 256 rows and columns alone.
     pub(crate) fn source(self, seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
-        let simulated = |changes: &[&[&str]]| -> wake_ldm::Result<Arc<dyn Source>> {
-            let pixels = ["rows", "columns"].map(|side| format!("scene.grid.{side} = {size}"));
-            let recipe = SceneRecipe::detector()?.with_assignments(&pixels)?;
-            let recipe = recipe.with_assignments(&changes.concat())?;
-            Ok(Arc::new(Simulated::new(recipe, seed)?))
-        };
-        Ok(match self {
-            Self::Painted => Arc::new(Painted { seed, size }),
-            Self::Plain => simulated(&[&CALM, &NO_EDGE, &PLAIN])?,
-            Self::Echo => simulated(&[&CALM, &NO_EDGE])?,
-            Self::Edge => simulated(&[&CALM])?,
-            Self::Detector => simulated(&[])?,
+        let changes: [&[&str]; 3] = match self {
+            Self::Plain => [&CALM, &NO_EDGE, &PLAIN],
+            Self::Echo => [&CALM, &NO_EDGE, &[]],
+            Self::Edge => [&CALM, &[], &[]],
+            Self::Detector => [&[]; 3],
+            Self::Painted => return Ok(Arc::new(Painted { seed, size })),
             Self::Sampled => {
                 let sampler = WakeSampler::pretrained(&Device::flex())?;
                 let recipe = SceneRecipe::default().with_assignments(&SAMPLED)?;
-                Arc::new(Sampled::new(sampler, Simulated::new(recipe, seed)?)?)
+                return Ok(Arc::new(Sampled::new(
+                    sampler,
+                    Simulated::new(recipe, seed)?,
+                )?));
             }
-            Self::Mixed => Arc::new(Mixture::new(vec![
-                (1.0, Self::Painted.source(seed, size)?),
-                (1.0, Self::Detector.source(seed, size)?),
-            ])?),
-        })
+            Self::Mixed => {
+                return Ok(Arc::new(Mixture::new(vec![
+                    (1.0, Self::Painted.source(seed, size)?),
+                    (1.0, Self::Detector.source(seed, size)?),
+                ])?));
+            }
+        };
+        simulated(&changes.concat(), seed, size)
     }
+
+    /// Images of the open sea of the recipe detector, or of plain pixels: without ships and slicks.
+    ///
+    /// # Errors
+    ///
+    /// Of the recipe.
+    pub(crate) fn open_sea(
+        plain: bool,
+        seed: u64,
+        size: usize,
+    ) -> wake_ldm::Result<Arc<dyn Source>> {
+        let changes: [&[&str]; 3] = match plain {
+            true => [&CALM, &NO_EDGE, &PLAIN],
+            false => [&[]; 3],
+        };
+        let empty = ["draw.count = 0", "draw.sea.slick_damping = 0"];
+        simulated(&[&changes.concat()[..], &empty].concat(), seed, size)
+    }
+}
+
+/// The recipe detector with changes.
+fn simulated(changes: &[&str], seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
+    let pixels = ["rows", "columns"].map(|side| format!("scene.grid.{side} = {size}"));
+    let recipe = SceneRecipe::detector()?.with_assignments(&pixels)?;
+    let recipe = recipe.with_assignments(changes)?;
+    Ok(Arc::new(Simulated::new(recipe, seed)?))
 }
