@@ -53,21 +53,19 @@ fn the_tolerance_is_met_at_every_level() {
     }
 }
 
-/// A ship that turns, and one beside a ship that does not: no other error than that of a straight wake, since the waves are
-/// summed by the same methods.
+/// A ship that turns beside one that does not, few pixels since the oracle sums the rings of all wavelengths: no other error than
+/// that of a straight wake, since the waves are summed by the same methods.
 #[test]
 fn turning_ships_keep_the_tolerance() {
-    let turning = [
-        "ship.position=[20, 20]",
+    let keys = [
+        "ship.position=[15, 15]",
         "ship.turn_rate=1.4",
         "ship.edge=true",
-        "radar.range_to_velocity=30",
+        "ship.2.position=[-20, 30]",
+        "ship.2.heading=350",
+        "radar.range_to_velocity=5",
     ];
-    let beside = ["ship.2.position=[-20, 30]", "ship.2.heading=350"];
-    let both = [&turning[..], &beside].concat();
-    for (tolerance, assignments) in [(1e-2, &both[..]), (1e-4, &turning)] {
-        assert_tolerance(&small(20, 18, assignments), tolerance);
-    }
+    assert_tolerance(&small(12, 10, &keys), 1e-3);
 }
 
 fn assert_tolerance(scene: &Scene, tolerance: f64) {
