@@ -115,6 +115,37 @@ impl Golden {
         tensor(self.f32s(name), self.shape(name), device)
     }
 
+    /// Images `[1, channels, rows, columns]` named `single`, and all that have steps before those axes, as batches of two: the
+    /// second image is the first with its numbers in reverse. What is done number by number does the same to both.
+    pub(crate) fn in_pairs(mut self, single: &[&str]) -> Self {
+        for (name, entry) in &mut self.tensors {
+            let steps = match entry.shape.len() {
+                4 if single.contains(&name.as_str()) => 1,
+                4 => {
+                    entry.shape.insert(1, 1);
+                    entry.shape[0]
+                }
+                5 => entry.shape[0],
+                _ => continue,
+            };
+            let axis = entry.shape.len() - 4;
+            entry.shape[axis] *= 2;
+            let pairs = entry.bytes.chunks_exact(entry.bytes.len() / steps);
+            let pair = |image: &[u8]| -> Vec<u8> {
+                let reversed = image.chunks_exact(4).rev().flatten();
+                image.iter().chain(reversed).copied().collect()
+            };
+            entry.bytes = pairs.flat_map(pair).collect();
+        }
+        self
+    }
+
+    /// Numbers of entry `i` along the first axis, whatever the others.
+    pub(crate) fn f32s_of(&self, name: &str, i: usize) -> Vec<f32> {
+        let length: usize = self.shape(name)[1..].iter().product();
+        self.f32s(name)[i * length..(i + 1) * length].to_vec()
+    }
+
     /// Entry `i` along the first axis.
     pub(crate) fn entry<const D: usize>(&self, name: &str, i: usize, device: &Device) -> Tensor<D> {
         let shape = self.shape(name);

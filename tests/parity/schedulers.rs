@@ -169,7 +169,7 @@ impl Case<'_> {
                 noise,
             });
             sample = output.sample;
-            let state = numbers(&self.golden.entry::<4>(&trajectory, index + 1, self.device));
+            let state = self.golden.f32s_of(&trajectory, index + 1);
             self.expect_close(
                 &format!("{steps} steps, state {}", index + 1),
                 run,
@@ -177,7 +177,7 @@ impl Case<'_> {
                 &state,
             );
             if self.golden.has(&denoised) {
-                let clean = numbers(&self.golden.entry::<4>(&denoised, index, self.device));
+                let clean = self.golden.f32s_of(&denoised, index);
                 let what = format!("{steps} steps, clean image {index}");
                 self.expect_close(&what, run, &output.denoised, &clean);
             }
@@ -211,7 +211,7 @@ impl Case<'_> {
             ] {
                 let name = format!("{}/{name}", self.name);
                 if self.golden.has(&name) {
-                    let expected = numbers(&self.golden.entry::<3>(&name, i, self.device));
+                    let expected = self.golden.f32s_of(&name, i);
                     self.expect_close(&format!("{name} {t}"), &Value::Null, &ours, &expected);
                 }
             }
@@ -287,9 +287,20 @@ fn stored_schedules(golden: &Golden) -> Vec<(Vec<f32>, Vec<f32>)> {
 
 #[test]
 fn schedulers_follow_diffusers_state_by_state() {
+    follow(|golden| golden);
+}
+
+/// The same files in another layout.
+#[test]
+fn images_of_a_batch_follow_their_own_states() {
+    follow(|golden| golden.in_pairs(&["latents", "clean", "eps"]));
+}
+
+/// All cases, on numbers laid out anew.
+fn follow(layout: fn(Golden) -> Golden) {
     let folder = folder().join("schedulers");
     let manifest = json(&folder.join("schedulers.json"));
-    let golden = Golden::read(&folder.join("trajectories.safetensors"));
+    let golden = layout(Golden::read(&folder.join("trajectories.safetensors")));
     let tables = stored_schedules(&golden);
     let cases = manifest["cases"].as_object().expect("cases");
     assert!(!cases.is_empty(), "no cases in {}", folder.display());
