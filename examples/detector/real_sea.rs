@@ -130,7 +130,7 @@ mod tests {
             .map(|n| 80.0 + (n % 7) as f32)
             .collect();
         assert!(is_open(&sea));
-        let mut ship = sea.clone();
+        let mut ship = sea;
         ship[900] = 255.0 * BRIGHTEST;
         assert!(!is_open(&ship) && !is_open(&[0.0; 64]) && !is_open(&[9.0; 64]));
     }

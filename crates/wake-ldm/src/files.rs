@@ -87,11 +87,17 @@ mod tests {
     }
 
     #[test]
-    fn devices_without_end_are_read_to_the_limit() {
+    fn long_files_and_devices_are_refused() {
         let path = Path::new("/dev/zero");
         if path.exists() {
             let refused = read_text(path).unwrap_err().to_string();
-            assert!(refused.contains("longer than 16 MiB"), "{refused}");
+            assert!(refused.contains("no regular file"), "{refused}");
         }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.json");
+        let file = File::create(&path).unwrap();
+        file.set_len(LONGEST_TEXT + 1).unwrap();
+        let refused = read_text(&path).unwrap_err().to_string();
+        assert!(refused.contains("longer than 16 MiB"), "{refused}");
     }
 }

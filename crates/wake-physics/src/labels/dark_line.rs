@@ -1,10 +1,12 @@
 //! The turbulent wake as the radar shows it.
 
 use super::short_waves::Profile;
-use super::visibility::{Background, WINDOW};
 use crate::turbulent::TurbulentWake;
 use crate::turbulent::current::WakeEdge;
 use std::f64::consts::{PI, SQRT_2};
+
+/// Places across a window at which a change is computed.
+const PLACES: usize = 16;
 
 /// Standard deviations of the damping, smeared, beyond which edges are not looked for: their current has fallen to
 /// e⁻⁸ of its largest.
@@ -24,20 +26,22 @@ pub(super) struct DarkLine {
 }
 
 impl DarkLine {
+    /// As an image shows it.
+    ///
+    /// - `edge`: its edges, if they are drawn
+    /// - `damped`, `multiplied`: shares of the intensity that full damping takes away, and that the edges multiply
+    /// - `resolution`: azimuth resolution \[m\]
     pub(super) fn new(
-        background: &Background,
         wake: TurbulentWake,
         edge: Option<WakeEdge>,
+        [damped, multiplied]: [f64; 2],
+        resolution: f64,
     ) -> Self {
-        let deviation = background.resolution / (SQRT_2 * PI);
+        let deviation = resolution / (SQRT_2 * PI);
         Self {
-            edge: edge.filter(|_| background.edges_drawn),
-            damped: if background.dark_line_drawn {
-                background.share * background.transfer.bragg_share
-            } else {
-                0.0
-            },
-            multiplied: background.share,
+            edge,
+            damped,
+            multiplied,
             // The track's port side leans on azimuth by its y component.
             smear: deviation * wake.track.port()[1].abs(),
             wake,
@@ -66,15 +70,15 @@ impl DarkLine {
         short: Option<&Profile>,
     ) -> [f64; 3] {
         let mut sums = [0.0; 3];
-        for n in 0..WINDOW {
-            let at = off + ((n as f64 + 0.5) / WINDOW as f64 - 0.5) * width;
+        for n in 0..PLACES {
+            let at = off + ((n as f64 + 0.5) / PLACES as f64 - 0.5) * width;
             let dark = self.edges(distance, at) - self.damping(distance, at);
             let short = short.map_or(0.0, |profile| self.short(profile, at));
             for (sum, change) in sums.iter_mut().zip([dark, short, dark + short]) {
                 *sum += change * change;
             }
         }
-        sums.map(|sum| sum / WINDOW as f64)
+        sums.map(|sum| sum / PLACES as f64)
     }
 
     /// What the ship's short waves add at a place, smeared.

@@ -4,12 +4,19 @@ use crate::kelvin::{KelvinWake, UnresolvedWaves};
 use crate::models::Models;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::Term;
+use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 /// Rays from the track to the outermost one at which the change is known: chosen, it is smooth but where waves break.
 const RAYS: usize = 24;
 
 /// Slope variance below which nothing is to be seen: σ⁰ changes by at most some hundreds of it.
 const LEAST_VARIANCE: f64 = 1e-5;
+
+/// Directions of waves, over half a circle, and variances of their slopes at which the change is computed: between them its
+/// logarithm is as smooth as a cubic, and a line.
+const DIRECTIONS: usize = 16;
+const VARIANCES: [f64; 7] = [0.002, 0.005, 0.009, 0.014, 0.02, 0.03, 0.04];
 
 /// What a variance of slopes makes of the mean σ⁰ of a sea.
 #[derive(Debug)]
@@ -20,6 +27,8 @@ pub(super) struct ShortWaves {
     mean: f64,
     /// Wavenumbers of the waves that count [rad/m].
     band: [f64; 2],
+    /// ln of σ⁰ over its mean, by direction and variance; computed when the first waves count.
+    table: OnceLock<[[f64; VARIANCES.len()]; DIRECTIONS]>,
 }
 
 impl ShortWaves {
@@ -35,6 +44,7 @@ impl ShortWaves {
             backscatter,
             mean,
             band: models.unresolved_band(),
+            table: OnceLock::new(),
         })
     }
 
@@ -45,11 +55,53 @@ impl ShortWaves {
         (strongest >= LEAST_VARIANCE).then_some(WavesOfShip { sea: self, waves })
     }
 
-    /// Relative change of σ⁰ by a variance of slopes \[1\].
-    fn change(&self, slopes: [f64; 3]) -> f64 {
-        let [xx, xy, yy] = slopes;
+    /// Relative change of σ⁰ by waves of one direction, a variance of slopes xx, xy and yy \[1\].
+    fn change(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
+        let table = self.table.get_or_init(|| self.tabulated());
+        let direction = 0.5 * (2.0 * xy).atan2(xx - yy) / PI * DIRECTIONS as f64;
+        let variance = xx + yy;
+        let next = VARIANCES.partition_point(|&v| v < variance);
+        let next = next.min(VARIANCES.len() - 1);
+        let (before, low) = match next.checked_sub(1) {
+            None => (None, 0.0),
+            Some(before) => (Some(before), VARIANCES[before]),
+        };
+        let part = ((variance - low) / (VARIANCES[next] - low)).min(1.0);
+        let of = |direction: i64| {
+            let row = &table[direction.rem_euclid(DIRECTIONS as i64) as usize];
+            let start = before.map_or(0.0, |before| row[before]);
+            start + part * (row[next] - start)
+        };
+        let whole = direction.floor();
+        let t = direction - whole;
+        // Catmull and Rom's cubic through four neighbours.
+        let weights = [
+            ((2.0 - t) * t - 1.0) * t,
+            (3.0 * t - 5.0) * t * t + 2.0,
+            ((4.0 - 3.0 * t) * t + 1.0) * t,
+            (t - 1.0) * t * t,
+        ];
+        let neighbours = weights.iter().zip(whole as i64 - 1..);
+        let logarithm: f64 = neighbours.map(|(weight, at)| 0.5 * weight * of(at)).sum();
+        logarithm.exp() - 1.0
+    }
+
+    fn tabulated(&self) -> [[f64; VARIANCES.len()]; DIRECTIONS] {
+        let mut table = [[0.0; VARIANCES.len()]; DIRECTIONS];
+        for (n, row) in table.iter_mut().enumerate() {
+            let (sin, cos) = (PI * n as f64 / DIRECTIONS as f64).sin_cos();
+            for (value, variance) in row.iter_mut().zip(VARIANCES) {
+                let slopes = [cos * cos, cos * sin, sin * sin].map(|product| variance * product);
+                *value = self.ratio(slopes).ln();
+            }
+        }
+        table
+    }
+
+    /// Mean σ⁰ with a variance of slopes over that without \[1\].
+    fn ratio(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
         let [bragg, specular] = self.backscatter.mean_over(&SlopeCovariance { xx, xy, yy });
-        (bragg + specular) / self.mean - 1.0
+        (bragg + specular) / self.mean
     }
 }
 
@@ -104,5 +156,41 @@ impl Profile {
         let side = &self.sides[usize::from(port < 0.0)];
         let n = (port.abs() / self.step) as usize;
         side.get(n).copied().unwrap_or(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    /// Between its directions and variances, at three sensors: σ⁰ within 0.2 dB, 5 %, also where it is several times the
+    /// sea's.
+    #[test]
+    fn the_table_is_the_change_between_its_nodes() {
+        for (sensor, incidence) in [
+            ("alos-2-sm10", 35),
+            ("sentinel-1-iw", 35),
+            ("novasar-1", 28),
+        ] {
+            let set = [
+                format!("radar.sensor=\"{sensor}\""),
+                format!("radar.incidence={incidence}"),
+            ];
+            let set = set.each_ref().map(String::as_str);
+            let models = Models::new(&Scene::default().with_assignments(&set).unwrap());
+            let sea = ShortWaves::new(&models, |_| true).unwrap();
+            for degrees in [4.0f64, 22.0, 52.0, 97.0, 128.0, 171.0] {
+                for variance in [0.001, 0.003, 0.011, 0.017, 0.025] {
+                    let (sin, cos) = degrees.to_radians().sin_cos();
+                    let slopes = [cos * cos, cos * sin, sin * sin].map(|p| variance * p);
+                    let (found, expected) = (sea.change(slopes) + 1.0, sea.ratio(slopes));
+                    assert!(
+                        (found / expected - 1.0).abs() < 0.05,
+                        "{sensor} {degrees} {variance}: {found} {expected}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -9,13 +9,14 @@ use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::survey::Survey;
 use crate::turbulent::TurbulentWake;
+use crate::turbulent::current::WakeEdge;
 use crate::wakes::Wake;
 use crate::window::sinc;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Side of the windows in which a wake is looked for \[pixels\]: chosen.
-pub(super) const WINDOW: usize = 16;
+const WINDOW: usize = 16;
 
 /// A window shows the wake from this ratio on, of the root of the summed squares of what the wake changes to the standard
 /// deviation of a pixel: chosen; five deviations of a filter that knows the pattern, about ⅓ of one in each pixel.
@@ -78,23 +79,23 @@ struct ImagedRay {
 /// The sea that a wake is seen against.
 #[derive(Debug)]
 pub(super) struct Background {
-    pub(super) transfer: ModulationTransfer,
+    transfer: ModulationTransfer,
     raster: Raster,
     /// Largest wavenumber that the computed pixels carry [rad/m].
     largest: f64,
     /// Share of the intensity that waves change: the rest are breaking waves and the radar's noise.
-    pub(super) share: f64,
+    share: f64,
     /// Resolution in range where it is not the pixel \[m\].
     range_resolution: f64,
     /// Side of the squares that the image is the mean over, where finer pixels are computed \[m\].
     square: f64,
     /// Azimuth resolution of the moving sea \[m\].
-    pub(super) resolution: f64,
+    resolution: f64,
     /// Standard deviation of one pixel over its mean.
     noise: f64,
     waves_drawn: bool,
-    pub(super) dark_line_drawn: bool,
-    pub(super) edges_drawn: bool,
+    dark_line_drawn: bool,
+    edges_drawn: bool,
     /// What the waves make that the pixels do not carry, if they are drawn.
     short_waves: Option<ShortWaves>,
     /// Mean velocity toward the radar [m/s].
@@ -179,7 +180,7 @@ impl Background {
     /// How far a wake is seen that opens by `half_angle` \[rad\].
     pub(super) fn extent(&self, wake: &Wake, half_angle: f64) -> Extent {
         let step = WINDOW as f64 * self.raster.spacing;
-        let band = DarkLine::new(self, wake.turbulent, wake.edge);
+        let band = self.dark_line(wake.turbulent, wake.edge);
         let wake = &wake.kelvin;
         let rays = self.rays(wake);
         let short = self.short_waves.as_ref().and_then(|short| short.of(wake));
@@ -201,8 +202,7 @@ impl Background {
                     track: there,
                     ..*wake
                 });
-                let band = DarkLine::new(
-                    self,
+                let band = self.dark_line(
                     TurbulentWake {
                         track: there,
                         ..band.wake
@@ -237,6 +237,16 @@ impl Background {
         });
         extent.visibility = (count > 0.0).then(|| self.visibility(sum / count));
         extent
+    }
+
+    fn dark_line(&self, wake: TurbulentWake, edge: Option<WakeEdge>) -> DarkLine {
+        let damped = if self.dark_line_drawn {
+            self.share * self.transfer.bragg_share
+        } else {
+            0.0
+        };
+        let edge = edge.filter(|_| self.edges_drawn);
+        DarkLine::new(wake, edge, [damped, self.share], self.resolution)
     }
 
     fn visibility(&self, mean_square: f64) -> Visibility {
