@@ -40,8 +40,12 @@ impl Report {
             .rows
             .first()
             .map_or(0, |row| row["count"].as_u64().unwrap_or(0));
+        let rungs = match self.rungs.is_empty() {
+            true => "",
+            false => " --rung NAME=FILE …",
+        };
         let mut text = format!(
-            "<!-- Written by: cargo run --release --example detector -- evaluate --images {count} --real DIR -->\n\n# Finding wakes\n\n\
+            "<!-- Written by: cargo run --release --example detector -- evaluate --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n\
              AP: average precision by the ray rule (axis within 10°; tip within 60 pixels, or axis line within 25 pixels of tip \
              and middle). AP boxes: oriented boxes from the tip to the end of what is visible, IoU 0.5. Recall: with at most half \
              a false alarm an image.\n\n\

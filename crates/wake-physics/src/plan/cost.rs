@@ -6,7 +6,7 @@ use std::fmt;
 const SECONDS_PER_PIXEL: f64 = 5e-7;
 
 /// Seconds of a core above which a user should know first: chosen.
-const HIGH: f64 = 5.0;
+const HIGH: f64 = 1.0;
 
 /// What a simulation by the fast methods costs; says what to change when it is written out.
 #[derive(Debug, Clone, Copy, PartialEq)]
