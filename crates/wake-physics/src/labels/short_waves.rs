@@ -15,9 +15,9 @@ const LEAST_VARIANCE: f64 = 1e-5;
 
 /// Directions of waves, over half a circle, and variances of their slopes at which the change is computed: between them its
 /// logarithm is as smooth as a cubic, and a line.
-const DIRECTIONS: usize = 16;
-const VARIANCES: [f64; 10] = [
-    0.002, 0.004, 0.007, 0.01, 0.0135, 0.017, 0.021, 0.025, 0.032, 0.04,
+const DIRECTIONS: usize = 20;
+const VARIANCES: [f64; 12] = [
+    0.002, 0.004, 0.007, 0.01, 0.0135, 0.017, 0.0205, 0.024, 0.028, 0.032, 0.036, 0.04,
 ];
 
 /// What a variance of slopes makes of the mean σ⁰ of a sea.
@@ -183,7 +183,7 @@ mod tests {
             let models = Models::new(&Scene::default().with_assignments(&set).unwrap());
             let sea = ShortWaves::new(&models, |_| true).unwrap();
             for degrees in [4.0f64, 22.0, 52.0, 97.0, 128.0, 171.0] {
-                for variance in [0.001, 0.003, 0.0085, 0.015, 0.023, 0.028] {
+                for variance in [0.001, 0.003, 0.0085, 0.015, 0.0225, 0.03] {
                     let (sin, cos) = degrees.to_radians().sin_cos();
                     let slopes = [cos * cos, cos * sin, sin * sin].map(|p| variance * p);
                     let (found, expected) = (sea.change(slopes) + 1.0, sea.ratio(slopes));
