@@ -12,6 +12,7 @@
 //! tiles with labels, and writes `report.md`. Without a command, wakes are found in a few simulated images and drawn
 //! into `out/detector/simulated.png`.
 
+mod cluttered;
 mod decode;
 mod detect;
 mod drawing;

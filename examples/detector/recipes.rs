@@ -6,6 +6,7 @@ use burn::tensor::Device;
 use wake_ldm::WakeSampler;
 use wake_ldm::dataset::{Mixture, Recipe as SceneRecipe, Sampled, Simulated, Source};
 
+use super::cluttered::Cluttered;
 use super::paint::Painted;
 
 /// What the images of a training run, or of an evaluation, show.
@@ -21,9 +22,11 @@ pub(crate) enum Recipe {
     Edge,
     /// The recipe detector: all that, gusts, swell, slicks, shallow water, several ships
     Detector,
+    /// The same, clear wakes more often, under painted land, piers, streaks, fronts and borders
+    Cluttered,
     /// Drawn by the wake model
     Sampled,
-    /// Painted and simulated images (detector) in turn
+    /// Painted and simulated images (cluttered) in turn
     Mixed,
 }
 
@@ -60,6 +63,7 @@ impl Recipe {
             Self::Echo => "echo",
             Self::Edge => "edge",
             Self::Detector => "detector",
+            Self::Cluttered => "cluttered",
             Self::Sampled => "sampled",
             Self::Mixed => "mixed",
         }
@@ -76,6 +80,9 @@ impl Recipe {
             Self::Echo => [&CALM, &NO_EDGE, &[]],
             Self::Edge => [&CALM, &[], &[]],
             Self::Detector => [&[]; 3],
+            Self::Cluttered => {
+                return Ok(Arc::new(Cluttered::new(simulated(&[], seed, size)?)));
+            }
             Self::Painted => return Ok(Arc::new(Painted { seed, size })),
             Self::Sampled => {
                 let sampler = WakeSampler::pretrained(&Device::flex())?;
@@ -88,11 +95,11 @@ impl Recipe {
             Self::Mixed => {
                 return Ok(Arc::new(Mixture::new(vec![
                     (1.0, Self::Painted.source(seed, size)?),
-                    (1.0, Self::Detector.source(seed, size)?),
+                    (1.0, Self::Cluttered.source(seed, size)?),
                 ])?));
             }
         };
-        simulated(&changes.concat(), seed, size)
+        Ok(Arc::new(simulated(&changes.concat(), seed, size)?))
     }
 
     /// Images of the open sea of the recipe detector, or of plain pixels: without ships and slicks.
@@ -110,14 +117,14 @@ impl Recipe {
             false => [&[]; 3],
         };
         let empty = ["draw.count = 0", "draw.sea.slick_damping = 0"];
-        simulated(&[&changes.concat()[..], &empty].concat(), seed, size)
+        let changes = [&changes.concat()[..], &empty].concat();
+        Ok(Arc::new(simulated(&changes, seed, size)?))
     }
 }
 
 /// The recipe detector with changes.
-fn simulated(changes: &[&str], seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
+fn simulated(changes: &[&str], seed: u64, size: usize) -> wake_ldm::Result<Simulated> {
     let pixels = ["rows", "columns"].map(|side| format!("scene.grid.{side} = {size}"));
     let recipe = SceneRecipe::detector()?.with_assignments(&pixels)?;
-    let recipe = recipe.with_assignments(changes)?;
-    Ok(Arc::new(Simulated::new(recipe, seed)?))
+    Simulated::new(recipe.with_assignments(changes)?, seed)
 }

@@ -123,7 +123,7 @@ impl Sample {
 /// The wakes of a scene: those that its labels show, and those of its other ships under way, which nobody is sure of.
 ///
 /// A wake's line begins at the stern. A scene without ships is of a painted image: its wakes are the objects alone.
-fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
+pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
     let mut seen: Vec<&Object> = objects.iter().filter(|o| o.class == Class::Wake).collect();
     let grid = &scene.grid;
     // The origin lies at a pixel's centre; azimuth grows upward.

@@ -149,7 +149,7 @@ pub(crate) fn border(mean: &mut [f32], size: usize, draw: &mut Draw) {
 }
 
 /// A wandering line between darker and brighter water.
-fn front(mean: &mut [f32], size: usize, draw: &mut Draw) {
+pub(crate) fn front(mean: &mut [f32], size: usize, draw: &mut Draw) {
     let [right, down] = direction(draw.between(0.0, 360.0));
     let offset = draw.between(-0.4, 0.4) * size as f32;
     let (step, width) = (draw.sign() * draw.between(0.08, 0.5), draw.scale(1.0, 40.0));
