@@ -38,7 +38,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Seed of images and first weights
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 7)]
     seed: u64,
     /// Largest step of the optimizer
     #[arg(long, default_value_t = 2e-3)]

@@ -58,7 +58,7 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 250, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
     /// Seed of everything that is drawn
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 7)]
     seed: u64,
     /// Go on from the newest checkpoint in --out
     #[arg(long)]

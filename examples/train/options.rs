@@ -39,7 +39,7 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) every: u32,
     /// Seed of the run, and of simulated pairs
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 7)]
     pub(crate) seed: u64,
     /// Keep less for the way back through the model, and compute it again; slower
     #[arg(long)]

@@ -178,7 +178,7 @@ fn a_folder_belongs_to_one_run() {
     );
     toys.refused(
         &["words", "--steps", "4", "--resume", "--seed", "5"],
-        &["seed = 0", "expected 5"],
+        &["seed = 7", "expected 5"],
     );
     toys.train(&["mean", "--steps", "1"]);
     let other = toys.path("other");

@@ -22,7 +22,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 /// The noise that the first sample is made of.
 pub const INITIAL_STREAM: u32 = 0;
 /// The noise that an encoded image is drawn with.
-pub const POSTERIOR_STREAM: u32 = 1;
+pub(crate) const POSTERIOR_STREAM: u32 = 1;
 /// The white share of the noise that a flow starts from.
 pub(crate) const WHITE_STREAM: u32 = 2;
 /// The noise of fine-tuning.
@@ -100,7 +100,7 @@ impl NoiseSource {
 /// # Shapes
 ///
 /// `[sources, channels, rows, columns]`
-pub fn normal_batch(
+pub(crate) fn normal_batch(
     sources: &[NoiseSource],
     stream: u32,
     [channels, rows, columns]: [usize; 3],

@@ -12,7 +12,7 @@ pub type Colour = [u8; 3];
 /// Boxes of wakes.
 pub const WAKE: Colour = [255, 176, 0];
 /// Arms of wakes, and their tips.
-pub const ARMS: Colour = [64, 224, 128];
+pub(crate) const ARMS: Colour = [64, 224, 128];
 /// Boxes of ships.
 pub const SHIP: Colour = [255, 96, 176];
 /// Behind captions and between the pictures of a sheet.

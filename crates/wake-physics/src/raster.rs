@@ -119,7 +119,7 @@ impl Raster {
 
     /// Largest wavenumber a pixel carries, π/spacing [rad/m]; "resolved" means |k| at most this.
     #[must_use]
-    pub fn nyquist_wavenumber(&self) -> f64 {
+    pub(crate) fn nyquist_wavenumber(&self) -> f64 {
         std::f64::consts::PI / self.spacing
     }
 }

@@ -130,7 +130,7 @@ impl Track {
 
     /// The place (x, y) \[m\] of what is seen from the ship at (ξ, η) \[m\].
     #[must_use]
-    pub fn on_sea(&self, [along, port]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn on_sea(&self, [along, port]: [f64; 2]) -> [f64; 2] {
         if self.turn().is_some() {
             let there = self.at(along);
             let [px, py] = there.port();

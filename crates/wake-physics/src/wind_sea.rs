@@ -78,7 +78,7 @@ impl DirectionalSpectrum {
 
     /// Whether there is no wave at all.
     #[must_use]
-    pub fn is_flat(&self) -> bool {
+    pub(crate) fn is_flat(&self) -> bool {
         self.flat
     }
 

@@ -107,7 +107,7 @@ impl UNet {
     }
 
     /// Length of the condition vector, if the model has one.
-    pub fn condition_channels(&self) -> Option<usize> {
+    pub(crate) fn condition_channels(&self) -> Option<usize> {
         self.config.condition_channels
     }
 

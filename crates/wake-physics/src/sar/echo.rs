@@ -57,7 +57,7 @@ impl Echo {
     /// # Panics
     ///
     /// If the intensity is not of the raster's size.
-    pub fn add_to(&self, intensity: &mut Field, raster: &Raster, resolution: f64) {
+    pub(crate) fn add_to(&self, intensity: &mut Field, raster: &Raster, resolution: f64) {
         assert_eq!(
             (intensity.rows, intensity.columns),
             (raster.rows, raster.columns),

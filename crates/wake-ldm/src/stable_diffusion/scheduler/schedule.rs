@@ -76,7 +76,7 @@ impl NoiseSchedule {
     /// # Panics
     ///
     /// When there are not that many steps.
-    pub fn alpha_cumprod(&self, t: usize) -> f64 {
+    pub(crate) fn alpha_cumprod(&self, t: usize) -> f64 {
         f64::from(self.alphas_cumprod[t])
     }
 
