@@ -36,6 +36,9 @@ use wake_ldm::device_named;
 use wake_ldm::metrics::{Lpips, LpipsNetwork};
 use wake_physics::output;
 
+/// The held-out scene that is shown on every rung.
+const PICTURED: u64 = 2;
+
 /// Judge generated images against the simulator.
 #[derive(Parser)]
 #[command(version)]
@@ -109,6 +112,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     let text = report::markdown(&report);
     output::write_json(&arguments.out.join("report.json"), &report)?;
     output::write_atomically(&arguments.out.join("report.md"), text.as_bytes())?;
+    rungs::picture(&scenes::held_out(PICTURED), &judged)?
+        .write(&arguments.out.join("rungs.png"))?;
     plot::spectrum(&arguments.out.join("spectrum.svg"), &report)?;
     plot::wake(&arguments.out.join("wake_correlation.svg"), &report)?;
     if arguments.json {

@@ -9,7 +9,11 @@ use burn::tensor::Device;
 use serde::Serialize;
 use wake_ldm::train::{TwoSample, TwoSampleOptions, two_sample};
 use wake_physics::measure::{SeaShape, crest_variance, sea_shape};
+use wake_physics::picture::Picture;
 use wake_physics::{Field, Scene};
+
+/// Panels of the picture in a row.
+const ACROSS: usize = 3;
 
 /// What one kind of image has of a sea, means over the scenes.
 #[derive(Debug, Serialize)]
@@ -82,6 +86,30 @@ pub(crate) fn rungs(
     }
     rows.push(row("simulator", scenes, &simulated, &expected, None));
     Ok(rows)
+}
+
+/// One scene on every rung, in one stretch of grey: three standard deviations of the simulator's image to each side of its mean.
+pub(crate) fn picture(scene: &Scene, judged: &Judged<'_>) -> Result<Picture> {
+    let draw = |source: &dyn ImageSource| -> Result<Field> {
+        Ok(grey(
+            &source.draw(std::slice::from_ref(scene), Told::Both)?[0],
+        ))
+    };
+    let mut panels = Vec::new();
+    for (name, source) in sources(judged) {
+        panels.push((name, draw(source)?));
+    }
+    panels.push(("simulator", draw(&Simulator)?));
+    let last = &panels[panels.len() - 1].1.values;
+    let mean = last.iter().sum::<f32>() / last.len() as f32;
+    let variance = last.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / last.len() as f32;
+    let reach = 3.0 * variance.sqrt();
+    let level = |v: &f32| (127.5 * (1.0 + (v - mean) / reach)).round() as u8;
+    let captioned = panels.iter().map(|(name, image)| {
+        let levels: Vec<u8> = image.values.iter().map(level).collect();
+        Picture::from_levels(&levels, image.columns).captioned(name)
+    });
+    Ok(Picture::sheet(&captioned.collect::<Vec<_>>(), ACROSS))
 }
 
 fn row(

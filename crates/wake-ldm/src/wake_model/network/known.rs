@@ -72,7 +72,16 @@ pub fn expected_grey(scene: &Scene) -> Result<Vec<f32>> {
         .collect())
 }
 
-/// Latents of the images expected of some scenes; scenes that follow on their equal are imaged once.
+/// [`expected_grey`] of some scenes, on all cores; scenes that follow on their equal are imaged once.
+///
+/// # Errors
+///
+/// As [`expected_grey`].
+pub(crate) fn expected_greys(scenes: &[Scene]) -> Result<Vec<Vec<f32>>> {
+    runs_of_equals(scenes, expected_grey)
+}
+
+/// Latents of the images expected of some scenes of one size, see [`expected_grey`].
 ///
 /// # Shapes
 ///
@@ -82,35 +91,40 @@ pub fn expected_grey(scene: &Scene) -> Result<Vec<f32>> {
 ///
 /// As [`expected_grey`].
 pub fn expected_latents(scenes: &[Scene], patches: &PatchTransform) -> Result<Tensor<4>> {
-    let device = patches.device();
-    let latents = runs_of_equals(scenes, |scene| {
-        let shape = [1, 1, scene.grid.rows, scene.grid.columns];
-        let grey = TensorData::new(expected_grey(scene)?, shape);
-        Ok(patches.encode(Tensor::from_data(grey, &device)).0)
-    })?;
-    Ok(Tensor::cat(latents, 0))
+    Ok(latents_of(scenes, expected_greys(scenes)?, patches))
 }
 
-/// A function of every scene, which does not depend on its seed: found once for scenes that follow on their equal.
-pub(super) fn runs_of_equals<T: Clone>(
+/// Latents of an image of each scene.
+pub(crate) fn latents_of(
     scenes: &[Scene],
-    find: impl Fn(&Scene) -> Result<T>,
+    images: Vec<Vec<f32>>,
+    patches: &PatchTransform,
+) -> Tensor<4> {
+    let [rows, columns] = scenes
+        .first()
+        .map_or([0, 0], |scene| [scene.grid.rows, scene.grid.columns]);
+    let data = TensorData::new(images.concat(), [scenes.len(), 1, rows, columns]);
+    patches.encode(Tensor::from_data(data, &patches.device())).0
+}
+
+/// A function of every scene, which does not depend on its seed: found once for scenes that follow on their equal, for
+/// several at once on all cores.
+pub(super) fn runs_of_equals<T: Clone + Send>(
+    scenes: &[Scene],
+    find: impl Fn(&Scene) -> Result<T> + Sync,
 ) -> Result<Vec<T>> {
-    let mut found: Vec<T> = Vec::with_capacity(scenes.len());
-    let mut before: Option<Scene> = None;
-    for scene in scenes {
-        let scene = Scene {
-            seed: 0,
-            ..scene.clone()
-        };
-        let value = match found.last() {
-            Some(last) if before.as_ref() == Some(&scene) => last.clone(),
-            _ => find(&scene)?,
-        };
-        found.push(value);
-        before = Some(scene);
+    let seedless = |scene: &Scene| Scene {
+        seed: 0,
+        ..scene.clone()
+    };
+    let scenes: Vec<Scene> = scenes.iter().map(seedless).collect();
+    let runs: Vec<&[Scene]> = scenes.chunk_by(|a, b| a == b).collect();
+    let found: Vec<Result<T>> = runs.par_iter().map(|run| find(&run[0])).collect();
+    let mut all = Vec::with_capacity(scenes.len());
+    for (run, value) in runs.iter().zip(found) {
+        all.extend(vec![value?; run.len()]);
     }
-    Ok(found)
+    Ok(all)
 }
 
 #[cfg(all(test, feature = "flex"))]

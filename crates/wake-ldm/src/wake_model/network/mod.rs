@@ -12,9 +12,12 @@ mod sea;
 pub use config::WakeModelConfig;
 pub use flow::{Flow, Prepared};
 pub use known::{Known, expected_grey, expected_latents};
+pub(crate) use known::{expected_greys, latents_of};
 pub use model::WakeModel;
 pub use patches::{PatchTransform, Shares};
 pub use prior::{Expected, Prior};
 pub use prompt_parser::PromptParser;
 pub(crate) use prompt_parser::windows;
+pub(crate) use sea::SeaFields;
+#[cfg(feature = "train")]
 pub(crate) use sea::sea_noise;

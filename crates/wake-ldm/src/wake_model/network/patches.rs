@@ -98,7 +98,7 @@ impl PatchTransform {
     }
 
     /// What each channel weighs the pixels of a square with, `[channels, 64]`.
-    pub(super) fn encoder_rows(&self) -> Vec<f32> {
+    pub(crate) fn encoder_rows(&self) -> Vec<f32> {
         self.encoder.val().into_data().iter::<f32>().collect()
     }
 

@@ -1,9 +1,10 @@
 //! The noise that a flow starts from: seas to first order.
 
 use burn::tensor::{Tensor, TensorData};
+use rayon::prelude::*;
 use wake_physics::{LinearSea, Scene};
 
-use super::known::runs_of_equals;
+use super::known::{latents_of, runs_of_equals};
 use super::patches::{PIXELS, PatchTransform};
 use crate::error::Result;
 use crate::noise::{INITIAL_STREAM, NoiseSource, WHITE_STREAM, normal_batch};
@@ -37,63 +38,87 @@ struct SeaNoise {
 impl SeaNoise {
     /// The noise of a scene, with or without its ship.
     ///
+    /// - `encoder`: what each channel weighs the pixels of a square with
+    ///
     /// # Errors
     ///
     /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
-    fn new(scene: &Scene, patches: &PatchTransform) -> Result<Self> {
+    fn new(scene: &Scene, encoder: &[f32]) -> Result<Self> {
         let sea = LinearSea::new(scene)?;
-        let variances = variances(&sea, &patches.encoder_rows());
         let share = |variance: f64| match variance {
             0.0 => [0.0, 1.0],
             _ => [((1.0 - WHITE) / variance).sqrt(), WHITE.sqrt()].map(|x| x as f32),
         };
         Ok(Self {
-            shares: variances.into_iter().map(share).collect(),
+            shares: variances(&sea, encoder).into_iter().map(share).collect(),
             sea,
         })
     }
 
-    /// Noise of a source.
+    /// The sea of a source, `[rows, columns]` of the scene.
+    fn field(&self, source: NoiseSource) -> Vec<f32> {
+        let normals = source.normal(INITIAL_STREAM, self.sea.normals());
+        self.sea.field(&normals).values
+    }
+}
+
+/// Seas of some scenes, each from its own source, before they are encoded.
+pub(crate) struct SeaFields {
+    seas: Vec<SeaNoise>,
+    fields: Vec<Vec<f32>>,
+}
+
+impl SeaFields {
+    /// Those of some scenes of one size, on all cores; scenes that follow on their equal are looked at once.
+    ///
+    /// - `encoder`: as [`PatchTransform::encoder_rows`] has it
+    ///
+    /// # Errors
+    ///
+    /// As [`SeaNoise::new`].
+    pub(crate) fn new(scenes: &[Scene], sources: &[NoiseSource], encoder: &[f32]) -> Result<Self> {
+        let seas = runs_of_equals(scenes, |scene| SeaNoise::new(scene, encoder))?;
+        let drawn = seas.par_iter().zip(sources);
+        let fields = drawn.map(|(sea, &source)| sea.field(source)).collect();
+        Ok(Self { seas, fields })
+    }
+
+    /// The noise in latents.
     ///
     /// # Shapes
     ///
-    /// `[1, channels, rows / 8, columns / 8]` of the scene, on the device of `patches`
-    fn draw(&self, source: NoiseSource, patches: &PatchTransform) -> Tensor<4> {
+    /// `[scenes, channels, rows / 8, columns / 8]`, on the device of `patches`
+    pub(crate) fn noise(
+        self,
+        scenes: &[Scene],
+        sources: &[NoiseSource],
+        patches: &PatchTransform,
+    ) -> Tensor<4> {
         let device = patches.device();
-        let field = self
-            .sea
-            .field(&source.normal(INITIAL_STREAM, self.sea.normals()));
-        let shape = [1, 1, field.rows, field.columns];
-        let field = Tensor::from_data(TensorData::new(field.values, shape), &device);
-        let (waves, _) = patches.encode(field);
-        let [_, channels, rows, columns] = waves.dims();
-        let white = normal_batch(&[source], WHITE_STREAM, [channels, rows, columns], &device);
+        let waves = latents_of(scenes, self.fields, patches);
+        let [batch, channels, rows, columns] = waves.dims();
+        let white = normal_batch(sources, WHITE_STREAM, [channels, rows, columns], &device);
         let factor = |which: usize| -> Tensor<4> {
-            let factors: Vec<f32> = self.shares.iter().map(|share| share[which]).collect();
-            Tensor::from_data(TensorData::new(factors, [1, channels, 1, 1]), &device)
+            let shares = self.seas.iter().flat_map(|sea| &sea.shares);
+            let factors: Vec<f32> = shares.map(|share| share[which]).collect();
+            Tensor::from_data(TensorData::new(factors, [batch, channels, 1, 1]), &device)
         };
         waves * factor(0) + white * factor(1)
     }
 }
 
-/// The noise of some scenes, each from its own source; scenes that follow on their equal are looked at once.
-///
-/// # Shapes
-///
-/// `[scenes, channels, rows / 8, columns / 8]`, on the device of `patches`
+/// The noise of some scenes, see [`SeaFields`].
 ///
 /// # Errors
 ///
-/// As [`SeaNoise::new`].
+/// As [`SeaFields::new`].
 pub(crate) fn sea_noise(
     scenes: &[Scene],
     sources: &[NoiseSource],
     patches: &PatchTransform,
 ) -> Result<Tensor<4>> {
-    let seas = runs_of_equals(scenes, |scene| SeaNoise::new(scene, patches))?;
-    let drawn = seas.iter().zip(sources);
-    let drawn = drawn.map(|(sea, &source)| sea.draw(source, patches));
-    Ok(Tensor::cat(drawn.collect(), 0))
+    let fields = SeaFields::new(scenes, sources, &patches.encoder_rows())?;
+    Ok(fields.noise(scenes, sources, patches))
 }
 
 /// Variance of each channel: wᵀ C w with C the covariance of the pixels of a square; 0 where there are no waves.
@@ -158,11 +183,13 @@ mod tests {
     #[test]
     fn every_channel_has_variance_one() {
         let patches = patches(&[grey(&scene(1)), grey(&scene(2))]);
-        let sea = SeaNoise::new(&scene(0), &patches).unwrap();
+        let noise_of = |scene: Scene, seed: u64| {
+            sea_noise(&[scene], &[NoiseSource::new(seed)], &patches).unwrap()
+        };
         let mut sums = [0.0; 16];
         let draws = 40;
         for seed in 0..draws {
-            let noise = numbers(sea.draw(NoiseSource::new(seed), &patches));
+            let noise = numbers(noise_of(scene(0), seed));
             for (channel, pixels) in noise.chunks(256).enumerate() {
                 sums[channel] += pixels.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>();
             }
@@ -177,7 +204,7 @@ mod tests {
             &[3, 4].map(NoiseSource::new),
             &patches,
         );
-        let one = sea.draw(NoiseSource::new(4), &patches);
+        let one = noise_of(scene(0), 4);
         let second = again.unwrap().narrow(0, 1, 1);
         assert_eq!(numbers(second), numbers(one));
     }
@@ -187,7 +214,6 @@ mod tests {
     fn noise_is_correlated_as_the_sea_is() {
         let seas: Vec<Vec<f32>> = (1..25).map(|seed| grey(&scene(seed))).collect();
         let patches = patches(&seas);
-        let sea = SeaNoise::new(&scene(0), &patches).unwrap();
         // Covariances of channels 0…5 of a pixel with those of the pixel to its right, of the pixel below it.
         let correlations = |images: &[Vec<f32>]| -> Vec<f64> {
             let at = |z: &[f32], c: usize, i: usize, j: usize| f64::from(z[(c * 16 + i) * 16 + j]);
@@ -213,7 +239,10 @@ mod tests {
             numbers(patches.encode(Tensor::from_data(data, &Device::flex())).0)
         };
         let simulated = correlations(&seas.iter().map(encoded).collect::<Vec<_>>());
-        let drawn = |seed| numbers(sea.draw(NoiseSource::new(seed), &patches));
+        let drawn = |seed| {
+            let sources = [NoiseSource::new(seed)];
+            numbers(sea_noise(&[scene(0)], &sources, &patches).unwrap())
+        };
         let drawn = correlations(&(0..24).map(drawn).collect::<Vec<_>>());
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let slope = dot(&simulated, &drawn) / dot(&simulated, &simulated);
@@ -229,8 +258,7 @@ mod tests {
         let patches = patches(&[grey(&scene(1))]);
         let mut calm = scene(0);
         calm.sea.wind_speed = 0.0;
-        let noise = SeaNoise::new(&calm, &patches).unwrap();
-        let drawn = noise.draw(NoiseSource::new(1), &patches);
+        let drawn = sea_noise(&[calm], &[NoiseSource::new(1)], &patches).unwrap();
         let white = normal_batch(
             &[NoiseSource::new(1)],
             WHITE_STREAM,

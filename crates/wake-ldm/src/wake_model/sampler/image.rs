@@ -10,13 +10,13 @@ use wake_physics::{Field, Scene, labels_of};
 pub struct SampleSeconds {
     /// Words to numbers.
     pub text: f64,
-    /// Numbers to the mean and spread of the latents.
+    /// Numbers to the mean and spread of the latents, and to the noise.
     pub expect: f64,
     /// Steps from noise to latents.
     pub denoise: f64,
     /// Latents to grey.
     pub decode: f64,
-    /// All of it.
+    /// The four together; labels and speckle are not in it.
     pub total: f64,
 }
 

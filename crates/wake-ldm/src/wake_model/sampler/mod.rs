@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use rayon::prelude::*;
 use wake_physics::labels::Labels;
 use wake_physics::{Field, Scene, labels_of};
 use wake_text::{Reading, Wording};
@@ -19,7 +20,7 @@ use crate::noise::NoiseSource;
 use crate::self_check::check_once;
 use crate::wake_model::conditioning::{Conditions, Vocabulary};
 use crate::wake_model::network::{
-    Expected, Known, WakeModel, WakeModelConfig, expected_latents, sea_noise,
+    Expected, Known, SeaFields, WakeModel, WakeModelConfig, expected_greys, latents_of,
 };
 pub use image::{SampleSeconds, WakeImage};
 
@@ -190,7 +191,7 @@ impl WakeSampler {
     /// whose numbers overflow.
     pub fn sample_batch(&self, scenes: &[Scene]) -> Result<(Tensor<4>, Vec<Labels>)> {
         let drawn = self.run(&self.inputs(scenes)?, Instant::now())?;
-        let labels = drawn.scenes.iter().map(labels_of).collect();
+        let labels = drawn.scenes.par_iter().map(labels_of).collect();
         Ok((drawn.grey, labels))
     }
 
@@ -231,16 +232,23 @@ impl WakeSampler {
             .iter()
             .map(|scene| Conditions::of_scene(scene).or(base))
             .collect();
-        let wake = expected_latents(&scenes, &self.model.patches)?;
-        let known = Known::new(&conditions, self.config.grid(), wake);
-        let expected = self.model.prior.forward(&known);
-        check_finite("the mean of the image", &expected.mean)?;
-        seconds.expect = lap();
         let sources: Vec<NoiseSource> = scenes
             .iter()
             .map(|scene| NoiseSource::new(scene.seed))
             .collect();
-        let noise = sea_noise(&scenes, &sources, &self.model.patches)?;
+        // Neither needs the other, and one of a single image does not fill all cores.
+        let encoder = self.model.patches.encoder_rows();
+        let (expected, seas) = rayon::join(
+            || expected_greys(&scenes),
+            || SeaFields::new(&scenes, &sources, &encoder),
+        );
+        let (expected, seas) = (expected?, seas?);
+        let wake = latents_of(&scenes, expected, &self.model.patches);
+        let known = Known::new(&conditions, self.config.grid(), wake);
+        let expected = self.model.prior.forward(&known);
+        check_finite("the mean of the image", &expected.mean)?;
+        seconds.expect = lap();
+        let noise = seas.noise(&scenes, &sources, &self.model.patches);
         let latents = self.denoise(&known, &expected, noise);
         check_finite("the latents of the image", &latents)?;
         seconds.denoise = lap();
@@ -333,8 +341,9 @@ impl Drawn {
     /// The images with their speckle and labels.
     fn images(self) -> Vec<WakeImage> {
         let [_, _, rows, columns] = self.grey.dims();
-        let images = self.pixels.chunks(rows * columns).zip(self.scenes);
+        let images = self.pixels.par_chunks(rows * columns);
         images
+            .zip(self.scenes)
             .map(|(pixels, scene)| {
                 let grey = Field {
                     rows,

@@ -78,7 +78,7 @@ fn steps_follow_the_velocity_from_noise_to_latents() {
     sampler.model.flow = sampler.model.flow.clone().map(&mut Constant);
     let scene = sampler.base_scene();
     let conditions = [Conditions::of_scene(&scene)];
-    let wake = expected_latents(&[scene], &sampler.model.patches).unwrap();
+    let wake = crate::network::expected_latents(&[scene], &sampler.model.patches).unwrap();
     let known = Known::new(&conditions, sampler.config.grid(), wake);
     let expected = sampler.model.prior.forward(&known);
     let noise = expected.mean.zeros_like() + 0.5;
