@@ -35,6 +35,10 @@ fn wrong_recipes_shares_and_numbers_are_named() {
             ["--set", "draw.ship.speed=[12,6]"],
             ["draw.ship.speed", "[12, 6]", "lower first"],
         ),
+        (
+            ["--set", "draw.sea.gust_strength=\"x\""],
+            ["\"x\"", "sea.gust_strength", "expected f64"],
+        ),
         (["--val-share", "2"], ["val_share", "is 2", "[0, 1]"]),
         (["--shard", "5/3"], ["--shard", "5/3", "from 0 to n"]),
         (["--shard", "half"], ["--shard", "half", "such as 0/4"]),

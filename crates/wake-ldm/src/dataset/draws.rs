@@ -265,7 +265,7 @@ fn scene(
     let sea: Scene = table
         .clone()
         .try_into()
-        .map_err(|e: toml::de::Error| told(&e.message().trim()))?;
+        .map_err(|e: toml::de::Error| told(&e.to_string().trim().replace('\n', ", ")))?;
     let (first, of_base) = match ships {
         Some(toml::Value::Array(several)) => (several.first().cloned(), several.len()),
         one => (one.clone(), usize::from(one.is_some())),
@@ -292,7 +292,7 @@ fn scene(
     table.insert("ship".to_owned(), ships);
     table
         .try_into()
-        .map_err(|e: toml::de::Error| told(&e.message().trim()))
+        .map_err(|e: toml::de::Error| told(&e.to_string().trim().replace('\n', ", ")))
 }
 
 /// A ship with the values that are drawn of it.
