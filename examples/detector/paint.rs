@@ -41,6 +41,7 @@ impl Source for Painted {
                     ships: wakes.iter().map(|wake| label(wake, self.size)).collect(),
                     ..Labels::default()
                 },
+                amplitudes: None,
             }
         };
         Ok(positions.into_par_iter().map(pair).collect())

@@ -85,6 +85,7 @@ impl Folder {
             prompt: row.text.clone(),
             labels: labels_of(&row.scene),
             scene: row.scene.clone(),
+            amplitudes: row.amplitudes,
         })
     }
 }

@@ -24,6 +24,9 @@ pub(super) struct Row {
     pub(super) scene: Scene,
     /// What is where.
     pub(super) objects: Objects,
+    /// Amplitudes of grey 0 and 1, of a quick-look.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) amplitudes: Option<[f64; 2]>,
 }
 
 impl Row {
@@ -35,6 +38,7 @@ impl Row {
             columns: Columns::of(&pair.scene),
             scene: pair.scene.clone(),
             objects: Objects::of(&pair.labels),
+            amplitudes: pair.amplitudes,
         }
     }
 }
@@ -157,12 +161,18 @@ pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Row
     lines.map(parse).collect()
 }
 
-/// Checks that the lines are those that this set makes, byte for byte.
+/// Checks that the lines are those that this set makes, byte for byte but for the amplitudes of quick-looks, which only their
+/// images tell.
 fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<()> {
     let source = manifest.source()?;
     let lines = text.split_inclusive(|&b| b == b'\n');
-    for (at, (found, (index, _))) in lines.zip(rows).enumerate() {
-        let row = Row::of(&source.pair_without_image(*index)?);
+    for (at, (found, (index, kept))) in lines.zip(rows).enumerate() {
+        let row = Row {
+            amplitudes: kept
+                .amplitudes
+                .filter(|_| source.quick_look(*index).is_some()),
+            ..Row::of(&source.pair_without_image(*index)?)
+        };
         if found != line(&row)?.as_bytes() {
             let message = format!("not the line of pair {index} of this recipe and seed");
             return Err(broken(path, at + 1, message));

@@ -143,6 +143,7 @@ mod tests {
                 prompt: self.0.to_owned(),
                 scene: Scene::default(),
                 labels: Labels::default(),
+                amplitudes: None,
             };
             Ok(positions.map(pair).collect())
         }

@@ -31,6 +31,8 @@ pub struct Pair {
     pub scene: Scene,
     /// What is where.
     pub labels: Labels,
+    /// Of a quick-look: the amplitudes √σ⁰ of grey 0 and of grey 1, linear between; the first may be below 0.
+    pub amplitudes: Option<[f64; 2]>,
 }
 
 /// Simulators that wait for the next pair, each with its memory; no more than ever worked at once.
@@ -56,17 +58,20 @@ impl Simulated {
         } else {
             image.intensity
         };
+        let (image, amplitudes) = self.grey(&power, index);
         Ok(Pair {
-            image: self.grey(&power, index),
+            image,
+            amplitudes,
             ..self.pair_without_image(index)?
         })
     }
 
-    /// The intensities of image number `index` as its recipe shows them.
-    pub(super) fn grey(&self, power: &Field, index: u64) -> Grey {
+    /// The intensities of image number `index` as its recipe shows them, and the amplitudes at the ends of a quick-look's
+    /// grey.
+    pub(super) fn grey(&self, power: &Field, index: u64) -> (Grey, Option<[f64; 2]>) {
         match self.quick_look(index) {
             Some([gain, offset]) => Grey::quick_look(power, gain, offset),
-            None => Grey::of_power(power, &GreyScale::default()),
+            None => (Grey::of_power(power, &GreyScale::default()), None),
         }
     }
 
@@ -87,6 +92,7 @@ impl Simulated {
             prompt: self.wording(index).prompt(&scene)?,
             labels: labels_of(&scene),
             scene,
+            amplitudes: None,
         })
     }
 }
@@ -108,8 +114,9 @@ impl Grey {
     /// grey = offset + gain · a / median(a),   a = √intensity,   in steps of 1/255 from 0 to 1
     /// ```
     ///
-    /// An image without power is of the grey of `offset`.
-    pub fn quick_look(power: &Field, gain: f64, offset: f64) -> Self {
+    /// Beside it the amplitudes of grey 0 and 1, a = median(a) (grey − offset)/gain. An image without power is of the grey of
+    /// `offset`, which no amplitude undoes.
+    pub fn quick_look(power: &Field, gain: f64, offset: f64) -> (Self, Option<[f64; 2]>) {
         let mut pixels: Vec<f32> = power.values.iter().map(|&p| p.max(0.0).sqrt()).collect();
         let mut sorted = pixels.clone();
         let middle = sorted.len() / 2;
@@ -126,11 +133,13 @@ impl Grey {
             let grey = (offset as f32 + factor * *a).clamp(0.0, 1.0);
             *a = (255.0 * grey).round() / 255.0;
         }
-        Self {
+        let ends = [0.0, 1.0].map(|grey| f64::from(median) * (grey - offset) / gain);
+        let image = Self {
             rows: power.rows,
             columns: power.columns,
             pixels,
-        }
+        };
+        (image, (median > 0.0 && gain > 0.0).then_some(ends))
     }
 
     /// The pixels as the nearest levels of 8 bits.
@@ -169,7 +178,14 @@ mod tests {
         let power = [0.0, 1.0, 4.0, 9.0, 1e6];
         let expected = [0.1, 0.2, 0.3, 0.4, 1.0];
         for factor in [1e-6, 1.0, 1e3] {
-            let grey = Grey::quick_look(&field(&power.map(|p| factor * p)), 0.2, 0.1);
+            let power = power.map(|p| factor * p);
+            let (grey, amplitudes) = Grey::quick_look(&field(&power), 0.2, 0.1);
+            let [dark, bright] = amplitudes.unwrap();
+            for (level, power) in grey.pixels.iter().zip(power).take(4) {
+                // Half a level of the 255 between the ends; the last pixel is cut.
+                let found = dark + f64::from(*level) * (bright - dark);
+                assert!((found - f64::from(power).sqrt()).abs() <= (bright - dark) / 509.0);
+            }
             assert_eq!((grey.rows, grey.columns), (1, 5));
             for (found, expected) in grey.pixels.iter().zip(expected) {
                 // Half a level, and the rounding of both numbers.
@@ -177,9 +193,10 @@ mod tests {
                 assert!((255.0 * found - (255.0 * found).round()).abs() < 1e-4);
             }
         }
-        let dark = Grey::quick_look(&field(&[0.0; 3]), 0.2, -0.1);
+        let (dark, none) = Grey::quick_look(&field(&[0.0; 3]), 0.2, -0.1);
+        assert_eq!(none, None);
         assert_eq!(dark.pixels, [0.0; 3]);
-        assert!(Grey::quick_look(&field(&[]), 0.2, 0.1).pixels.is_empty());
+        assert!(Grey::quick_look(&field(&[]), 0.2, 0.1).0.pixels.is_empty());
     }
 
     /// Images of a recipe that draws a gain have a median between its ends, another in each image.

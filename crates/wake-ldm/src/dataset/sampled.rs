@@ -48,14 +48,19 @@ impl Source for Sampled {
             false => self.sampler.sample_scenes(&scenes)?,
         };
         let speckle = self.scenes.recipe().speckle;
-        let drawn = pairs.into_iter().zip(images).map(|(pair, image)| Pair {
-            image: match speckle {
-                true => self.scenes.grey(&image.speckled, pair.index),
-                false => self.scenes.grey(&image.intensity, pair.index),
-            },
-            scene: image.scene,
-            labels: image.labels,
-            ..pair
+        let drawn = pairs.into_iter().zip(images).map(|(pair, image)| {
+            let power = match speckle {
+                true => &image.speckled,
+                false => &image.intensity,
+            };
+            let (grey, amplitudes) = self.scenes.grey(power, pair.index);
+            Pair {
+                image: grey,
+                amplitudes,
+                scene: image.scene,
+                labels: image.labels,
+                ..pair
+            }
         });
         Ok(drawn.collect())
     }

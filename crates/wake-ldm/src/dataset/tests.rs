@@ -548,3 +548,41 @@ fn shards_cover_every_index_once() {
         assert!(text.parse::<Shard>().is_err(), "{text}");
     }
 }
+
+/// σ⁰ follows from a quick-look and its line, to half a level, where grey is not cut; a set that is there is accepted.
+#[test]
+fn quick_looks_can_be_undone() {
+    let changes = [
+        "draw.quick_look.gain = [0.1, 0.4]",
+        "draw.quick_look.offset = [-0.05, 0.05]",
+        "draw.count = 1",
+        "speckle = false",
+    ];
+    let manifest = Manifest {
+        recipe: manifest().recipe.with_assignments(&changes).unwrap(),
+        count: 2,
+        ..manifest()
+    };
+    let folder = TempDir::new().unwrap();
+    assert_eq!(made(folder.path(), &manifest), 2);
+    assert_eq!(made(folder.path(), &manifest), 0);
+    let set = Folder::open(folder.path()).unwrap();
+    let mut compared = 0;
+    for index in 0..2 {
+        let pair = set.pair(index).unwrap();
+        let [dark, bright] = pair.amplitudes.expect("a quick-look");
+        let power = wake_physics::simulate(&pair.scene)
+            .unwrap()
+            .intensity
+            .values;
+        for (grey, power) in pair.image.pixels.iter().zip(power) {
+            if (0.01..0.99).contains(grey) {
+                let found = dark + f64::from(*grey) * (bright - dark);
+                let apart = (found - f64::from(power).sqrt()).abs();
+                assert!(apart <= 0.501 / 255.0 * (bright - dark), "{apart}");
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 400, "{compared}");
+}
