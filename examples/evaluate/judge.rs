@@ -4,7 +4,7 @@ use crate::measurements::{MeasurementRow, Reading, raster, rows};
 use crate::pixels::{PixelRow, Tally, blur, constant, grey};
 use crate::rungs::{RungRow, bar_steps, rungs};
 use crate::scenes::{held_out, other_sea, ship};
-use crate::source::{ImageSource, Result, Simulator, Told};
+use crate::source::{Gaussian, ImageSource, Result, Simulator, Told};
 use crate::statistics::quantile;
 use crate::swaps::{SwapRow, swaps};
 use crate::timing::{TimingRow, timings};
@@ -108,9 +108,10 @@ const PAPER: Paper = Paper {
 /// Sums over the scenes.
 #[derive(Default)]
 struct Sums {
-    tallies: [Tally; 4],
+    tallies: [Tally; 5],
     simulated: Vec<Reading>,
     generated: Vec<Reading>,
+    gaussian: Vec<Reading>,
     looks: [Vec<f64>; 2],
 }
 
@@ -145,13 +146,14 @@ pub(crate) fn judge(
     bar.set_message("seconds");
     let seconds = timings(model)?;
     let [simulator, model_looks] = sums.looks.each_ref().map(|looks| quantile(looks, 0.5));
-    let [second, model_row, constant, blurred] = &sums.tallies;
+    let [second, model_row, gaussian, constant, blurred] = &sums.tallies;
     Ok(Report {
         judged: judged.name,
         scenes: scenes.len(),
         pixels: vec![
             model_row.row("model"),
             second.row("simulator, other sea"),
+            gaussian.row("expected image, Gaussian sea"),
             constant.row("constant"),
             blurred.row("blurred simulator"),
         ],
@@ -162,7 +164,12 @@ pub(crate) fn judge(
             model: model_looks,
         },
         wake_correlation: wake,
-        measurements: rows(&scenes, &sums.simulated, Some(&sums.generated)),
+        measurements: rows(
+            &scenes,
+            &sums.simulated,
+            Some(&sums.generated),
+            Some(&sums.gaussian),
+        ),
         conditions,
         swaps,
         seconds,
@@ -176,15 +183,18 @@ impl Sums {
         let others: Vec<Scene> = scenes.iter().map(|scene| other_sea(scene, 1)).collect();
         let seconds = Simulator.draw(&others, Told::Both)?;
         let generated = judged.source.draw(scenes, Told::Both)?;
+        let linear = Gaussian.draw(scenes, Told::Both)?;
         for (n, scene) in scenes.iter().enumerate() {
-            let [reference, second, model] = [&references[n], &seconds[n], &generated[n]].map(grey);
+            let images = [&references[n], &seconds[n], &generated[n], &linear[n]];
+            let [reference, second, model, gaussian] = images.map(grey);
             let (flat, soft) = (constant(&reference), blur(&second));
-            let images = [&second, &model, &flat, &soft];
+            let images = [&second, &model, &gaussian, &flat, &soft];
             for (tally, image) in self.tallies.iter_mut().zip(images) {
                 tally.add(&reference, image, lpips);
             }
             self.simulated.push(Reading::of(&references[n], scene)?);
             self.generated.push(Reading::of(&generated[n], scene)?);
+            self.gaussian.push(Reading::of(&linear[n], scene)?);
             for (looks, image) in self.looks.iter_mut().zip([&references[n], &generated[n]]) {
                 looks.extend(equivalent_looks(image, scene));
             }
@@ -212,7 +222,12 @@ fn conditions(
     let simulated = &sums.simulated[..scenes.len()];
     let mut all = vec![ConditionRow {
         told: Told::Both.name(),
-        measurements: rows(scenes, simulated, Some(&sums.generated[..scenes.len()])),
+        measurements: rows(
+            scenes,
+            simulated,
+            Some(&sums.generated[..scenes.len()]),
+            None,
+        ),
     }];
     for &told in &judged.conditions {
         let mut readings = Vec::new();
@@ -225,7 +240,7 @@ fn conditions(
         }
         all.push(ConditionRow {
             told: told.name(),
-            measurements: rows(scenes, simulated, Some(&readings)),
+            measurements: rows(scenes, simulated, Some(&readings), None),
         });
     }
     Ok(all)

@@ -120,6 +120,8 @@ pub(crate) struct MeasurementRow {
     /// On generated images, over the scenes in which it is measurable on the simulated one; what is not measurable
     /// there is a miss.
     pub(crate) model: Option<Errors>,
+    /// Likewise on the expected image with a Gaussian sea.
+    pub(crate) gaussian: Option<Errors>,
 }
 
 /// The rows of all quantities.
@@ -127,6 +129,7 @@ pub(crate) fn rows(
     scenes: &[Scene],
     simulated: &[Reading],
     generated: Option<&[Reading]>,
+    gaussian: Option<&[Reading]>,
 ) -> Vec<MeasurementRow> {
     let errors = |readings: &[Reading], quantity: Quantity| -> Vec<Option<f64>> {
         let pairs = readings.iter().zip(scenes);
@@ -135,20 +138,21 @@ pub(crate) fn rows(
     Quantity::ALL
         .map(|quantity| {
             let own = errors(simulated, quantity);
-            let model = generated.map(|generated| {
-                let both = errors(generated, quantity).into_iter().zip(&own);
+            let of = |others: &[Reading]| {
+                let both = errors(others, quantity).into_iter().zip(&own);
                 let counted: Vec<Option<f64>> = both
                     .filter(|(_, own)| own.is_some())
                     .map(|(e, _)| e)
                     .collect();
                 Errors::of(&counted)
-            });
+            };
             let [name, unit] = quantity.name();
             MeasurementRow {
                 quantity: name,
                 unit,
                 simulator: Errors::of(&own),
-                model,
+                model: generated.map(of),
+                gaussian: gaussian.map(of),
             }
         })
         .to_vec()

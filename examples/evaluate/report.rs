@@ -8,7 +8,7 @@ use crate::statistics::Errors;
 pub(crate) fn markdown(report: &Report) -> String {
     let parts = [
         format!(
-            "# Evaluation\n\nJudged: {}. {} held-out scenes of 256 x 256 pixels of 4 m, before speckle.\n",
+            "Judged: {}. {} held-out scenes of 256 x 256 pixels of 4 m, before speckle.\n",
             report.judged, report.scenes
         ),
         rungs(report),
@@ -117,15 +117,16 @@ fn errors(errors: &Errors) -> String {
 
 fn measurements(title: &str, rows: &[MeasurementRow]) -> String {
     let mut text = format!(
-        "## {title}\n\nAbsolute error: median, 90th percentile, share measurable. The model's share is of the scenes in \
-         which the simulated image is measurable; the rest of these are misses.\n\n\
-         | value | unit | simulator median | p90 | share | model median | p90 | share |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        "## {title}\n\nAbsolute error: median, 90th percentile, share measurable. The shares of the others are of the \
+         scenes in which the simulated image is measurable; the rest of these are misses.\n\n\
+         | value | unit | simulator median | p90 | share | model median | p90 | share | Gaussian sea median | p90 | share |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
     );
     for row in rows {
-        let model = row.model.as_ref().map_or("– | – | –".to_owned(), errors);
+        let [model, gaussian] = [&row.model, &row.gaussian]
+            .map(|row| row.as_ref().map_or("– | – | –".to_owned(), errors));
         text += &format!(
-            "| {} | {} | {} | {model} |\n",
+            "| {} | {} | {} | {model} | {gaussian} |\n",
             row.quantity,
             row.unit,
             errors(&row.simulator)
