@@ -26,7 +26,7 @@ pub(crate) enum Recipe {
     Cluttered,
     /// Drawn by the wake model
     Sampled,
-    /// Painted and simulated images (cluttered) in turn
+    /// Painted and simulated images (detector) in turn
     Mixed,
 }
 
@@ -95,7 +95,7 @@ impl Recipe {
             Self::Mixed => {
                 return Ok(Arc::new(Mixture::new(vec![
                     (1.0, Self::Painted.source(seed, size)?),
-                    (1.0, Self::Cluttered.source(seed, size)?),
+                    (1.0, Self::Detector.source(seed, size)?),
                 ])?));
             }
         };
