@@ -4,6 +4,7 @@
 //! cargo run --release --example make_dataset
 //! cargo run --release --example make_dataset -- --grid paper --out out/paper
 //! cargo run --release --example make_dataset -- --grid detector --count 100000 --shard 3/16
+//! cargo run --release --example make_dataset -- --sea out/sea/sea.safetensors
 //! cargo run --release --example make_dataset -- --merge
 //! ```
 //!
@@ -21,7 +22,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
-use wake_ldm::dataset::{Manifest, Progress, Recipe, Shard, merge, shard_folder, write};
+use wake_ldm::burn::tensor::Device;
+use wake_ldm::dataset::{Manifest, Progress, Recipe, Shard, Simulated, merge, shard_folder, write};
+use wake_ldm::fingerprint;
+use wake_ldm::sea_texture::SeaTexture;
 use wake_physics::Plan;
 
 /// Number of scenes in the paper's grid.
@@ -47,11 +51,14 @@ struct Arguments {
     /// Share of the images that are for validation, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     val_share: f64,
+    /// Draw the scenes on a sea learnt from real images: a file that `train -- sea` wrote
+    #[arg(long, value_name = "FILE")]
+    sea: Option<PathBuf>,
     /// Make only share i of n, into the folder shard-i
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Join the shards made before
-    #[arg(long, conflicts_with_all = ["shard", "count", "set"])]
+    #[arg(long, conflicts_with_all = ["shard", "count", "set", "sea"])]
     merge: bool,
     /// Images made at the same time [default: one for each core]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
@@ -78,8 +85,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             Some(shard) => shard_folder(&arguments.out, shard),
             None => arguments.out.clone(),
         };
+        let source = source(&manifest, arguments)?;
         tell_cost(&manifest)?;
-        let made = make(&folder, &manifest, arguments)?;
+        let made = make(&folder, &manifest, &source, arguments)?;
         (folder, manifest, made)
     };
     let seconds = start.elapsed().as_secs_f64();
@@ -116,8 +124,18 @@ fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
     let recipe = recipe.with_assignments(&arguments.set)?;
     Ok(Manifest {
         shard: arguments.shard,
+        sea: arguments.sea.as_deref().map(fingerprint).transpose()?,
         ..Manifest::new(recipe, arguments.seed, count)?.with_val_share(arguments.val_share)?
     })
+}
+
+/// The pairs of a set, on the learnt sea that is asked for.
+fn source(manifest: &Manifest, arguments: &Arguments) -> wake_ldm::Result<Simulated> {
+    let source = manifest.source()?;
+    match &arguments.sea {
+        Some(path) => source.with_sea(SeaTexture::load(path, &Device::default())?),
+        None => Ok(source),
+    }
 }
 
 /// Scenes that are planned before a set is made.
@@ -145,12 +163,17 @@ fn tell_cost(manifest: &Manifest) -> wake_ldm::Result<()> {
 }
 
 /// Makes what is missing under a progress bar; returns how many images that were.
-fn make(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> wake_ldm::Result<u64> {
+fn make(
+    folder: &Path,
+    manifest: &Manifest,
+    source: &Simulated,
+    arguments: &Arguments,
+) -> wake_ldm::Result<u64> {
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or_else(cores, usize::from);
     let bar = progress::bar(0, "images");
     let mut made = 0;
-    write(folder, manifest, jobs, |progress: Progress| {
+    write(folder, manifest, source, jobs, |progress: Progress| {
         made = progress.made;
         if made == 0 {
             bar.set_length(progress.total);

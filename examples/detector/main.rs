@@ -21,6 +21,8 @@ mod evaluate;
 mod exit;
 mod find;
 mod grey;
+#[path = "../common/grey.rs"]
+mod grey_file;
 mod labels;
 mod model;
 mod network;

@@ -3,21 +3,30 @@
 //! ```text
 //! cargo run --release --example evaluate
 //! cargo run --release --example evaluate -- --simulator-only
+//! cargo run --release --example evaluate -- sea --real chips --weights out/sea/sea.safetensors
 //! ```
 //!
 //! Writes `report.json`, `report.md`, `spectrum.svg` and `wake_correlation.svg`. `docs/evaluation.md` says what each
-//! figure means.
+//! figure means. `sea` sets a learnt sea beside real images instead, and writes `report.json`, `report.md` and `learned_sea.png`.
 
 #[path = "../common/exit.rs"]
 mod exit;
+#[path = "../common/grey.rs"]
+mod grey;
 mod judge;
 mod measurements;
 mod model;
 mod pixels;
 mod plot;
+#[path = "../common/progress.rs"]
+mod progress;
 mod report;
 mod rungs;
 mod scenes;
+mod sea;
+#[path = "../common/sea_images.rs"]
+mod sea_images;
+mod sea_report;
 mod source;
 mod statistics;
 mod swaps;
@@ -25,7 +34,7 @@ mod timing;
 mod wake;
 
 use burn::tensor::Device;
-use clap::Parser;
+use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use judge::{Judged, Plan, judge};
 use model::Model;
@@ -41,8 +50,10 @@ const PICTURED: u64 = 2;
 
 /// Judge generated images against the simulator.
 #[derive(Parser)]
-#[command(version)]
+#[command(version, args_conflicts_with_subcommands = true)]
 struct Arguments {
+    #[command(subcommand)]
+    task: Option<Task>,
     /// Judge the simulator itself, with another random sea, in the place of a model: what a perfect model would get
     #[arg(long)]
     simulator_only: bool,
@@ -72,8 +83,20 @@ struct Arguments {
     json: bool,
 }
 
+#[derive(Subcommand)]
+enum Task {
+    /// Judge a sea that was learnt from real images against their other halves
+    Sea(sea::Options),
+}
+
 fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
+    exit::code(|| {
+        let arguments = Arguments::parse();
+        match &arguments.task {
+            Some(Task::Sea(options)) => sea::run(options),
+            None => run(&arguments),
+        }
+    })
 }
 
 fn run(arguments: &Arguments) -> Result<()> {

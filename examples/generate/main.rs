@@ -3,6 +3,7 @@
 //! ```text
 //! cargo run --release --example generate
 //! cargo run --release --example generate -- --prompt "a ship at 8 m/s toward 135 degrees, wind 5 m/s" --count 8
+//! cargo run --release --example generate -- --sea out/sea/sea.safetensors
 //! cargo run --release --example generate -- --weights stable-diffusion-v1-4 --steps 20
 //! ```
 //!
@@ -45,6 +46,9 @@ struct Arguments {
     /// Folder of a model: one that `train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
+    /// Draw on a sea learnt from real images: a file that `train -- sea` wrote; not in diffusers layout
+    #[arg(long, value_name = "FILE", conflicts_with = "steps")]
+    sea: Option<PathBuf>,
     /// Steps from noise to image [default: 4, or 50 in diffusers layout]
     #[arg(long)]
     steps: Option<usize>,
@@ -86,7 +90,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     match arguments.weights.as_deref() {
         None => wake_model::run(arguments),
         Some(folder) if folder.join("config.json").is_file() => wake_model::run(arguments),
-        Some(folder) if folder.join("unet").is_dir() => diffusers::run(arguments, folder),
+        Some(folder) if folder.join("unet").is_dir() => match &arguments.sea {
+            None => diffusers::run(arguments, folder),
+            Some(_) => Err("--sea is for the wake model; leave it out, or --weights".into()),
+        },
         Some(folder) => Err(format!(
             "--weights {}: no model there; a folder that `train` wrote holds config.json, one in diffusers layout unet/",
             folder.display()

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use serde_json::json;
 use wake_ldm::sampler::WakeImage;
+use wake_ldm::sea_texture::SeaTexture;
 use wake_ldm::{WakeSampler, device_named};
 use wake_physics::picture::Picture;
 use wake_physics::{Scene, output};
@@ -27,6 +28,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if let Some(steps) = arguments.steps {
         sampler = sampler.with_steps(steps)?;
     }
+    if let Some(file) = &arguments.sea {
+        sampler = sampler.with_sea(SeaTexture::load(file, &device)?)?;
+    }
     let load = begin.elapsed().as_secs_f64();
     let scene = scene(arguments, || sampler.base_scene())?;
     let prompt = prompt(arguments, scene.as_ref())?;
@@ -44,7 +48,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let report = json!({
         "prompt": prompt, "stated": reading.scene, "unread": reading.unread, "scene": images[0].scene, "seed": seed,
         "steps": sampler.steps(), "count": count, "device": arguments.device,
-        "weights": arguments.weights, "files": files,
+        "weights": arguments.weights, "sea": arguments.sea, "files": files,
         "seconds": {
             "load": load, "text": seconds.text, "expect": seconds.expect, "denoise": seconds.denoise,
             "decode": seconds.decode, "total": total,

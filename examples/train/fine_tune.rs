@@ -7,14 +7,14 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use clap::Args;
 use serde_json::{Value, json};
 use wake_ldm::dataset::{Folder, Pair};
-use wake_ldm::device_named;
 use wake_ldm::noise::NoiseSource;
 use wake_ldm::pipeline::{Pipeline, PipelineParts};
 use wake_ldm::scheduler::Prediction;
 use wake_ldm::train::{
-    Checkpoint, FineTune, FineTuneOptions, Frozen, Metrics, Rate, TrainerOptions, fingerprint,
+    Checkpoint, FineTune, FineTuneOptions, Frozen, Metrics, Rate, TrainerOptions,
 };
 use wake_ldm::weights::Precision;
+use wake_ldm::{device_named, fingerprint};
 use wake_physics::output;
 use wake_text::Tokenizer;
 

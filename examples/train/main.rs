@@ -14,6 +14,13 @@
 //! folder belongs to one run: other data, another model, seed, rate or batch, and a new beginning, are refused by name.
 //!
 //! ```text
+//! cargo run --release --example train -- sea --images chips --spacing 10
+//! ```
+//!
+//! `sea` learns the sea of real radar images that nobody labelled ([data sets](../../docs/dataset.md)) and writes
+//! `sea.safetensors`, which `generate --sea` and `make_dataset --sea` draw scenes on.
+//!
+//! ```text
 //! cargo run --release --example train -- fine-tune --weights stable-diffusion-v1-4 --data out/make_dataset --rank 8
 //! ```
 //!
@@ -22,10 +29,16 @@
 #[path = "../common/exit.rs"]
 mod exit;
 mod fine_tune;
+#[path = "../common/grey.rs"]
+mod grey;
 mod options;
 #[path = "../common/progress.rs"]
 mod progress;
+mod sea;
+#[path = "../common/sea_images.rs"]
+mod sea_images;
 mod source;
+mod stage;
 mod stages;
 
 use std::process::ExitCode;
@@ -51,6 +64,8 @@ enum Stage {
     Mean(Options),
     /// Train the flow that draws the sea.
     Diffusion(Options),
+    /// Learn the sea of a folder of real images, without labels.
+    Sea(sea::Options),
     /// Fit a model in diffusers layout to simulated pairs: its U-Net, or low-rank changes of it.
     FineTune(fine_tune::Options),
 }
@@ -61,6 +76,7 @@ fn main() -> ExitCode {
         Stage::Words(options) => stages::words(&options),
         Stage::Mean(options) => stages::mean(&options),
         Stage::Diffusion(options) => stages::diffusion(&options),
+        Stage::Sea(options) => sea::run(&options),
         Stage::FineTune(options) => fine_tune::run(&options),
     })
 }

@@ -6,19 +6,16 @@ use std::path::Path;
 use burn::module::Module;
 use burn::tensor::Device;
 use rayon::prelude::*;
-use serde_json::{Map, Value, json};
-use wake_ldm::WakeSampler;
+use serde_json::{Value, json};
 use wake_ldm::conditioning::{Conditions, Vocabulary, tokens};
 use wake_ldm::dataset::{Folder, Pair, Prompts, Recipe, Simulated};
 use wake_ldm::network::{
     Flow, Known, PatchTransform, Prior, PromptParser, Shares, WakeModel, WakeModelConfig,
     expected_grey, expected_latents,
 };
-use wake_ldm::train::{
-    Checkpoint, FlowTask, LatentSet, Metrics, PriorTask, Run, RunFolder, Task, WordsTask,
-    fingerprint,
-};
+use wake_ldm::train::{Checkpoint, FlowTask, LatentSet, PriorTask, Run, RunFolder, WordsTask};
 use wake_ldm::weights::{Layout, Precision, load, save_as};
+use wake_ldm::{WakeSampler, fingerprint};
 use wake_physics::{Scene, available_memory, output};
 use wake_text::Wording;
 
@@ -26,6 +23,7 @@ use super::exit;
 use super::options::Options;
 use super::progress;
 use super::source::Source;
+use super::stage::Stage;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -126,7 +124,9 @@ impl<'a> Work<'a> {
         let show = |run: &Run<PromptParser>| Ok(keep(&run.averaged(), &file)?);
         let stage = Stage {
             name: "words",
-            options,
+            out: &options.out,
+            resume: options.resume,
+            every: options.every,
             steps,
             results: &[PARSER],
         };
@@ -158,7 +158,9 @@ impl<'a> Work<'a> {
         };
         let stage = Stage {
             name: "mean",
-            options,
+            out: &options.out,
+            resume: options.resume,
+            every: options.every,
             steps,
             results: &[PRIOR],
         };
@@ -216,7 +218,9 @@ impl<'a> Work<'a> {
         };
         let stage = Stage {
             name: "diffusion",
-            options,
+            out: &options.out,
+            resume: options.resume,
+            every: options.every,
             steps,
             results: &[FLOW, SHEET],
         };
@@ -311,64 +315,6 @@ impl<'a> Work<'a> {
 /// Writes a part of the model as it ships.
 fn keep(part: &impl Module, path: &Path) -> wake_ldm::Result<()> {
     save_as(part, Layout::Diffusers, path, Precision::F16)
-}
-
-/// One run with its checkpoints and its log.
-struct Stage<'a> {
-    name: &'static str,
-    options: &'a Options,
-    steps: usize,
-    /// Files that are written after every checkpoint.
-    results: &'a [&'a str],
-}
-
-impl Stage<'_> {
-    /// Makes all steps; `show` writes the results.
-    fn train<M: Module>(
-        self,
-        folder: &mut RunFolder,
-        mut run: Run<M>,
-        task: &impl Task<M>,
-        show: impl Fn(&Run<M>) -> Outcome<()>,
-    ) -> Outcome<()> {
-        let Self {
-            name,
-            options,
-            steps,
-            results,
-        } = self;
-        if let Some(checkpoint) = folder.begin(name, options.resume)? {
-            run.resume(checkpoint)?;
-            // A kill after the checkpoint leaves results of the one before.
-            if !folder.is_current(name, run.steps(), results) {
-                show(&run)?;
-            }
-            folder.note(name, run.steps(), steps)?;
-        }
-        let log = options.out.join(format!("{name}.jsonl"));
-        let mut metrics = Metrics::open(&log, run.steps())?;
-        let bar = progress::bar(steps as u64, name);
-        while run.steps() < steps {
-            let (report, terms) = run.step(task)?;
-            let terms: Map<String, Value> = terms
-                .into_iter()
-                .map(|(term, value)| (term.to_owned(), json!(value)))
-                .collect();
-            metrics.write(run.steps(), steps, report, &Value::Object(terms))?;
-            bar.set_message(format!("{name}, loss {:.4}", report.loss));
-            bar.set_position(run.steps() as u64);
-            if run.steps().is_multiple_of(options.every as usize) || run.steps() == steps {
-                run.checkpoint(&folder.checkpoints(name))?;
-                show(&run)?;
-                folder.note(name, run.steps(), steps)?;
-            }
-        }
-        bar.finish_and_clear();
-        let (made, out) = (run.steps(), options.out.display());
-        Ok(exit::say(&format!(
-            "{name}: {made} steps, results in {out}"
-        ))?)
-    }
 }
 
 /// JSON has no infinity: all 64 components lose nothing.

@@ -10,6 +10,8 @@ mod generate;
 #[cfg(feature = "train")]
 mod make_dataset;
 #[cfg(feature = "train")]
+mod sea;
+#[cfg(feature = "train")]
 mod train;
 
 use std::collections::BTreeMap;

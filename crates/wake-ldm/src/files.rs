@@ -1,4 +1,4 @@
-//! Text files that are read to a limit, and files that are either whole or not there.
+//! Text files that are read to a limit, files that are either whole or not there, and short names of their content.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Read, Write};
@@ -62,6 +62,22 @@ pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomically(path, |writer| writer.write_all(text.as_bytes()))
 }
 
+/// A short name of the content of a file: FNV-1a of 64 bits.
+///
+/// # Errors
+///
+/// [`Error::Io`] if it cannot be read.
+///
+/// # References
+///
+/// Fowler, Noll & Vo, "The FNV Non-Cryptographic Hash Algorithm".
+pub fn fingerprint(path: &Path) -> Result<String> {
+    let bytes = fs::read(path).map_err(|source| unreadable(path, source))?;
+    let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix);
+    Ok(format!("{hash:016x}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,5 +115,14 @@ mod tests {
         file.set_len(LONGEST_TEXT + 1).unwrap();
         let refused = read_text(&path).unwrap_err().to_string();
         assert!(refused.contains("longer than 16 MiB"), "{refused}");
+    }
+
+    /// The values that the algorithm's authors publish for "" and "foobar".
+    #[test]
+    fn fingerprints_are_those_of_the_algorithm() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        assert_eq!(fingerprint(file.path()).unwrap(), "cbf29ce484222325");
+        fs::write(file.path(), "foobar").unwrap();
+        assert_eq!(fingerprint(file.path()).unwrap(), "85944171f73967e8");
     }
 }

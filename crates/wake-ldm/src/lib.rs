@@ -25,8 +25,9 @@ mod self_check;
 pub use burn;
 pub use device::device_named;
 pub use error::{Error, Mismatch, Misshapen, Result};
+pub use files::fingerprint;
 #[cfg(feature = "flex")]
 pub use self_check::self_check;
 pub use stable_diffusion::{autoencoder, lora, pipeline, scheduler, text};
 pub use wake_model::sampler::WakeSampler;
-pub use wake_model::{conditioning, network, sampler};
+pub use wake_model::{conditioning, network, sampler, sea_texture};

@@ -28,20 +28,27 @@ pub(crate) const WHITE_STREAM: u32 = 2;
 /// The noise of fine-tuning.
 #[cfg(feature = "train")]
 pub(crate) const FINE_TUNE_STREAM: u32 = 3;
+/// The noise that a learnt sea starts from.
+pub(crate) const SEA_TEXTURE_STREAM: u32 = 4;
 /// The noise of the first step; that of step i is `STEP_STREAM + i`.
 pub const STEP_STREAM: u32 = 16;
 
 /// Streams of uniform numbers; they never meet the normal ones, which have another counter.
-#[cfg(feature = "dataset")]
 pub(crate) mod uniform {
     /// The values of a data set's scene: each key has one of the streams from here on.
+    #[cfg(feature = "dataset")]
     pub(crate) const VALUES: u32 = 1 << 31;
     /// Seeds of scenes.
+    #[cfg(feature = "dataset")]
     pub(crate) const SEEDS: u32 = 1000;
     /// Wordings of scenes.
+    #[cfg(feature = "dataset")]
     pub(crate) const WORDINGS: u32 = 1001;
     /// Prompts without images.
+    #[cfg(feature = "dataset")]
     pub(crate) const PROMPTS: u32 = 1002;
+    /// Styles of learnt seas.
+    pub(crate) const STYLES: u32 = 1100;
     /// Noise levels of examples.
     #[cfg(feature = "train")]
     pub(crate) const LEVELS: u32 = 2000;
@@ -51,10 +58,14 @@ pub(crate) mod uniform {
     /// Latent pixels of examples.
     #[cfg(feature = "train")]
     pub(crate) const CELLS: u32 = 2001;
+    /// Places of patches that a sea is learnt from.
+    #[cfg(feature = "train")]
+    pub(crate) const SEA_PLACES: u32 = 2003;
     /// Training steps of fine-tuning.
     #[cfg(feature = "train")]
     pub(crate) const STEPS: u32 = 2100;
     /// The order of examples; round i of the shuffle has `ORDER + i`.
+    #[cfg(feature = "dataset")]
     pub(crate) const ORDER: u32 = 1 << 20;
 }
 
@@ -191,15 +202,18 @@ mod tests {
             one(POSTERIOR_STREAM),
             one(WHITE_STREAM),
             one(FINE_TUNE_STREAM),
+            one(SEA_TEXTURE_STREAM),
             (STEP_STREAM, u32::MAX - STEP_STREAM),
         ];
         let uniform = [
             one(uniform::SEEDS),
             one(uniform::WORDINGS),
             one(uniform::PROMPTS),
+            one(uniform::STYLES),
             one(uniform::LEVELS),
             one(uniform::CELLS),
             one(uniform::PLACES),
+            one(uniform::SEA_PLACES),
             one(uniform::STEPS),
             (uniform::ORDER, uniform::VALUES - uniform::ORDER),
             (uniform::VALUES, u32::MAX - uniform::VALUES),

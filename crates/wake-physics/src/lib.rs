@@ -26,7 +26,7 @@
 //!
 //! | of | modules |
 //! | --- | --- |
-//! | all | [`constants`], [`output`], [`export`], [`dispersion`], [`window`] |
+//! | all | [`constants`], [`output`], [`export`], [`correlated`], [`dispersion`], [`window`] |
 //! | what is asked | [`scene`] |
 //! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`swell`], [`surface`] |
 //! | the ship | [`hull`], [`nufft`], [`kelvin`], [`turbulent`] |
@@ -63,6 +63,7 @@ pub mod output;
 pub mod export;
 mod fft;
 mod random;
+pub mod correlated;
 pub mod dispersion;
 pub mod window;
 pub mod scene;

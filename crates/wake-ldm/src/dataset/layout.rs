@@ -31,6 +31,9 @@ pub struct Manifest {
     pub val_share: f64,
     /// Which scenes.
     pub recipe: Recipe,
+    /// [Fingerprint](crate::fingerprint) of the file of the learnt sea that the images show, if any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sea: Option<String>,
     /// Which share of the set this folder holds, if not all: the content of `shard.json`.
     #[serde(skip)]
     pub shard: Option<Shard>,
@@ -75,6 +78,7 @@ impl Manifest {
             grey: GreyScale::default(),
             val_share: VAL_SHARE,
             recipe,
+            sea: None,
         })
     }
 
@@ -100,7 +104,7 @@ impl Manifest {
         shuffled(index % scenes, scenes, self.seed) < val
     }
 
-    /// The pairs that it makes.
+    /// The pairs that it makes, without the learnt sea.
     ///
     /// # Errors
     ///

@@ -201,7 +201,8 @@ mod tests {
     fn folder(count: u64) -> (tempfile::TempDir, Folder) {
         let path = tempfile::tempdir().unwrap();
         let manifest = Manifest::new(source().recipe().clone(), 5, count).unwrap();
-        write(path.path(), &manifest, 2, |_| ()).unwrap();
+        let source = manifest.source().unwrap();
+        write(path.path(), &manifest, &source, 2, |_| ()).unwrap();
         let folder = Folder::open(path.path()).unwrap();
         (path, folder)
     }

@@ -46,23 +46,32 @@ impl Simulated {
     ///
     /// # Errors
     ///
-    /// [`Error::Scene`](crate::Error::Scene) if the grid does not fit in memory.
+    /// [`Error::Scene`](crate::Error::Scene) if the grid does not fit in memory; on a learnt sea as [`SeaTexture::image`].
+    ///
+    /// [`SeaTexture::image`]: crate::sea_texture::SeaTexture::image
     pub fn pair(&self, index: u64) -> Result<Pair> {
-        let scene = self.scene(index)?;
-        let mut simulator = idle().pop().unwrap_or_default();
-        let image = simulator.image(&scene);
-        idle().push(simulator);
-        let image = image?;
-        let power = if self.recipe().speckle {
-            image.speckled()
-        } else {
-            image.intensity
-        };
+        let power = self.power(&self.scene(index)?)?;
         let (image, amplitudes) = self.grey(&power, index);
         Ok(Pair {
             image,
             amplitudes,
             ..self.pair_without_image(index)?
+        })
+    }
+
+    /// Intensities of a scene as its recipe asks for them.
+    fn power(&self, scene: &Scene) -> Result<Field> {
+        if let Some(sea) = self.sea() {
+            return sea.image(scene);
+        }
+        let mut simulator = idle().pop().unwrap_or_default();
+        let image = simulator.image(scene);
+        idle().push(simulator);
+        let image = image?;
+        Ok(if self.recipe().speckle {
+            image.speckled()
+        } else {
+            image.intensity
         })
     }
 

@@ -3,6 +3,7 @@
 use super::recipe::{Draw, Recipe};
 use crate::error::Result;
 use crate::noise::{NoiseSource, uniform};
+use crate::sea_texture::SeaTexture;
 use wake_physics::Scene;
 use wake_physics::scene::paper_grid;
 use wake_text::{PartialScene, Wording};
@@ -23,7 +24,11 @@ const PAPER_STRIDE: u64 = 2137;
 pub struct Simulated {
     recipe: Recipe,
     seed: u64,
+    sea: Option<SeaTexture>,
 }
+
+/// Scenes that are looked at before the first image.
+const LOOKED_AT: u64 = 16;
 
 impl Simulated {
     /// The data set of a recipe and a seed.
@@ -33,7 +38,32 @@ impl Simulated {
     /// As [`Recipe::validate`].
     pub fn new(recipe: Recipe, seed: u64) -> Result<Self> {
         recipe.validate()?;
-        Ok(Self { recipe, seed })
+        Ok(Self {
+            recipe,
+            seed,
+            sea: None,
+        })
+    }
+
+    /// The same scenes on a sea that was learnt from real images, see [`SeaTexture::image`]; its speckle comes with it, whatever
+    /// the recipe says of speckle.
+    ///
+    /// # Errors
+    ///
+    /// As [`SeaTexture::check_spacing`], for the first scenes; one that comes later is refused when its turn comes.
+    pub fn with_sea(self, sea: SeaTexture) -> Result<Self> {
+        for index in 0..LOOKED_AT {
+            sea.check_spacing(self.scene(index)?.grid.spacing)?;
+        }
+        Ok(Self {
+            sea: Some(sea),
+            ..self
+        })
+    }
+
+    /// The learnt sea that the scenes are drawn on, if any.
+    pub(super) fn sea(&self) -> Option<&SeaTexture> {
+        self.sea.as_ref()
     }
 
     /// The recipe.

@@ -31,6 +31,16 @@ fn shard(number: u64, of: u64) -> Manifest {
     }
 }
 
+/// The set of a manifest, from its own source.
+fn write(
+    folder: &Path,
+    manifest: &Manifest,
+    jobs: usize,
+    watch: impl FnMut(Progress),
+) -> Result<()> {
+    super::write(folder, manifest, &manifest.source()?, jobs, watch)
+}
+
 /// Relative path → content of every file below a folder.
 type Tree = BTreeMap<PathBuf, Vec<u8>>;
 
@@ -585,4 +595,60 @@ fn quick_looks_can_be_undone() {
         }
     }
     assert!(compared > 400, "{compared}");
+}
+
+/// A learnt sea of white noise and a flow without training.
+#[cfg(feature = "flex")]
+fn white_sea(spacing: Option<f64>) -> crate::sea_texture::SeaTexture {
+    use crate::sea_texture::{SeaFlow, SeaStyle, SeaTexture};
+    let white = crate::noise::NoiseSource::new(2).normal(0, 128 * 128);
+    let patch = wake_physics::Field {
+        rows: 128,
+        columns: 128,
+        values: white.into_iter().map(|n| 50.0 + 5.0 * n).collect(),
+    };
+    let style = SeaStyle::of(&patch).unwrap();
+    let device = burn::tensor::Device::flex();
+    SeaTexture::new(SeaFlow::new(&device), &[style], spacing).unwrap()
+}
+
+/// Images show the learnt sea, everything else is that of the set without one; the folder says which sea it is, and a run
+/// with another, or none, is refused.
+#[cfg(feature = "flex")]
+#[test]
+fn a_learnt_sea_changes_images_alone() {
+    let recipe = manifest().recipe;
+    let source = || manifest().source().unwrap();
+    let on_sea = source().with_sea(white_sea(Some(20.0))).unwrap();
+    let of_sea = |name: &str| Manifest {
+        sea: Some(name.to_owned()),
+        ..manifest()
+    };
+    let folder = TempDir::new().unwrap();
+    super::write(folder.path(), &of_sea("one"), &on_sea, 2, |_| ()).unwrap();
+    let (plain, drawn) = (whole(), tree(folder.path()));
+    for (path, content) in &plain {
+        let differs = path.starts_with("images") || path.ends_with("dataset.json");
+        assert_eq!(drawn[path] != *content, differs, "{}", path.display());
+    }
+    assert_eq!(plain.len(), drawn.len());
+    let read = Folder::open(folder.path()).unwrap();
+    assert_eq!(read.manifest().sea.as_deref(), Some("one"));
+    let pair = on_sea.pair(3).unwrap();
+    assert_eq!(pair.image.levels(), read.pair(3).unwrap().image.levels());
+    let refused = |manifest: &Manifest, source: &Simulated| {
+        let refused = super::write(folder.path(), manifest, source, 1, |_| ());
+        refused.unwrap_err().to_string()
+    };
+    assert!(refused(&of_sea("two"), &on_sea).contains("another recipe"));
+    assert!(refused(&of_sea("one"), &source()).contains("without a learnt sea"));
+    assert!(refused(&manifest(), &on_sea).contains("on a learnt sea"));
+    let other = Simulated::new(recipe, 12).unwrap();
+    assert!(refused(&manifest(), &other).contains("another recipe or seed"));
+    assert_eq!(tree(folder.path()), drawn);
+    let fine = source()
+        .with_sea(white_sea(Some(4.0)))
+        .unwrap_err()
+        .to_string();
+    assert!(fine.contains("20 m") && fine.contains("4 m"), "{fine}");
 }

@@ -4,7 +4,8 @@ use super::annotations::{Coco, data_yaml, dota, yolo, yolo_oriented};
 use super::layout::{Layout, Manifest, Shard, broken, cannot};
 use super::metadata::{Log, Row, Rows};
 use super::ordered::Ordered;
-use crate::error::Result;
+use super::scenes::Simulated;
+use crate::error::{Error, Result};
 use std::path::Path;
 use wake_physics::output::{self, FolderLock};
 
@@ -24,16 +25,20 @@ pub struct Progress {
 /// The folder's content is a function of the manifest alone, byte for byte. A run that is killed leaves no
 /// half-written file; the next one continues. `watch` hears of every pair.
 ///
+/// - `source`: the manifest's own, on its learnt sea where it names one
+///
 /// # Errors
 ///
-/// [`Error::Dataset`](crate::Error::Dataset) if the folder holds something else,
-/// [`Error::Io`](crate::Error::Io) if it cannot be written.
+/// [`Error::Dataset`] if the folder holds something else, [`Error::Io`] if it cannot be written,
+/// [`Error::InvalidOption`] for a source of another recipe or seed, or with a sea that the manifest does not name.
 pub fn write(
     folder: &Path,
     manifest: &Manifest,
+    source: &Simulated,
     jobs: usize,
     mut watch: impl FnMut(Progress),
 ) -> Result<()> {
+    check_source(manifest, source)?;
     let _lock = claim(folder, &manifest.text()?, manifest.shard)?;
     let mut log = Log::open(folder, manifest)?;
     let missing = missing(folder, manifest, log.rows.len());
@@ -45,7 +50,7 @@ pub fn write(
     };
     watch(progress);
     let next = manifest.indices().start + log.rows.len() as u64;
-    for made in make(folder, manifest, jobs, missing)? {
+    for made in make(folder, source, jobs, missing)? {
         let (index, row) = made?;
         if index >= next {
             log.push(index, row)?;
@@ -55,6 +60,31 @@ pub fn write(
         watch(progress);
     }
     finish(folder, manifest, &log.finish()?)
+}
+
+/// Whether a source makes the pairs of a manifest.
+fn check_source(manifest: &Manifest, source: &Simulated) -> Result<()> {
+    let same = source.seed() == manifest.seed && *source.recipe() == manifest.recipe;
+    let refuse = |value: &str, expected: &str| Error::InvalidOption {
+        option: "source".to_owned(),
+        value: value.to_owned(),
+        expected: expected.to_owned(),
+    };
+    match (source.sea(), &manifest.sea) {
+        _ if !same => Err(refuse(
+            "of another recipe or seed",
+            "the manifest's own source",
+        )),
+        (Some(_), None) => Err(refuse(
+            "on a learnt sea",
+            "a manifest that names its file's fingerprint",
+        )),
+        (None, Some(_)) => Err(refuse(
+            "without a learnt sea",
+            "one, as the manifest names it",
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Takes a folder that is empty, or that an earlier run began for the same `dataset.json` and shard.
@@ -124,12 +154,11 @@ fn missing(folder: &Path, manifest: &Manifest, lines: usize) -> Vec<u64> {
 /// Makes pairs and writes their files on `jobs` threads; their rows come in order.
 fn make(
     folder: &Path,
-    manifest: &Manifest,
+    source: &Simulated,
     jobs: usize,
     indices: Vec<u64>,
 ) -> Result<Ordered<(u64, Row)>> {
-    let source = manifest.source()?;
-    let folder = folder.to_owned();
+    let (source, folder) = (source.clone(), folder.to_owned());
     Ordered::new(indices.into_iter(), jobs, move |index| {
         let pair = source.pair(index)?;
         let row = Row::of(&pair);

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 use wake_physics::output::{self, FolderLock};
 
 use super::checkpoint::{Checkpoint, difference};
 use crate::error::{Error, Result};
-use crate::network::WakeModelConfig;
 
 /// A folder that the stages of one run share, taken for this process.
 ///
@@ -33,6 +33,7 @@ struct Noted {
 impl RunFolder {
     /// Opens or makes the folder of a run; what is refused changes nothing.
     ///
+    /// - `model`: what shapes it
     /// - `data`: what is learnt from, such as the manifest of a data set; `Null` for a stage that needs none
     /// - `stage`: the one that shall begin, or be resumed
     ///
@@ -42,7 +43,7 @@ impl RunFolder {
     /// [`begin`](Self::begin); [`Error::Scene`] if another process works there.
     pub fn open(
         path: &Path,
-        model: &WakeModelConfig,
+        model: &impl Serialize,
         data: &Value,
         (stage, resume): (&str, bool),
     ) -> Result<Self> {
@@ -189,26 +190,11 @@ fn read(path: &Path) -> Result<Option<Map<String, Value>>> {
     Ok(Some(object))
 }
 
-/// A short name of the content of a file: FNV-1a of 64 bits.
-///
-/// # Errors
-///
-/// [`Error::Io`] if it cannot be read.
-///
-/// # References
-///
-/// Fowler, Noll & Vo, "The FNV Non-Cryptographic Hash Algorithm".
-pub fn fingerprint(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|source| crate::files::unreadable(path, source))?;
-    let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix);
-    Ok(format!("{hash:016x}"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::conditioning::Vocabulary;
+    use crate::network::WakeModelConfig;
 
     fn config() -> WakeModelConfig {
         WakeModelConfig::standard(&Vocabulary::new([1, 2]))
@@ -304,14 +290,5 @@ mod tests {
         std::fs::remove_file(file).unwrap();
         assert_eq!(run.unfinished("mean", &results).unwrap(), Some(6));
         assert!(!run.is_current("mean", 6, &results));
-    }
-
-    /// The values that the algorithm's authors publish for "" and "foobar".
-    #[test]
-    fn fingerprints_are_those_of_the_algorithm() {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        assert_eq!(fingerprint(file.path()).unwrap(), "cbf29ce484222325");
-        std::fs::write(file.path(), "foobar").unwrap();
-        assert_eq!(fingerprint(file.path()).unwrap(), "85944171f73967e8");
     }
 }

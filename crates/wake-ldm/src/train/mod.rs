@@ -16,6 +16,7 @@ mod trainer;
 // What is learnt.
 mod latents;
 mod run;
+mod sea;
 mod tasks;
 
 mod fine_tune;
@@ -27,11 +28,12 @@ mod two_sample;
 
 pub use checkpoint::{Checkpoint, Tensors};
 pub use fine_tune::{FineTune, FineTuneOptions, Frozen};
-pub use folder::{RunFolder, fingerprint};
+pub use folder::RunFolder;
 pub use latents::{Example, LatentSet};
 pub use metrics::Metrics;
 pub use optimizer::{AdamOptions, Rate};
 pub use run::{Run, RunOptions, Task, Terms};
+pub use sea::{SeaPatches, SeaTask};
 pub use tasks::{FlowTask, PriorTask, WordsTask};
 pub use trainer::{StepReport, Trainer, TrainerOptions};
 pub use two_sample::{TwoSample, TwoSampleOptions, two_sample};

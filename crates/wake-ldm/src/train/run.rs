@@ -58,7 +58,7 @@ impl RunOptions {
     }
 }
 
-/// A run that trains one part of a [`WakeModel`](crate::network::WakeModel).
+/// A run that trains one part of a model, such as a [`WakeModel`](crate::network::WakeModel).
 #[derive(Debug)]
 pub struct Run<M> {
     trainer: Trainer<M>,
@@ -84,13 +84,37 @@ impl<M: Module> Run<M> {
         devices: Vec<Device>,
     ) -> Result<Self> {
         config.validate()?;
+        Self::of(
+            part,
+            &json!(config),
+            |device| init(config, device),
+            options,
+            devices,
+        )
+    }
+
+    /// A run of a model of any kind from random weights.
+    ///
+    /// - `part`, `devices`: as in [`new`](Self::new)
+    /// - `model`: what shapes it
+    ///
+    /// # Errors
+    ///
+    /// As [`RunOptions::validate`].
+    pub fn of(
+        part: &str,
+        model: &Value,
+        init: impl FnOnce(&Device) -> M,
+        options: RunOptions,
+        devices: Vec<Device>,
+    ) -> Result<Self> {
         options.validate(devices.len())?;
         devices[0].seed(options.seed);
-        let model = init(config, &devices[0]);
+        let weights = init(&devices[0]);
         Ok(Self {
-            trainer: Trainer::new(model, options.trainer, devices),
+            trainer: Trainer::new(weights, options.trainer, devices),
             state: json!({
-                "part": part, "model": config, "seed": options.seed, "batch": options.batch,
+                "part": part, "model": model, "seed": options.seed, "batch": options.batch,
                 "identity": options.identity, "trainer": options.trainer.state(),
             }),
             options,

@@ -27,21 +27,25 @@ use crate::noise::{NoiseSource, uniform};
 /// # References
 ///
 /// Esser et al. (2024), "Scaling Rectified Flow Transformers", section 3.1 (logit-normal).
-fn noise_level(random: NoiseSource, position: u64) -> f64 {
+pub(super) fn noise_level(random: NoiseSource, position: u64) -> f64 {
     let [a, b] = [0, 1].map(|i| random.uniform(uniform::LEVELS, 2 * position + i));
     let normal = (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos();
     1.0 / (1.0 + (-normal).exp())
 }
 
 /// The examples at some positions of a run: each round through a set is in another order.
-fn examples(seed: u64, positions: impl Iterator<Item = u64>, count: usize) -> Vec<usize> {
+pub(super) fn examples(
+    seed: u64,
+    positions: impl Iterator<Item = u64>,
+    count: usize,
+) -> Vec<usize> {
     positions
         .map(|position| shuffled(position, count as u64, seed) as usize)
         .collect()
 }
 
 /// The noise of one image of a run.
-fn noise_of(seed: u64, position: u64) -> NoiseSource {
+pub(super) fn noise_of(seed: u64, position: u64) -> NoiseSource {
     NoiseSource::new(seed ^ position.wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
 
@@ -165,6 +169,20 @@ impl Task<Prior> for PriorTask<'_> {
     }
 }
 
+/// Between data r and noise n at noise levels σ: x = cos φ r + sin φ n, its velocity cos φ n − sin φ r, and σ, φ = πσ/2.
+pub(super) fn on_the_way(
+    data: Tensor<4>,
+    noise: Tensor<4>,
+    levels: &[f32],
+) -> (Tensor<4>, Tensor<4>, Tensor<1>) {
+    let levels = TensorData::new(levels.to_vec(), [levels.len()]);
+    let levels: Tensor<1> = Tensor::from_data(levels, &data.device());
+    let angle = (levels.clone() * FRAC_PI_2).reshape([-1, 1, 1, 1]);
+    let (cos, sin) = (angle.clone().cos(), angle.sin());
+    let x = data.clone() * cos.clone() + noise.clone() * sin.clone();
+    (x, noise * cos - data * sin, levels)
+}
+
 /// Learning the velocity of the flow by its squared error.
 ///
 /// ```text
@@ -221,17 +239,10 @@ impl Task<Flow> for FlowTask<'_> {
         let noise = self.noise(&indices, positions);
         let noise = Tensor::from_inner(noise.to_device(&device.clone().inner()));
         let residual = self.set.latents(&indices, device);
-        let count = levels.len();
-        let angles: Vec<f32> = levels.iter().map(|level| FRAC_PI_2 * level).collect();
-        let tensor =
-            |numbers| -> Tensor<1> { Tensor::from_data(TensorData::new(numbers, [count]), device) };
-        let angle = tensor(angles).reshape([-1, 1, 1, 1]);
-        let (cos, sin) = (angle.clone().cos(), angle.sin());
-        let x = residual.clone() * cos.clone() + noise.clone() * sin.clone();
-        let target = noise * cos - residual * sin;
+        let (x, target, levels) = on_the_way(residual, noise, &levels);
         let wake = self.set.expected(&indices, device);
         let known = model.prepared(&Known::new(&conditions, self.config.grid(), wake));
-        let error = model.velocity(x, tensor(levels), &known) - target;
+        let error = model.velocity(x, levels, &known) - target;
         let loss = error.square().mean();
         let terms = vec![("flow", number(&loss))];
         (loss, terms)

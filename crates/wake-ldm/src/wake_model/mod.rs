@@ -2,4 +2,5 @@
 
 pub mod conditioning;
 pub mod network;
+pub mod sea_texture;
 pub mod sampler;

@@ -19,6 +19,7 @@ use names::ModulePath;
 
 pub use names::Layout;
 pub use precision::Precision;
+pub(crate) use save::save_noted;
 pub use save::{save_as, save_folder};
 
 /// Reads weights into a model, as f32; see [`load_as`].

@@ -27,7 +27,18 @@ pub fn save_as<M: Module>(
     path: &Path,
     precision: Precision,
 ) -> Result<()> {
-    let header = header(model, layout, precision);
+    save_noted(model, layout, path, precision, None)
+}
+
+/// [`save_as`] with an entry in the free text of the header, its key and its value.
+pub(crate) fn save_noted<M: Module>(
+    model: &M,
+    layout: Layout,
+    path: &Path,
+    precision: Precision,
+    note: Option<(&str, &str)>,
+) -> Result<()> {
+    let header = header(model, layout, precision, note);
     write_atomically(path, |writer| {
         writer.write_all(&(header.len() as u64).to_le_bytes())?;
         writer.write_all(header.as_bytes())?;
@@ -65,7 +76,12 @@ pub fn save_folder<M: Module>(
 }
 
 /// The header, in the order in which the parameters are visited, padded to a multiple of 8 bytes.
-fn header<M: Module>(model: &M, layout: Layout, precision: Precision) -> String {
+fn header<M: Module>(
+    model: &M,
+    layout: Layout,
+    precision: Precision,
+    note: Option<(&str, &str)>,
+) -> String {
     let mut collector = HeaderCollector {
         path: ModulePath::default(),
         layout,
@@ -73,9 +89,11 @@ fn header<M: Module>(model: &M, layout: Layout, precision: Precision) -> String 
         end: 0,
         tensors: Map::new(),
     };
+    let mut metadata = Map::from_iter([("format".to_owned(), json!("pt"))]);
+    metadata.extend(note.map(|(key, value)| (key.to_owned(), json!(value))));
     collector
         .tensors
-        .insert("__metadata__".to_owned(), json!({"format": "pt"}));
+        .insert("__metadata__".to_owned(), Value::Object(metadata));
     model.visit(&mut collector);
     let mut header = Value::Object(collector.tensors).to_string();
     while !header.len().is_multiple_of(8) {

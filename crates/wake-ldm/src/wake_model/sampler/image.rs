@@ -23,11 +23,11 @@ pub struct SampleSeconds {
 /// A generated image. Fields are `[rows, columns]`.
 #[derive(Debug, Clone)]
 pub struct WakeImage {
-    /// Grey 0…1 without speckle, as the model draws it.
+    /// Grey 0…1 as the model draws it: without speckle, but with that of a learnt sea.
     pub grey: Field,
-    /// Intensity without speckle, linear, in the unit of σ⁰.
+    /// Intensity of the same, linear, in the unit of σ⁰.
     pub intensity: Field,
-    /// Intensity with speckle of the scene's number of looks.
+    /// Intensity with speckle: of the scene's number of looks, or of the learnt sea, which gets no second one.
     pub speckled: Field,
     /// Where ship and wake are in [`scene`](Self::scene).
     pub labels: Labels,
@@ -54,6 +54,23 @@ impl WakeImage {
             grey,
             intensity,
             speckled,
+            labels: labels_of(&scene),
+            scene,
+            seconds,
+        }
+    }
+
+    /// An image whose intensity has its speckle already.
+    pub(super) fn with_speckle(intensity: Field, scene: Scene, seconds: SampleSeconds) -> Self {
+        let scale = GreyScale::default();
+        let grey = |&v: &f32| scale.grey(f64::from(v)) as f32;
+        Self {
+            grey: Field {
+                values: intensity.values.iter().map(grey).collect(),
+                ..intensity
+            },
+            speckled: intensity.clone(),
+            intensity,
             labels: labels_of(&scene),
             scene,
             seconds,

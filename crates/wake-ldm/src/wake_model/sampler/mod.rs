@@ -7,8 +7,9 @@ use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
+use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
 use wake_physics::{Field, Scene, labels_of};
 use wake_text::{Reading, Wording};
@@ -22,6 +23,7 @@ use crate::wake_model::conditioning::{Conditions, Vocabulary};
 use crate::wake_model::network::{
     Expected, Known, SeaFields, WakeModel, WakeModelConfig, expected_greys, latents_of,
 };
+use crate::wake_model::sea_texture::SeaTexture;
 pub use image::{SampleSeconds, WakeImage};
 
 /// Steps from noise to image, unless others are asked for.
@@ -59,6 +61,7 @@ pub struct WakeSampler {
     device: Device,
     steps: usize,
     conditioning: Conditioning,
+    sea: Option<SeaTexture>,
 }
 
 impl WakeSampler {
@@ -82,6 +85,7 @@ impl WakeSampler {
             config,
             steps: STEPS,
             conditioning: Conditioning::default(),
+            sea: None,
         })
     }
 
@@ -102,6 +106,23 @@ impl WakeSampler {
             conditioning,
             ..self
         }
+    }
+
+    /// The same sampler with a sea that was learnt from real images, in the place of the model's own sea and of speckle.
+    ///
+    /// The image is then the one that physics expects of the scene, times a learnt sea of mean 1 with its speckle, and
+    /// the echoes of the ships on it, see [`SeaTexture::image`]. Of the model the parser of prompts is used alone; steps
+    /// are those of the learnt sea. Labels are as ever.
+    ///
+    /// # Errors
+    ///
+    /// As [`SeaTexture::check_spacing`].
+    pub fn with_sea(self, sea: SeaTexture) -> Result<Self> {
+        sea.check_spacing(self.config.spacing)?;
+        Ok(Self {
+            sea: Some(sea),
+            ..self
+        })
     }
 
     /// Steps from noise to image.
@@ -178,7 +199,8 @@ impl WakeSampler {
         Ok(self.run(&inputs, begin)?.images())
     }
 
-    /// An image of each scene, in one batch on the device, without speckle, and the labels of what was drawn.
+    /// An image of each scene, in one batch on the device, without speckle but that of a learnt sea, and the labels of what
+    /// was drawn.
     ///
     /// # Shapes
     ///
@@ -227,6 +249,18 @@ impl WakeSampler {
         };
         let scenes = self.resolved(inputs)?;
         seconds.text = lap();
+        if let Some(sea) = &self.sea {
+            let intensities = scenes.iter().map(|scene| sea.image(scene));
+            let intensities: Vec<Field> = intensities.collect::<Result<_>>()?;
+            seconds.denoise = lap();
+            seconds.total = seconds.text + seconds.denoise;
+            return Ok(Drawn {
+                grey: grey_of(&intensities, &self.device),
+                pixels: Pixels::WithSpeckle(intensities),
+                scenes,
+                seconds,
+            });
+        }
         let base = Conditions::of_scene(&self.base_scene());
         let conditions: Vec<Conditions> = scenes
             .iter()
@@ -260,7 +294,7 @@ impl WakeSampler {
         Ok(Drawn {
             scenes,
             grey,
-            pixels,
+            pixels: Pixels::Grey(pixels),
             seconds,
         })
     }
@@ -333,15 +367,42 @@ struct Drawn {
     /// What they show.
     scenes: Vec<Scene>,
     grey: Tensor<4>,
-    pixels: Vec<f32>,
+    pixels: Pixels,
     seconds: SampleSeconds,
+}
+
+/// All pixels of a batch.
+enum Pixels {
+    /// Grey, of all images in a row.
+    Grey(Vec<f32>),
+    /// Intensities that have their speckle already.
+    WithSpeckle(Vec<Field>),
+}
+
+/// Grey of some intensities of one size, `[images, 1, rows, columns]`.
+fn grey_of(intensities: &[Field], device: &Device) -> Tensor<4> {
+    let scale = GreyScale::default();
+    let size = intensities.first().map_or([0, 0], |f| [f.rows, f.columns]);
+    let values = intensities.iter().flat_map(|f| &f.values);
+    let grey: Vec<f32> = values.map(|&v| scale.grey(f64::from(v)) as f32).collect();
+    let shape = [intensities.len(), 1, size[0], size[1]];
+    Tensor::from_data(TensorData::new(grey, shape), device)
 }
 
 impl Drawn {
     /// The images with their speckle and labels.
     fn images(self) -> Vec<WakeImage> {
         let [_, _, rows, columns] = self.grey.dims();
-        let images = self.pixels.par_chunks(rows * columns);
+        let pixels = match self.pixels {
+            Pixels::Grey(pixels) => pixels,
+            Pixels::WithSpeckle(intensities) => {
+                let images = intensities.into_par_iter().zip(self.scenes);
+                return images
+                    .map(|(image, scene)| WakeImage::with_speckle(image, scene, self.seconds))
+                    .collect();
+            }
+        };
+        let images = pixels.par_chunks(rows * columns);
         images
             .zip(self.scenes)
             .map(|(pixels, scene)| {

@@ -7,6 +7,7 @@ use burn::tensor::Device;
 use wake_physics::grey::GreyScale;
 
 use super::*;
+use crate::sea_texture::{SeaFlow, SeaStyle};
 
 const PROMPT: &str = "Simulated SAR image of wakes from a ship moving at 10 mps toward 135 degrees. Ocean waves are \
                       shaped by 3 mps wind directing toward 90 degrees and 10000 meter fetch. Captured at 32 degree \
@@ -344,6 +345,56 @@ fn words_and_numbers_each_move_the_image() {
             "{told:?}"
         );
     }
+}
+
+/// A learnt sea of white noise and a flow without training.
+fn white_sea(spacing: Option<f64>) -> SeaTexture {
+    let white = NoiseSource::new(2).normal(0, 128 * 128);
+    let patch = Field {
+        rows: 128,
+        columns: 128,
+        values: white.into_iter().map(|n| 50.0 + 5.0 * n).collect(),
+    };
+    let style = SeaStyle::of(&patch).unwrap();
+    SeaTexture::new(SeaFlow::new(&Device::flex()), &[style], spacing).unwrap()
+}
+
+/// The sea changes, what is where does not: labels, scenes and the words' meaning are those of the model's own sea.
+#[test]
+fn a_learnt_sea_changes_the_image_and_no_label() {
+    let plain = sampler();
+    let sea = white_sea(Some(4.0));
+    let on_sea = plain.clone().with_sea(sea.clone()).unwrap();
+    let [one, other] = [&plain, &on_sea].map(|s| s.sample(PROMPT, 3).unwrap());
+    assert_eq!(one.labels, other.labels);
+    assert_eq!(one.scene, other.scene);
+    assert!(distance(&one.speckled.values, &other.speckled.values) > 1e-3);
+    // One sea, one speckle: intensity and grey are those of the image.
+    assert_eq!(other.intensity, other.speckled);
+    assert_eq!(other.intensity, sea.image(&other.scene).unwrap());
+    let scale = GreyScale::default();
+    for (grey, value) in other.grey.values.iter().zip(&other.intensity.values) {
+        assert!((f64::from(*grey) - scale.grey(f64::from(*value))).abs() < 1e-6);
+    }
+    let again = on_sea.sample(PROMPT, 3).unwrap();
+    assert_eq!(again.speckled, other.speckled);
+    let seeds = on_sea.sample_many(&[PROMPT, PROMPT], 2).unwrap();
+    assert_eq!(seeds[1].speckled, other.speckled);
+    assert!(distance(&seeds[0].speckled.values, &other.speckled.values) > 1e-3);
+    let (batch, labels) = on_sea
+        .sample_batch(std::slice::from_ref(&other.scene))
+        .unwrap();
+    let grey: Vec<f32> = batch.into_data().iter::<f32>().collect();
+    assert_eq!(labels, [other.labels]);
+    assert_eq!(grey, other.grey.values);
+    let coarse = plain
+        .with_sea(white_sea(Some(10.0)))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        coarse.contains("4 m") && coarse.contains("10 m"),
+        "{coarse}"
+    );
 }
 
 #[test]

@@ -1,0 +1,165 @@
+//! What seas differ in: a few statistics of a patch, and the correlation of its pixels.
+
+use wake_physics::Field;
+use wake_physics::correlated::{CorrelatedNoise, Correlation};
+use wake_physics::measure::{Texture, texture};
+
+use crate::error::{Error, Result, check_range};
+use crate::noise::{NoiseSource, SEA_TEXTURE_STREAM};
+
+/// Largest distance of pixels whose correlation a style keeps.
+pub(super) const LAGS: usize = 32;
+/// A pixel brighter than so many medians is no sea: chosen, a little above the brightest of 128² pixels of one look.
+const BRIGHTEST: f32 = 4.0;
+/// Speckle of one look has 0.63, what is more skewed than this holds bright points, as land does: chosen.
+const MOST_SKEWED: f64 = 1.0;
+/// Means of blocks of 32 pixels of a sea vary by less: chosen, above the gusts of real images and below most coasts.
+const MOST_VARIED: f64 = 0.2;
+/// Numbers that the flow is told of a style.
+pub(crate) const FEATURES: usize = 8;
+/// Numbers of a style in a file: those and the mean.
+pub(super) const NUMBERS: usize = FEATURES + 1;
+/// Names and ranges of the numbers of a style in a file.
+const RANGES: [(&str, f64, f64); NUMBERS] = [
+    ("mean", 0.5, 2.0),
+    ("spread", 1e-3, 2.0),
+    ("skewness", -20.0, 20.0),
+    ("correlation along rows", -1.0, 1.0),
+    ("correlation along rows", -1.0, 1.0),
+    ("correlation along columns", -1.0, 1.0),
+    ("correlation along columns", -1.0, 1.0),
+    ("variation of blocks of 8", 0.0, 2.0),
+    ("variation of blocks of 32", 0.0, 2.0),
+];
+
+/// Statistics of a patch of open sea, of its amplitude over its own median.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeaStyle {
+    /// Mean, spread, and the rest of [`RANGES`].
+    numbers: [f32; NUMBERS],
+    correlation: Correlation,
+}
+
+impl SeaStyle {
+    /// The style of a square patch of amplitudes of any scale; `None` where it is smaller than 64 pixels, of one value, or
+    /// is no open sea: with a pixel above four medians or eight standard deviations above the mean (a target), a skewness above
+    /// 1 (land), or means of blocks of 32 pixels that vary by more than a fifth (a coast, a front).
+    #[must_use]
+    pub fn of(amplitude: &Field) -> Option<Self> {
+        let side = amplitude.rows;
+        let median = median(amplitude);
+        let largest = amplitude.values.iter().copied().fold(0.0, f32::max);
+        // A median of 0 or no number fails, too.
+        let lit = median > 0.0 && largest <= BRIGHTEST * median;
+        if side < 2 * LAGS || amplitude.columns != side || !lit {
+            return None;
+        }
+        let mean = amplitude.mean();
+        let squares = amplitude.values.iter();
+        let squares: f64 = squares.map(|&v| (f64::from(v) - mean).powi(2)).sum();
+        let spread = (squares / amplitude.values.len() as f64).sqrt();
+        let median = f64::from(median);
+        let texture = texture(amplitude, side)?;
+        if texture.skewness > MOST_SKEWED || texture.block_variation[1] > MOST_VARIED {
+            return None;
+        }
+        let correlation = Correlation::of(amplitude, LAGS)?;
+        Self::new(
+            numbers(mean / median, spread / median, &texture),
+            correlation,
+        )
+        .ok()
+    }
+
+    /// A style from numbers that may be anybody's.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] with the first number that no sea has.
+    pub(super) fn new(numbers: [f32; NUMBERS], correlation: Correlation) -> Result<Self> {
+        for (number, (name, min, max)) in numbers.iter().zip(RANGES) {
+            check_range(name, f64::from(*number), min, max)?;
+        }
+        Ok(Self {
+            numbers,
+            correlation,
+        })
+    }
+
+    /// A style from a row of each of a file's tensors.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new), and [`Error::InvalidOption`] for what is no correlation.
+    pub(super) fn of_rows(numbers: &[f32], correlation: &[f32]) -> Result<Self> {
+        let Some(correlation) = Correlation::new(LAGS, correlation.to_vec()) else {
+            return Err(Error::InvalidOption {
+                option: "correlation".to_owned(),
+                value: "beyond -1 to 1, or not 1 of a pixel with itself".to_owned(),
+                expected: "what `train -- sea` writes".to_owned(),
+            });
+        };
+        let numbers = std::array::from_fn(|n| numbers.get(n).copied().unwrap_or(f32::NAN));
+        Self::new(numbers, correlation)
+    }
+
+    /// Mean amplitude over its median.
+    #[must_use]
+    pub fn mean(&self) -> f32 {
+        self.numbers[0]
+    }
+
+    /// Standard deviation of the amplitude over its median.
+    #[must_use]
+    pub fn spread(&self) -> f32 {
+        self.numbers[1]
+    }
+
+    pub(super) fn numbers(&self) -> &[f32; NUMBERS] {
+        &self.numbers
+    }
+
+    pub(super) fn correlations(&self) -> &[f32] {
+        self.correlation.values()
+    }
+
+    /// What the flow is told: every number near 0, of order 1.
+    pub(crate) fn features(&self) -> [f32; FEATURES] {
+        let [_, spread, skewness, ref rest @ ..] = self.numbers;
+        let [along @ .., fine, coarse] = rest;
+        // Logarithms of what is positive; the smallest block variation that 8 bits of grey show is some 1e-3.
+        let logarithm = |x: f32| (x.max(1e-3)).ln();
+        let mut features = [0.0; FEATURES];
+        features[0] = logarithm(spread) + 1.5;
+        features[1] = skewness;
+        features[2..6].copy_from_slice(along);
+        features[6] = 0.5 * (logarithm(*fine) + 3.0);
+        features[7] = 0.5 * (logarithm(*coarse) + 4.0);
+        features
+    }
+
+    /// Gaussian noise of mean 0 and variance 1 with the correlation of the style: what a sea is that has no more than a
+    /// spectrum.
+    #[must_use]
+    pub fn noise(&self, source: NoiseSource, rows: usize, columns: usize) -> Field {
+        let noise = CorrelatedNoise::new(&self.correlation, rows, columns);
+        noise.field(&source.normal(SEA_TEXTURE_STREAM, noise.normals()))
+    }
+}
+
+fn numbers(mean: f64, spread: f64, texture: &Texture) -> [f32; NUMBERS] {
+    let [r1, r2, ..] = texture.along_rows;
+    let [c1, c2, ..] = texture.along_columns;
+    let [fine, coarse] = texture.block_variation;
+    [mean, spread, texture.skewness, r1, r2, c1, c2, fine, coarse].map(|x| x as f32)
+}
+
+/// The middle value; 0 of no pixel.
+pub(super) fn median(field: &Field) -> f32 {
+    let mut sorted = field.values.clone();
+    let middle = sorted.len() / 2;
+    match sorted.is_empty() {
+        true => 0.0,
+        false => *sorted.select_nth_unstable_by(middle, f32::total_cmp).1,
+    }
+}

@@ -1,0 +1,131 @@
+//! `train -- sea`, and `generate`, `make_dataset` and `evaluate` on what it learnt.
+
+use std::path::{Path, PathBuf};
+
+use super::{done, files, refused_by, refused_into, text};
+
+/// Two images of 8 and 16 bits, 200 pixels wide, of a rough sea with a bright target and a mask.
+fn images(folder: &Path) -> PathBuf {
+    let folder = folder.join("images");
+    std::fs::create_dir(&folder).expect("a folder");
+    let grey = |x: u32, y: u32| 60 + ((x * 7919 + y * 104_729 + x * y * 31) % 37) as u8;
+    let mut small = image::GrayImage::from_fn(200, 140, |x, y| image::Luma([grey(x, y)]));
+    small.put_pixel(2, 2, image::Luma([255]));
+    small.save(folder.join("a.png")).expect("an image");
+    let mask = image::GrayImage::from_fn(200, 140, |x, _| image::Luma([u8::from(x > 190)]));
+    mask.save(folder.join("a_mask.png")).expect("a mask");
+    let deep = image::ImageBuffer::from_fn(200, 140, |x, y| {
+        image::Luma([150 * u16::from(grey(x + 9, y))])
+    });
+    deep.save(folder.join("b.tif")).expect("an image");
+    folder
+}
+
+const SHORT: [&str; 4] = ["--batch", "2", "--every", "1"];
+
+/// Stopped and resumed, a run writes what one in one go does; scenes are drawn on it, with the labels that they ever have.
+#[test]
+fn a_sea_is_learnt_resumed_and_drawn_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let images = images(folder.path());
+    let out = |name: &str| folder.path().join(name);
+    let train = |more: &[&str], out: &Path| {
+        let common = ["sea", "--images", text(&images), "--spacing", "4"];
+        done("train", &[&common[..], &SHORT, more].concat(), out)
+    };
+    train(&["--steps", "2"], &out("whole"));
+    // Sizes of steps depend on how many there shall be: the last is begun anew as a kill leaves it.
+    let killed = out("killed");
+    train(&["--steps", "2"], &killed);
+    let checkpoints = killed.join("checkpoints/sea");
+    std::fs::remove_dir_all(checkpoints.join("step-00000002")).expect("a checkpoint");
+    std::fs::write(killed.join("sea.safetensors"), "old").expect("a file");
+    train(&["--steps", "2", "--resume"], &killed);
+    let read = |out: &Path| std::fs::read(out.join("sea.safetensors")).expect("weights");
+    assert!(read(&killed) == read(&out("whole")));
+    assert!(killed.join("sea.png").is_file() && killed.join("sea.jsonl").is_file());
+    let again = ["sea", "--images", text(&images), "--spacing", "4"];
+    refused_into(
+        "train",
+        &[&again[..], &SHORT].concat(),
+        &["stage sea has made 2 steps", "--resume"],
+        &killed,
+    );
+    let weights = killed.join("sea.safetensors");
+    let sea = ["--sea", text(&weights)];
+    done("generate", &["--seed", "3"], &out("plain"));
+    done(
+        "generate",
+        &[&sea[..], &["--seed", "3"]].concat(),
+        &out("drawn"),
+    );
+    let file = |place: &str| std::fs::read(folder.path().join(place)).expect(place);
+    assert!(file("plain/labels.json") == file("drawn/labels.json"));
+    assert!(file("plain/image.png") != file("drawn/image.png"));
+    let size = [
+        "--count",
+        "2",
+        "--set",
+        "scene.grid.rows=48",
+        "--set",
+        "scene.grid.columns=48",
+    ];
+    done("make_dataset", &size, &out("set"));
+    done("make_dataset", &[&sea[..], &size].concat(), &out("sea"));
+    assert!(file("set/metadata.jsonl") == file("sea/metadata.jsonl"));
+    assert!(file("set/images/000001.png") != file("sea/images/000001.png"));
+    // A set of one sea is no set of another.
+    refused_into(
+        "make_dataset",
+        &size,
+        &["dataset.json", "another recipe"],
+        &out("sea"),
+    );
+    let coarse = [&sea[..], &size, &["--set", "scene.grid.spacing=10"]].concat();
+    refused_by("make_dataset", &coarse, &["grid.spacing", "10 m", "4 m"]);
+}
+
+#[test]
+fn what_is_no_sea_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let images = images(folder.path());
+    let images = text(&images);
+    refused_by("train", &["sea", "--images", "no/such"], &["no/such"]);
+    refused_by("train", &["sea", "--images", "docs"], &["docs", "PNG"]);
+    let given =
+        |more: &[&'static str]| -> Vec<&str> { [&["sea", "--images", images], more].concat() };
+    refused_by(
+        "train",
+        &given(&["--resume"]),
+        &["--resume", "no checkpoint"],
+    );
+    refused_by("train", &given(&["--rate=nan"]), &["rate is", "outside"]);
+    refused_by("train", &given(&["--spacing=0"]), &["spacing is 0", "0.1"]);
+    refused_by(
+        "train",
+        &given(&["--half", "left"]),
+        &["open sea", "128 x 128"],
+    );
+    let reader = "crates/wake-ldm/assets/reader.safetensors";
+    for (name, words) in [
+        (reader, ["reader.safetensors", "does not fit"]),
+        ("no/sea", ["no/sea", "cannot read"]),
+    ] {
+        refused_by("generate", &["--sea", name], &words);
+        refused_by("make_dataset", &["--sea", name, "--count", "1"], &words);
+        refused_by(
+            "evaluate",
+            &["sea", "--real", images, "--weights", name],
+            &words,
+        );
+    }
+    refused_by(
+        "generate",
+        &["--sea", reader, "--steps", "2"],
+        &["--sea", "--steps"],
+    );
+    let other = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/pipeline_a");
+    let layout = ["--weights", other, "--sea", reader];
+    refused_by("generate", &layout, &["--sea", "wake model"]);
+    assert_eq!(files(folder.path()).len(), 4);
+}
