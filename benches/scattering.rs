@@ -60,7 +60,13 @@ fn table(criterion: &mut Criterion) {
         for tolerance in [1e-2, 1e-3, 1e-4, 1e-6] {
             let name = BenchmarkId::new(format!("{degrees}_degrees"), tolerance);
             group.bench_function(name, |b| {
-                b.iter(|| BackscatterTable::covering(model.clone(), &x, &y, tolerance * mean));
+                b.iter(|| {
+                    BackscatterTable::covering(
+                        model.clone(),
+                        &FacetFields::of_slopes(&x, &y),
+                        tolerance * mean,
+                    )
+                });
             });
         }
         group.bench_function(format!("sensitivity/{degrees}_degrees"), |b| {
@@ -79,24 +85,19 @@ fn field(criterion: &mut Criterion) {
         for size in [128, 512, 2048] {
             let [x, y] = slopes(size);
             let fields = FacetFields {
-                slope_x: &x,
-                slope_y: &y,
                 modulation: Some(&y),
-                damping: None,
-                unresolved: None,
+                ..FacetFields::of_slopes(&x, &y)
             };
-            let table = BackscatterTable::covering(model.clone(), &x, &y, 1e-3 * mean);
+            let table = BackscatterTable::covering(
+                model.clone(),
+                &FacetFields::of_slopes(&x, &y),
+                1e-3 * mean,
+            );
             let name = BenchmarkId::new(format!("table/{degrees}_degrees"), size);
             group.bench_function(name, |b| b.iter(|| table.sigma0_field(&fields)));
         }
         let [x, y] = slopes(4);
-        let fields = FacetFields {
-            slope_x: &x,
-            slope_y: &y,
-            modulation: None,
-            damping: None,
-            unresolved: None,
-        };
+        let fields = FacetFields::of_slopes(&x, &y);
         group.bench_function(format!("quadrature_16_pixels/{degrees}_degrees"), |b| {
             b.iter(|| model.sigma0_field(&fields));
         });

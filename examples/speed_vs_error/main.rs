@@ -24,13 +24,14 @@ mod progress;
 #[cfg(feature = "ldm")]
 mod rounding;
 mod row;
+mod satellite;
 mod spacing;
 mod stages;
 
 use clap::{Parser, ValueEnum};
 use row::Row;
 use serde_json::json;
-use stages::{Memo, STAGES, measure};
+use stages::{Memo, STAGES, has_tolerance, measure};
 use std::cmp::Ordering;
 use std::error::Error;
 use std::path::PathBuf;
@@ -59,6 +60,9 @@ struct Arguments {
     /// What to measure
     #[arg(long, value_enum, default_value = "all")]
     part: Part,
+    /// Stages of the simulator alone, without spacing and model [repeatable; default: all]
+    #[arg(long, value_name = "STAGE", value_parser = STAGES)]
+    stage: Vec<String>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -79,12 +83,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     output::make_folder(out)?;
     let (mut rows, mut text) = (Vec::new(), String::new());
     if arguments.part != Part::Model {
-        let measured = simulator(arguments.largest as usize)?;
+        let measured = simulator(arguments.largest as usize, &arguments.stage)?;
         plot::draw(&out.join("frontier.svg"), &plot::SIMULATOR, &measured)?;
         text += &table(&measured);
         for row in measured {
             rows.push(serde_json::to_value(row)?);
         }
+    }
+    let all = arguments.stage.is_empty();
+    if all && arguments.part != Part::Model {
         let bar = progress::bar(spacing::COUNT, "rows of the spacing");
         let measured = spacing::measure(|| bar.inc(1))?;
         bar.finish_and_clear();
@@ -94,7 +101,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         }
     }
     #[cfg(feature = "ldm")]
-    if arguments.part != Part::Simulator {
+    if all && arguments.part != Part::Simulator {
         let bar = progress::bar(model::PARTS as u64, "rows of the model");
         let measured = model::measure(|| bar.inc(1))?;
         bar.finish_and_clear();
@@ -122,8 +129,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The rows of the simulator.
-fn simulator(largest: usize) -> wake_physics::Result<Vec<Row>> {
+/// The rows of some stages of the simulator, of all where none is named.
+fn simulator(largest: usize, stages: &[String]) -> wake_physics::Result<Vec<Row>> {
     let mut cases: Vec<(usize, f64)> = TOLERANCES.map(|t| (plot::FRONTIER_SIZE, t)).to_vec();
     let sizes = SIZES.into_iter().filter(|&n| n <= largest);
     cases.extend(
@@ -133,9 +140,12 @@ fn simulator(largest: usize) -> wake_physics::Result<Vec<Row>> {
     );
     let bar = progress::bar((cases.len() * STAGES.len()) as u64, "rows of the simulator");
     let (mut rows, mut memo) = (Vec::new(), Memo::default());
-    for stage in STAGES {
+    let named = |stage: &&str| stages.is_empty() || stages.iter().any(|named| named == stage);
+    for stage in STAGES.into_iter().filter(named) {
         for &(size, tolerance) in &cases {
-            rows.push(measure(stage, size, tolerance, &mut memo)?);
+            if has_tolerance(stage) || tolerance == DEFAULT_TOLERANCE {
+                rows.push(measure(stage, size, tolerance, &mut memo)?);
+            }
             bar.inc(1);
         }
     }
@@ -160,14 +170,14 @@ fn table(rows: &[Row]) -> String {
         row::instruction_set()
     );
     for r in rows {
+        let tolerance = r.tolerance.map_or(String::new(), |t| format!("{t:.0e}"));
         let product = r
             .matrix_product_seconds
             .map_or(String::new(), |s| figures(1e3 * s));
         text += &format!(
-            "| {} | {} | {:.0e} | {} | {}{} | {product} | {} | {} | {:.1e} | {:.1e} |\n",
+            "| {} | {} | {tolerance} | {} | {}{} | {product} | {} | {} | {:.1e} | {:.1e} |\n",
             r.stage,
             r.size,
-            r.tolerance.unwrap_or_default(),
             figures(1e3 * r.fast_seconds),
             figures(r.oracle_seconds),
             if r.extrapolated() { "*" } else { "" },

@@ -1,6 +1,7 @@
 //! The stages: each with its fast method, its oracle and what their difference is measured against.
 
 use crate::row::{Errors, Row, median_seconds, seconds};
+use crate::satellite;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
@@ -20,25 +21,40 @@ use wake_physics::{
 };
 
 /// Stages in the order of the data flow.
-pub(crate) const STAGES: [&str; 5] = ["sea", "kelvin", "backscatter", "bunching", "scene"];
+pub(crate) const STAGES: [&str; 9] = [
+    "sea",
+    "swell",
+    "kelvin",
+    "edge",
+    "unresolved",
+    "backscatter",
+    "bunching",
+    "response",
+    "scene",
+];
+
+/// Whether the method of a stage has a tolerance; the others are measured once a size.
+pub(crate) fn has_tolerance(stage: &str) -> bool {
+    !["edge", "response"].contains(&stage)
+}
 
 /// Waves of sea and wake: the paper's scale.
 const WAVES: usize = 10_000;
 /// Pixels of the oracle where the whole raster takes too long.
 const SAMPLE: usize = 4_096;
 /// Pixels of the quadrature of σ⁰, which takes a millisecond each.
-const QUADRATURES: usize = 1_024;
+pub(crate) const QUADRATURES: usize = 1_024;
 /// Largest raster, as pixels along a side, on which the oracles run whole.
 const WHOLE: usize = 128;
 /// Runs of a fast method, and of a short matrix product.
-const RUNS: usize = 5;
+pub(crate) const RUNS: usize = 5;
 /// Rows of a matrix product on a large raster, scaled up.
 const PRODUCT_ROWS: usize = 48;
 /// Incidence of the default scene [rad].
 const INCIDENCE: f64 = 32.0 * std::f64::consts::PI / 180.0;
 
 /// The six fields of surface and velocity.
-const QUANTITIES: [Quantity; 6] = [
+pub(crate) const QUANTITIES: [Quantity; 6] = [
     Quantity::Elevation,
     Quantity::SlopeX,
     Quantity::SlopeY,
@@ -47,7 +63,7 @@ const QUANTITIES: [Quantity; 6] = [
     Quantity::VelocityZ,
 ];
 
-const TRANSFER: Transfer = Transfer {
+pub(crate) const TRANSFER: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: INCIDENCE,
     relaxation_rate: 1.7,
@@ -67,6 +83,10 @@ pub(crate) fn measure(
         "kelvin" => kelvin(&raster, tolerance),
         "backscatter" => backscatter(&raster, tolerance, memo),
         "bunching" => bunching(&raster, tolerance),
+        "swell" => satellite::swell(&raster, tolerance),
+        "edge" => satellite::edge(size),
+        "unresolved" => satellite::unresolved(&raster, tolerance, memo),
+        "response" => satellite::response(size),
         _ => return scene(size, tolerance, memo),
     })
 }
@@ -83,7 +103,7 @@ fn spectrum() -> DirectionalSpectrum {
     })
 }
 
-fn wake() -> KelvinWake {
+pub(crate) fn wake() -> KelvinWake {
     KelvinWake {
         hull: Hull::wigley(195.0, 26.0, 10.0),
         speed: 10.0,
@@ -112,7 +132,7 @@ fn kelvin(raster: &Raster, tolerance: f64) -> Row {
 }
 
 /// A sum of plane waves against the harmonic sum and the matrix product.
-fn sum(
+pub(crate) fn sum(
     stage: &'static str,
     raster: &Raster,
     tolerance: f64,
@@ -135,7 +155,7 @@ fn sum(
         ..row(
             stage,
             raster,
-            tolerance,
+            Some(tolerance),
             fast_seconds,
             (oracle * scale, pixels.len()),
             errors,
@@ -163,14 +183,14 @@ fn pixels(raster: &Raster) -> (Vec<[usize; 2]>, f64) {
 }
 
 /// Random pixels of a raster.
-fn sample(raster: &Raster, count: usize) -> Vec<[usize; 2]> {
+pub(crate) fn sample(raster: &Raster, count: usize) -> Vec<[usize; 2]> {
     let mut random = StdRng::seed_from_u64(1);
     let mut one = || [raster.rows, raster.columns].map(|n| random.random_range(0..n));
     (0..count).map(|_| one()).collect()
 }
 
 /// Surface and wake together: slopes, and what the imaging needs.
-fn fields(raster: &Raster, quantities: &[Quantity]) -> Vec<Field> {
+pub(crate) fn fields(raster: &Raster, quantities: &[Quantity]) -> Vec<Field> {
     let mut fields = Surface::new(&spectrum(), 7, 0.0, raster).fields(&TRANSFER, quantities, 1e-4);
     let wake = wake();
     let waves = wake.waves(&wake.plan(raster, 1e-4));
@@ -184,7 +204,7 @@ fn fields(raster: &Raster, quantities: &[Quantity]) -> Vec<Field> {
     fields
 }
 
-fn backscatter_model(spacing: f64) -> Backscatter {
+pub(crate) fn backscatter_model(spacing: f64) -> Backscatter {
     let scene = Scene::default();
     let wavenumber = std::f64::consts::TAU * scene.radar.frequency / 299_792_458.0;
     let epsilon = permittivity::sea_water(scene.radar.frequency, 20.0, 35.0);
@@ -209,24 +229,17 @@ fn backscatter_model(spacing: f64) -> Backscatter {
 /// Table over slopes, built anew each time, against quadrature at each pixel.
 fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
     let slopes = fields(raster, &[Quantity::SlopeX, Quantity::SlopeY]);
-    let facets = FacetFields {
-        slope_x: &slopes[0],
-        slope_y: &slopes[1],
-        modulation: None,
-        damping: None,
-        unresolved: None,
-    };
+    let facets = FacetFields::of_slopes(&slopes[0], &slopes[1]);
     let model = backscatter_model(raster.spacing);
     let mean: f64 = model.parts([0.0, 0.0]).iter().sum();
     let (fast_seconds, sigma0) = median_seconds(RUNS, || {
-        let table =
-            BackscatterTable::covering(model.clone(), &slopes[0], &slopes[1], tolerance * mean);
+        let table = BackscatterTable::covering(model.clone(), &facets, tolerance * mean);
         table.sigma0_field(&facets)
     });
     // A sample on every raster, and the same for every tolerance.
     let pixels = sample(raster, QUADRATURES);
     let scale = raster.len() as f64 / pixels.len() as f64;
-    let oracle = memo.at_size(raster.rows, || {
+    let oracle = memo.at_size("backscatter", raster.rows, || {
         let (seconds, exact) = seconds(|| model.sigma0_pixels(&facets, &pixels));
         (seconds, exact.into_iter().map(f64::from).collect())
     });
@@ -235,7 +248,7 @@ fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
     row(
         "backscatter",
         raster,
-        tolerance,
+        Some(tolerance),
         fast_seconds,
         (oracle.0 * scale, pixels.len()),
         errors,
@@ -288,7 +301,7 @@ fn bunching(raster: &Raster, tolerance: f64) -> Row {
     row(
         "bunching",
         raster,
-        tolerance,
+        Some(tolerance),
         fast_seconds,
         (oracle * scale, pixels.len()),
         errors,
@@ -319,7 +332,7 @@ fn scene(size: usize, tolerance: f64, memo: &mut Memo) -> wake_physics::Result<R
     Ok(row(
         "scene",
         &raster,
-        tolerance,
+        Some(tolerance),
         fast_seconds,
         oracle,
         errors,
@@ -331,27 +344,32 @@ fn scene_pixels(size: usize) -> usize {
     ((1 << 23) / (size * size).max(1 << 18)).max(4)
 }
 
+/// Seconds of an oracle, and its values.
+type Exact = (f64, Vec<f64>);
+
 /// What several rows share, because it is slow.
 #[derive(Default)]
 pub(crate) struct Memo {
-    /// Seconds and exact σ⁰ of the sample, by size.
-    backscatter: Vec<(usize, (f64, Vec<f64>))>,
+    /// Seconds and exact σ⁰ of the sample, by stage and size.
+    backscatter: Vec<(&'static str, usize, Exact)>,
     /// Pixels of the scene by the oracles, by size.
     scene: Vec<(usize, DirectPixels)>,
 }
 
 impl Memo {
-    fn at_size(
+    pub(crate) fn at_size(
         &mut self,
+        stage: &'static str,
         size: usize,
-        compute: impl FnOnce() -> (f64, Vec<f64>),
-    ) -> &(f64, Vec<f64>) {
-        let known = self.backscatter.iter().position(|(s, _)| *s == size);
+        compute: impl FnOnce() -> Exact,
+    ) -> &Exact {
+        let mut known = self.backscatter.iter();
+        let known = known.position(|known| (known.0, known.1) == (stage, size));
         let index = known.unwrap_or_else(|| {
-            self.backscatter.push((size, compute()));
+            self.backscatter.push((stage, size, compute()));
             self.backscatter.len() - 1
         });
-        &self.backscatter[index].1
+        &self.backscatter[index].2
     }
 
     fn scene_at(
@@ -374,10 +392,10 @@ impl Memo {
 /// Tolerance of the direct simulation: its nodes of the wake stand for all others, and it leaves out no term.
 const STRICTEST: f64 = 1e-6;
 
-fn row(
+pub(crate) fn row(
     stage: &'static str,
     raster: &Raster,
-    tolerance: f64,
+    tolerance: Option<f64>,
     fast_seconds: f64,
     (oracle_seconds, pixels): (f64, usize),
     errors: Errors,
@@ -385,7 +403,7 @@ fn row(
     Row {
         stage,
         size: raster.rows,
-        tolerance: Some(tolerance),
+        tolerance,
         fast_seconds,
         oracle_seconds,
         pixels,

@@ -4,42 +4,50 @@
 //! of a simulation. Nothing here changes a result: what is taken has any content, and its user overwrites it.
 
 use crate::raster::{Field, Raster};
-use num_complex::{Complex32, Complex64};
+use num_complex::{Complex, Complex32, Complex64};
+use rayon::iter::ParallelIterator;
 use rustfft::FftPlanner;
 
 /// Blocks of values, kept to be taken again.
 #[derive(Debug)]
-pub(crate) struct Shelf<T>(Vec<Vec<T>>);
-
-impl<T> Default for Shelf<T> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
+pub(crate) struct Shelf<T> {
+    blocks: Vec<Vec<T>>,
+    /// Makes a block of zeros.
+    fresh: fn(usize) -> Vec<T>,
 }
 
-impl<T: Copy> Shelf<T> {
-    /// `len` values of any content; where new ones are needed they are `fill`.
-    pub(crate) fn take(&mut self, len: usize, fill: T) -> Vec<T> {
+impl<T: Copy + Default> Shelf<T> {
+    fn new(fresh: fn(usize) -> Vec<T>) -> Self {
+        Self {
+            blocks: Vec::new(),
+            fresh,
+        }
+    }
+
+    /// `len` values of any content.
+    pub(crate) fn take(&mut self, len: usize) -> Vec<T> {
+        let blocks = &mut self.blocks;
         let fits = |block: &Vec<T>| block.capacity() >= len;
         // The smallest that fits; where none does, the largest makes room for a new one.
-        let order = |&n: &usize| (!fits(&self.0[n]), self.0[n].capacity().abs_diff(len));
-        let block = (0..self.0.len()).min_by_key(order);
-        let mut block = match block.map(|n| self.0.swap_remove(n)) {
-            Some(block) if block.capacity() >= len => block,
-            _ => return vec![fill; len],
-        };
-        block.resize(len, fill);
-        block
+        let order = |&n: &usize| (!fits(&blocks[n]), blocks[n].capacity().abs_diff(len));
+        let block = (0..blocks.len()).min_by_key(order);
+        match block.map(|n| blocks.swap_remove(n)) {
+            Some(mut block) if block.capacity() >= len => {
+                block.resize(len, T::default());
+                block
+            }
+            _ => (self.fresh)(len),
+        }
     }
 
     fn len(&self) -> usize {
-        self.0.len()
+        self.blocks.len()
     }
 
     /// Puts a block back.
     pub(crate) fn give(&mut self, block: Vec<T>) {
         if block.capacity() > 0 {
-            self.0.push(block);
+            self.blocks.push(block);
         }
     }
 }
@@ -57,8 +65,13 @@ pub(crate) struct Workspace {
 impl Default for Workspace {
     fn default() -> Self {
         Self {
-            floats: Shelf::default(),
-            spectra: (Shelf::default(), Shelf::default()),
+            // The system's own zeros, whose pages come when a stage first writes to them, on all threads.
+            floats: Shelf::new(|len| vec![0.0; len]),
+            // Zeros of a compound type are written one by one: by all threads.
+            spectra: (
+                Shelf::new(|len| rayon::iter::repeat_n(Complex::default(), len).collect()),
+                Shelf::new(|len| rayon::iter::repeat_n(Complex::default(), len).collect()),
+            ),
             planners: (FftPlanner::new(), FftPlanner::new()),
         }
     }
@@ -80,7 +93,7 @@ impl Workspace {
         Field {
             rows: raster.rows,
             columns: raster.columns,
-            values: self.floats.take(raster.len(), 0.0),
+            values: self.floats.take(raster.len()),
         }
     }
 
@@ -104,19 +117,19 @@ mod tests {
     /// The block that fits best is taken, and there are never more than were out at once.
     #[test]
     fn blocks_are_used_again() {
-        let mut shelf = Shelf::default();
+        let mut shelf = Shelf::new(|len| vec![7u8; len]);
         let (small, large) = (vec![1u8; 10], vec![2u8; 100]);
         let places = [small.as_ptr(), large.as_ptr()];
         shelf.give(large);
         shelf.give(small);
-        let nine = shelf.take(9, 0);
+        let nine = shelf.take(9);
         assert_eq!((nine.as_ptr(), nine.len()), (places[0], 9));
         shelf.give(nine);
-        let eleven = shelf.take(11, 0);
+        let eleven = shelf.take(11);
         assert_eq!((eleven.as_ptr(), eleven.len()), (places[1], 11));
         shelf.give(eleven);
         // None fits: the large one is dropped for a larger one.
-        let block = shelf.take(1000, 7);
+        let block = shelf.take(1000);
         assert_eq!(block, vec![7; 1000]);
         shelf.give(block);
         assert_eq!(shelf.len(), 2);

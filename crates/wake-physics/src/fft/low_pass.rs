@@ -5,6 +5,7 @@ use num_complex::Complex32;
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Rows worked on at once: as many as share the cache lines of a transposed column.
@@ -163,8 +164,10 @@ impl LowPass {
                         row.fill(Complex32::ZERO);
                         fill(n * BLOCK + i, row);
                         transform.process_with_scratch(row, scratch);
-                        for (b, &weight) in band.0.iter().enumerate() {
-                            block[b * BLOCK + i] = row[place(b, count, columns)] * weight;
+                        let [below, above] = entries(count, columns);
+                        let values = row[below].iter().chain(&row[above]);
+                        for ((b, &weight), value) in band.0.iter().enumerate().zip(values) {
+                            block[b * BLOCK + i] = value * weight;
                         }
                     }
                 },
@@ -184,6 +187,7 @@ impl LowPass {
         let count = self.bands[1].0.len();
         let keep = window.keep[0];
         let shift = self.shifts(0, window.start[0]);
+        let points: Vec<PointSpectrum> = points.iter().map(|p| self.spectrum(p)).collect();
         let mut lines = vec![Complex32::ZERO; count * keep];
         lines.par_chunks_mut(keep).enumerate().for_each_init(
             || {
@@ -201,7 +205,7 @@ impl LowPass {
                     rows.copy_from_slice(values);
                 }
                 analysis.process_with_scratch(line, &mut scratch[0]);
-                self.add_points(b, points, line);
+                self.add_points(b, &points, line);
                 fold(line, &shift, short);
                 synthesis.process_with_scratch(short, &mut scratch[1]);
                 for (kept, value) in kept.iter_mut().zip(&*short) {
@@ -265,28 +269,52 @@ impl LowPass {
             .collect()
     }
 
-    /// Adds the spectrum of the points to line `b` of the band.
-    fn add_points(&self, b: usize, points: &[Point], line: &mut [Complex32]) {
-        let [rows, columns] = self.sizes;
-        let weight = self.bands[1].0[b];
-        let across = b as f64 - self.bands[1].highest() as f64;
-        let [count, highest] = [self.bands[0].0.len(), self.bands[0].highest()];
-        for point in points {
-            let turn = |frequency: f64, place: f64, size: usize| {
-                let (sin, cos) = (-TAU * (frequency * place / size as f64).fract()).sin_cos();
-                num_complex::Complex64::new(cos, sin)
-            };
-            let step = turn(1.0, point.place[0], rows);
-            let amplitude = point.amplitude * weight;
-            let mut value = num_complex::Complex64::new(amplitude.re.into(), amplitude.im.into())
-                * turn(across, point.place[1], columns)
-                * turn(-(highest as f64), point.place[0], rows);
-            for a in 0..count {
-                line[place(a, count, rows)] += Complex32::new(value.re as f32, value.im as f32);
-                value *= step;
-            }
+    /// The spectrum of a point: its factors of the frequencies of rows, and of columns with the amplitude and their weights.
+    fn spectrum(&self, point: &Point) -> PointSpectrum {
+        let turns = |axis: usize| {
+            let (band, size) = (&self.bands[axis], self.sizes[axis] as f64);
+            let highest = band.highest() as f64;
+            (0..band.0.len()).map(move |b| {
+                let turn = -TAU * ((b as f64 - highest) * point.place[axis] / size).fract();
+                let (sin, cos) = turn.sin_cos();
+                Complex32::new(cos as f32, sin as f32)
+            })
+        };
+        let columns = turns(1).zip(&self.bands[1].0);
+        PointSpectrum {
+            rows: turns(0).collect(),
+            columns: columns.map(|(t, &w)| point.amplitude * w * t).collect(),
         }
     }
+
+    /// Adds the spectra of the points to line `b` of the band.
+    fn add_points(&self, b: usize, points: &[PointSpectrum], line: &mut [Complex32]) {
+        let count = self.bands[0].0.len();
+        let [below, above] = entries(count, self.sizes[0]);
+        let split = below.len();
+        for point in points {
+            let amplitude = point.columns[b];
+            let mut add = |entries: Range<usize>, factors: &[Complex32]| {
+                for (value, factor) in line[entries].iter_mut().zip(factors) {
+                    *value += amplitude * factor;
+                }
+            };
+            add(below.clone(), &point.rows[..split]);
+            add(above.clone(), &point.rows[split..]);
+        }
+    }
+}
+
+/// Factors of the frequencies of the bands of rows and of columns.
+struct PointSpectrum {
+    rows: Vec<Complex32>,
+    columns: Vec<Complex32>,
+}
+
+/// Places in an FFT of `size` values of a band of `count`: of the negative frequencies, and of the others.
+fn entries(count: usize, size: usize) -> [Range<usize>; 2] {
+    let below = count / 2;
+    [size - below..size, 0..count - below]
 }
 
 /// Place in an FFT of `size` values of entry `entry` of a band of `count`.

@@ -29,7 +29,7 @@ use std::sync::Arc;
 const BLOCK: usize = 16;
 
 /// The two precisions a transform can run in; fields are `f32` either way.
-pub(crate) trait Real: FftNum {
+pub(crate) trait Real: FftNum + Default {
     /// Rounds to `f32`.
     fn to_f32(self) -> f32;
     /// Rounds from `f64`.

@@ -169,7 +169,7 @@ impl<'a> CentredSums<'a> {
         let mut fields = [(); 2].map(|()| workspace.field(self.raster));
         let (blocks, planner) = T::of(workspace);
         let synthesis = Synthesis::<T>::planned(planner, rows, columns);
-        let mut lattice = blocks.take(rows * columns, Complex::new(T::zero(), T::zero()));
+        let mut lattice = blocks.take(rows * columns);
         let correct = |pixels, lattice| -> Vec<T> {
             let factors = gridding.kernel.correction(pixels, lattice);
             factors.into_iter().map(<T as Real>::from_f64).collect()

@@ -38,6 +38,15 @@ impl SlopeLattice {
         }
     }
 
+    /// Coordinates of node `n`, counted as the values are.
+    pub(crate) fn place(&self, n: usize) -> [f64; 2] {
+        let [i, j] = [n % self.nodes[0], n / self.nodes[0]];
+        [
+            self.start[0] + self.step * i as f64,
+            self.start[1] + self.step * j as f64,
+        ]
+    }
+
     /// Every other node of both coordinates, from the first.
     pub(crate) fn every_other(&self) -> Self {
         let nodes = self.nodes.map(|n| n.div_ceil(2));

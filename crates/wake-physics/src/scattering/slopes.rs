@@ -97,8 +97,17 @@ impl SlopeCovariance {
     pub(crate) fn principal_axes(&self) -> PrincipalAxes {
         let mean = 0.5 * (self.xx + self.yy);
         let half = 0.5 * (self.xx - self.yy);
-        let radius = half.hypot(self.xy);
-        let (sin, cos) = (0.5 * self.xy.atan2(half)).sin_cos();
+        let radius = (half * half + self.xy * self.xy).sqrt();
+        // Half the angle whose cosine is half/radius and whose sine xy/radius; the larger of both from a root.
+        let larger = (0.5 + 0.5 * half.abs() / radius).sqrt();
+        let smaller = 0.5 * self.xy / (radius * larger);
+        let [cos, sin] = if radius <= 0.0 {
+            [1.0, 0.0]
+        } else if half >= 0.0 {
+            [larger, smaller]
+        } else {
+            [smaller.abs(), larger.copysign(self.xy)]
+        };
         PrincipalAxes {
             axis: [cos, sin],
             variance: [mean + radius, (mean - radius).max(0.0)],
@@ -173,47 +182,6 @@ pub(crate) fn gaussian_nodes(std: f64, step: f64) -> Vec<[f64; 2]> {
             [z_n * std, weight]
         })
         .collect()
-}
-
-/// Nodes and weights of the mean over a unit Gaussian, exact to the 17th power: the zeros of the ninth Hermite polynomial.
-const HERMITE_9: [[f64; 2]; 9] = [
-    [-4.512745863399783, 2.2345844007746566e-5],
-    [-3.2054290028564703, 0.002789141321231764],
-    [-2.07684797867783, 0.04991640676521786],
-    [-1.0232556637891324, 0.24409750289493937],
-    [0.0, 0.40634920634920635],
-    [1.0232556637891324, 0.24409750289493937],
-    [2.07684797867783, 0.04991640676521786],
-    [3.2054290028564703, 0.002789141321231764],
-    [4.512745863399783, 2.2345844007746566e-5],
-];
-
-impl SlopeCovariance {
-    /// The mean of a smooth function over slopes of this covariance around one, on nine nodes along each axis that has any.
-    #[inline(always)]
-    pub(crate) fn mean_around(&self, slope: [f64; 2], function: impl Fn([f64; 2]) -> f64) -> f64 {
-        let axes = self.principal_axes();
-        let deviation = axes.variance.map(f64::sqrt);
-        // One wave alone has slopes along one axis: what rounding leaves along the other is none.
-        let across: &[[f64; 2]] = if axes.variance[1] > 1e-5 * axes.variance[0] {
-            &HERMITE_9
-        } else {
-            &[[0.0, 1.0]]
-        };
-        let mut sum = 0.0;
-        for [v, weight_v] in across {
-            for [u, weight_u] in HERMITE_9 {
-                let [dx, dy] = axes.slope([u * deviation[0], v * deviation[1]]);
-                sum += weight_u * weight_v * function([slope[0] + dx, slope[1] + dy]);
-            }
-        }
-        sum
-    }
-
-    /// The farthest node of [`Self::mean_around`] from its middle, at most, for slopes of a variance in all.
-    pub(crate) fn reach(variance: f64) -> f64 {
-        HERMITE_9[8][0] * variance.sqrt()
-    }
 }
 
 #[cfg(test)]

@@ -82,10 +82,8 @@ impl Stages<'_> {
             return backscatter.sigma0_field(&facets);
         }
         let asked = SHARES.table * self.scene.model.tolerance;
-        let slopes = [facets.slope_x, facets.slope_y];
-        let reach = facets.reach();
         let table_for = |last, mean: f64| {
-            BackscatterTable::covering_or(last, backscatter.clone(), (slopes, reach), asked * mean)
+            BackscatterTable::covering_or(last, backscatter.clone(), &facets, asked * mean)
         };
         let mut sigma0 = workspace.field(&self.raster);
         let mut table = table_for(last_table.take(), LOWEST_MEAN * self.plan.mean_sigma0);

@@ -96,7 +96,7 @@ fn put(workspace: &mut Workspace, into: &mut Field, [rows, all]: [Range<usize>; 
         *into = Field {
             rows: all.len(),
             columns,
-            values: workspace.floats.take(all.len() * columns, 0.0),
+            values: workspace.floats.take(all.len() * columns),
         };
     }
     let to = rows.start * columns..rows.end * columns;

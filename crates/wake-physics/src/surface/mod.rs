@@ -142,7 +142,7 @@ impl Surface {
         let band = spectrum.moments(0.0, lattice.cutoff(), 0.0).elevation;
         let ([even, odd], carried) = if band > 0.0 {
             let len = lattice.lines() * lattice.rows;
-            let parts = [(); 2].map(|()| workspace.spectra.0.take(len, Complex32::ZERO));
+            let parts = [(); 2].map(|()| workspace.spectra.0.take(len));
             Draw::new(spectrum, lattice, raster, seed_and_time, scatter).run(parts)
         } else {
             ([Vec::new(), Vec::new()], 0.0)
@@ -313,15 +313,14 @@ impl Surface {
     ) {
         let columns = self.raster.columns;
         let mut unused = if quantities.len() % 2 == 1 {
-            workspace.floats.take(rows.len() * columns, 0.0)
+            workspace.floats.take(rows.len() * columns)
         } else {
             Vec::new()
         };
         let (blocks, planner) = T::of(workspace);
         let plan = Synthesis::<T>::planned(planner, self.lattice.rows, self.lattice.columns);
         let factors = Factors::new(&self.lattice, transfer);
-        let zero = Complex::new(T::zero(), T::zero());
-        let mut half = blocks.take(plan.half_len(rows.len()), zero);
+        let mut half = blocks.take(plan.half_len(rows.len()));
         for (pair, quantities) in fields.chunks_mut(2).zip(quantities.chunks(2)) {
             let out = match pair {
                 [first, second] => (&mut first.values[..], &mut second.values[..]),

@@ -172,8 +172,12 @@ impl WakeEdge {
         (-forward - 0.5 * self.length).max(0.0)
     }
 
-    /// Multiplies σ⁰ with the factor.
-    pub(crate) fn modulate(&self, sigma0: &mut Field, raster: &Raster) {
+    /// Multiplies σ⁰ with the factor, as far as [`Self::factor`] differs from 1 by more than 2e-8 of its largest change.
+    ///
+    /// # Panics
+    ///
+    /// If the field is smaller than the raster.
+    pub fn modulate(&self, sigma0: &mut Field, raster: &Raster) {
         self.change(sigma0, raster, |value, seen| {
             *value *= self.factor(seen) as f32;
         });

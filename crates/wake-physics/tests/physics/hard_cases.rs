@@ -1,6 +1,6 @@
 //! Cases at the edge of what a scene may be: a right answer, never NaN, a hang or garbage.
 
-use crate::{assert_sound, open_sea, run, small};
+use crate::{assert_sound, open_sea, run, small, wind_sea};
 use proptest::prelude::*;
 use wake_physics::scene::Term;
 use wake_physics::{Error, Scene, simulate};
@@ -70,16 +70,41 @@ fn every_corner_of_a_scene_is_sound() {
             let scene = small(40, 36, case)
                 .with_assignments(&[format!("model.terms={terms}")])
                 .unwrap();
-            assert_sound(&run(&scene), &format!("{case:?} {terms}"));
+            let simulation = run(&scene);
+            assert_sound(&simulation, &format!("{case:?} {terms}"));
+            // A wind that makes short waves makes an image.
+            let returns = scene.sea.wind_speed >= 5.0;
+            assert!(!returns || simulation.speckled.mean() > 0.0, "{case:?}");
         }
     }
 }
 
+/// Even, odd, prime and of one pixel: sound, and without a sea the pixel at the origin shows the same wake. Two fields differ
+/// by a quarter of the tolerance (nodes and sums) of the root mean square of each, over margins nearer to the ship as well:
+/// twice that of the largest image is allowed for them.
 #[test]
 fn every_shape_of_a_grid_is_sound() {
-    for (rows, columns) in [(1, 1), (1, 97), (97, 1), (2, 3), (31, 64), (127, 101)] {
+    let wake = ["ship.position=[150, 200]", "model.terms=[\"kelvin\"]"];
+    let [first, others @ ..] = [(127, 101), (1, 1), (1, 97), (97, 1), (2, 3), (31, 64)];
+    let of = |(rows, columns): (usize, usize)| run(&small(rows, columns, &wake));
+    let large = of(first);
+    assert_sound(&run(&small(first.0, first.1, &[])), "127 x 101");
+    for (rows, columns) in others {
         let simulation = run(&small(rows, columns, &[]));
         assert_sound(&simulation, &format!("{rows} x {columns}"));
+        let simulation = of((rows, columns));
+        let fields = large
+            .named_fields()
+            .into_iter()
+            .zip(simulation.named_fields());
+        for ((name, expected), (_, field)) in fields.take(6) {
+            let value = field.at(rows / 2, columns / 2);
+            let far = f64::from(value - expected.at(63, 50)).abs();
+            assert!(
+                far < 1e-3 * expected.rms(),
+                "{rows} x {columns} {name}: {far}"
+            );
+        }
     }
 }
 
@@ -102,25 +127,39 @@ fn no_wind_is_a_flat_sea() {
     assert!(wake.elevation.rms() > 0.01);
 }
 
-/// A ship that is far away leaves no wake here, nor does anything lie ahead of the bow.
+/// Ahead of the bow lies no wave.
 #[test]
 fn ahead_of_the_ship_there_is_no_wake() {
-    for position in ["[1e6, 0]", "[-400, 0]"] {
-        let assignments = [
-            "sea.wind_speed=0".to_owned(),
-            format!("ship.position={position}"),
-            format!("ship.heading={}", 90),
+    let keys = [
+        "sea.wind_speed=0",
+        "ship.position=[-400, 0]",
+        "ship.heading=90",
+    ];
+    let simulation = run(&small(48, 48, &keys));
+    assert_sound(&simulation, "ahead of the bow");
+    assert_eq!(simulation.elevation.rms(), 0.0);
+}
+
+/// 100 and 1,000 km astern on the track only the transverse waves are carried, of the frequency g/U: the square of their
+/// amplitude, ζ² + (w U/g)², falls as 1/d. Bow and stern are 97 m nearer and farther, a thousandth of the distance, which
+/// counts up to ten times where their waves nearly cancel.
+#[test]
+fn a_wake_far_astern_falls_by_stationary_phase() {
+    let square = |distance: f64| {
+        let keys = [
+            "model.terms=[\"kelvin\"]",
+            "ship.heading=90",
+            &format!("ship.position=[{distance}, 0]"),
         ];
-        let refs: Vec<&str> = assignments.iter().map(String::as_str).collect();
-        let simulation = run(&small(48, 48, &refs));
-        let rms = simulation.elevation.rms();
-        if position.starts_with("[-") {
-            assert_eq!(rms, 0.0, "the image lies ahead of the bow");
-        } else {
-            assert!(rms.is_finite());
-        }
-        assert_sound(&simulation, position);
-    }
+        let simulation = run(&small(48, 48, &keys));
+        let pairs = simulation.elevation.values.iter();
+        let pairs = pairs.zip(&simulation.velocity_z.values);
+        let per_frequency = 10.0f32 / 9.80665;
+        let square = |(z, w): (&f32, &f32)| z * z + (w * per_frequency).powi(2);
+        pairs.map(|pair| f64::from(square(pair))).sum::<f64>()
+    };
+    let ratio = square(1e5) / square(1e6);
+    assert!((ratio - 10.0).abs() < 0.1, "{ratio}");
 }
 
 #[test]
@@ -132,6 +171,7 @@ fn the_same_scene_twice_is_the_same_image() {
     }
     let other = run(&scene.with_assignments(&["seed=8"]).unwrap());
     assert_ne!(other.speckled, a.speckled);
+    assert_ne!(other.elevation, a.elevation);
 }
 
 /// One thread, two threads: the same bits.
@@ -151,17 +191,37 @@ fn threads_change_nothing() {
     }
 }
 
-/// 4096 × 4096 pixels: sound, with the variance of the sea and the wake where the small image has it.
+/// 4096 × 4096 pixels: sound, and the sea has the variance of its spectrum, within four standard errors as 64 squares of
+/// 1.28 km, each far longer than a wave, tell them; so small that half a hundredth of the variance would be missed.
 #[test]
 fn the_largest_common_grid_is_sound() {
     let scene = small(4096, 4096, &[]);
     let large = run(&scene);
     assert_sound(&large, "4096 x 4096");
-    // Over (10 km)² the sea is its own mean: some 10⁴ independent patches of a 10 m wave, twenty of the swell's.
-    let sea = run(&open_sea(scene));
-    let share = sea.elevation.rms() / run(&open_sea(small(512, 512, &[]))).elevation.rms();
-    assert!((share - 1.0).abs() < 0.05, "{share}");
-    assert!(large.elevation.rms() > sea.elevation.rms());
+    let sea = run(&open_sea(scene.clone())).elevation;
+    assert!(large.elevation.rms() > sea.rms());
+    let mut squares = [0.0; 64];
+    for (n, value) in sea.values.iter().enumerate() {
+        let (row, column) = (n / 4096 / 512, n % 4096 / 512);
+        squares[8 * row + column] += f64::from(*value).powi(2) / f64::from(512 * 512);
+    }
+    let band = std::f64::consts::PI / scene.grid.spacing;
+    let expected = wind_sea(&scene).moments(0.0, band, 0.5).elevation;
+    assert_mean(&squares, expected, 0.005, "4096 x 4096");
+}
+
+/// The mean of independent values is the expected one within four of their standard errors, which are below a share of it.
+fn assert_mean(values: &[f64], expected: f64, sharp: f64, what: &str) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let spread: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    let error = (spread / (count * (count - 1.0))).sqrt();
+    println!("{what}: {mean} {expected} {error}");
+    assert!(4.0 * error < sharp * expected, "{what}: {error}");
+    assert!(
+        (mean - expected).abs() < 4.0 * error,
+        "{what}: {mean} {expected} {error}"
+    );
 }
 
 #[test]
@@ -273,13 +333,10 @@ proptest! {
     }
 }
 
-/// Mean square elevation over seeds against the integral of the spectrum over the resolved band.
-///
-/// Four standard errors, estimated from the seeds themselves, are allowed; they must be small enough for a lost factor of
-/// 2, or of 3/2, to be seen.
+/// Mean square elevation and slopes over seeds against the integrals of the spectrum over the resolved band: a factor of 1.02
+/// is seen.
 #[test]
 fn the_variance_is_what_the_spectrum_says() {
-    use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
     for (wind, spacing, spectrum) in [
         (3.0, 1.0, "elfouhaily"),
         (7.0, 2.5, "jonswap"),
@@ -290,48 +347,35 @@ fn the_variance_is_what_the_spectrum_says() {
             240,
             &[
                 &format!("sea.wind_speed={wind}"),
+                "sea.wind_toward=60",
                 &format!("grid.spacing={spacing}"),
                 &format!("sea.spectrum={spectrum}"),
                 "model.terms=[\"sea\"]",
             ],
         ));
-        let count = 24;
-        let squares: Vec<f64> = (0..count)
+        let squares: Vec<[f64; 3]> = (0..24)
             .map(|seed| {
                 let sea = run(&Scene {
                     seed,
                     ..scene.clone()
                 });
-                sea.elevation.rms().powi(2)
+                [&sea.elevation, &sea.slope_x, &sea.slope_y].map(|f| f.rms().powi(2))
             })
             .collect();
-        let sea = WindSea {
-            wind_speed: wind,
-            wind_toward: scene.sea.wind_toward.to_radians(),
-            fetch: scene.sea.fetch,
-            depth: scene.sea.depth,
-            spectrum: scene.sea.spectrum,
-            spreading: scene.sea.spreading,
-        };
-        let band = std::f64::consts::PI / spacing;
-        let expected = DirectionalSpectrum::new(&sea)
-            .moments(0.0, band, 0.5)
-            .elevation;
-        let mean = squares.iter().sum::<f64>() / count as f64;
-        let spread: f64 = squares.iter().map(|v| (v - mean).powi(2)).sum();
-        let error = (spread / (count * (count - 1)) as f64).sqrt();
-        println!("{wind} m/s: {mean} {expected} {error}");
-        assert!(4.0 * error < 0.3 * expected, "{wind} m/s: {error}");
-        assert!(
-            (mean - expected).abs() < 4.0 * error,
-            "{wind} m/s: {mean} {expected} {error}"
-        );
+        let moments = wind_sea(&scene).moments(0.0, std::f64::consts::PI / spacing, 0.5);
+        let expected = [moments.elevation, moments.slope_xx, moments.slope_yy];
+        for (n, what) in ["elevation", "slope x", "slope y"].into_iter().enumerate() {
+            let of_seeds: Vec<f64> = squares.iter().map(|s| s[n]).collect();
+            assert_mean(&of_seeds, expected[n], 0.02, &format!("{wind} m/s {what}"));
+        }
     }
 }
 
 /// The margin holds what moves into the image: 4.5 standard deviations of the displacement in azimuth and range, which
 /// the largest of some 10⁵ pixels of a sea just about reach. A margin of half as many would be passed by a fortieth of
-/// them. Near the stern a wake may displace farther: not one in a thousand pixels.
+/// them. Near the stern a wake may displace farther: not one in ten thousand pixels. The sea here has at least a thousand
+/// independent places, of which the largest is beyond 2.9 deviations in 39 draws of 40: a margin is at most 1.55 times as wide,
+/// and two pixels, for it is whole and its edge is interpolated to.
 #[test]
 fn the_margin_holds_what_is_displaced() {
     for assignments in [
@@ -365,14 +409,11 @@ fn the_margin_holds_what_is_displaced() {
                     "{assignments:?} {ship}: margin {margin}, displaced {largest}, beyond {beyond}"
                 );
                 let share = beyond as f64 / pixels.len() as f64;
-                assert!(share < 1e-3, "{assignments:?} {ship}: {share}");
+                assert!(share < 1e-4, "{assignments:?} {ship}: {share}");
                 if !ship {
+                    assert!(largest <= margin, "{assignments:?}: {largest} {margin}");
                     assert!(
-                        largest <= 1.25 * margin,
-                        "{assignments:?}: {largest} {margin}"
-                    );
-                    assert!(
-                        margin <= 3.0 * largest + 4.0,
+                        margin <= 1.55 * largest + 2.0,
                         "{assignments:?}: {largest} {margin}"
                     );
                 }

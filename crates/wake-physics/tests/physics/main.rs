@@ -20,6 +20,7 @@ mod trends;
 mod visibility;
 
 use wake_physics::scene::Term;
+use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
 use wake_physics::{Scene, Simulation, simulate};
 
 /// The default scene on a small grid, with assignments.
@@ -34,6 +35,19 @@ fn open_sea(mut scene: Scene) -> Scene {
     scene
 }
 
+/// The spectrum of the wind sea of a scene.
+fn wind_sea(scene: &Scene) -> DirectionalSpectrum {
+    let sea = &scene.sea;
+    DirectionalSpectrum::new(&WindSea {
+        wind_speed: sea.wind_speed,
+        wind_toward: sea.wind_toward.to_radians(),
+        fetch: sea.fetch,
+        depth: sea.depth,
+        spectrum: sea.spectrum,
+        spreading: sea.spreading,
+    })
+}
+
 fn run(scene: &Scene) -> Simulation {
     simulate(scene).expect("a valid scene is simulated")
 }
@@ -42,8 +56,12 @@ fn run(scene: &Scene) -> Simulation {
 fn assert_sound(simulation: &Simulation, what: &str) {
     for (name, field) in simulation.named_fields() {
         assert_eq!(
-            (field.rows, field.columns),
-            (simulation.raster.rows, simulation.raster.columns),
+            (field.rows, field.columns, field.values.len()),
+            (
+                simulation.raster.rows,
+                simulation.raster.columns,
+                simulation.raster.len()
+            ),
             "{what}: {name}"
         );
         assert!(

@@ -1,6 +1,7 @@
 //! The fast methods against the oracles, whole scenes, at the tolerance asked for.
 
 use crate::small;
+use wake_physics::scene::Term;
 use wake_physics::{Method, Scene, simulate_with};
 
 /// Every field and the image, at several tolerances, on a small grid with ship, sea and all terms.
@@ -67,6 +68,35 @@ fn turning_ships_keep_the_tolerance() {
         "model.terms=[\"kelvin\", \"turbulent\", \"edge\", \"tilt_average\", \"bunching\"]",
     ];
     assert_tolerance(&small(12, 10, &keys), 1e-3);
+}
+
+/// A scene under an impulse response with all that a satellite's has: swell, waves of the ship that no pixel carries, edges,
+/// gusts, slicks, breaking waves, noise. 2.5 m are computed of pixels of 5 m, and 80 m around them.
+#[test]
+fn satellite_scenes_keep_the_tolerance() {
+    let keys = [
+        "grid.spacing=5",
+        "radar.frequency=5.405e9",
+        "radar.range_resolution=10",
+        "radar.resolution=10",
+        "radar.range_to_velocity=10",
+        "radar.noise_floor=-25",
+        "sea.wind_speed=4",
+        "sea.swell_height=1",
+        "sea.gust_strength=0.1",
+        "sea.slick_damping=0.5",
+        "sea.breaking=true",
+        "ship.position=[60, 150]",
+        "ship.heading=20",
+        "ship.edge=true",
+    ];
+    let scene = small(7, 6, &keys);
+    let plan = wake_physics::Plan::new(&scene).unwrap();
+    let drawn = [Term::Swell, Term::Unresolved, Term::Edge, Term::Slicks];
+    for term in drawn.into_iter().chain([Term::Gusts, Term::Response]) {
+        assert!(plan.uses(term), "{plan}");
+    }
+    assert_tolerance(&scene, 1e-3);
 }
 
 fn assert_tolerance(scene: &Scene, tolerance: f64) {

@@ -337,7 +337,12 @@ fn unresolved_waves_are_left_out_where_they_are_weak() {
         without.model.terms = Terms::List(list.collect());
         let (_, change) = run(&without).intensity.difference(&all.intensity);
         let change = change / all.intensity.mean();
-        assert!(change <= estimate, "{depth}: {change} {estimate}");
+        // The table of σ⁰ is another where there are means over slopes: the same hundredth of the tolerance as for other terms.
+        let allowance = 0.01 * scene.model.tolerance;
+        assert!(
+            change <= estimate + allowance,
+            "{depth}: {change} {estimate}"
+        );
         assert!(
             !used || change > estimate / 30.0,
             "{depth}: {change} {estimate}"

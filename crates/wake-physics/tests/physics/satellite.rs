@@ -110,7 +110,11 @@ fn one_look_is_a_complex_image() {
     simulation.write(folder.path()).unwrap();
     let bytes = std::fs::read(folder.path().join("fields.safetensors")).unwrap();
     let file = safetensors::SafeTensors::deserialize(&bytes).unwrap();
-    assert_eq!(file.tensor("slc").unwrap().shape(), [160, 150, 2]);
+    let written = file.tensor("slc").unwrap();
+    assert_eq!(written.shape(), [160, 150, 2]);
+    let parts = slc.iter().flat_map(|s| [s.re, s.im]);
+    let bytes: Vec<u8> = parts.flat_map(f32::to_le_bytes).collect();
+    assert_eq!(written.data(), bytes);
 }
 
 /// A quick-look is linear in amplitude, puts the sea four tenths up, and does not follow the pixels.
@@ -204,7 +208,14 @@ fn weak_extras_are_left_out_and_change_less_than_estimated() {
                 "{key}={value}: {change} {}",
                 planned.estimate
             );
-            assert!(change > 0.0, "{key}={value} changes nothing");
+            println!("{key}={value}: {change:e} {:e}", planned.estimate);
+            // Beside a wake whose own estimate is ten times the mean, others are up to forty times too large.
+            let least = planned.estimate / 50.0;
+            assert!(
+                change > least,
+                "{key}={value}: {change} {}",
+                planned.estimate
+            );
         }
     }
 }

@@ -203,7 +203,6 @@ fn factors_of_the_modulation(spacing: f64, wind: f64) -> [[f64; 2]; 2] {
 /// the mean changes by at most 5 `m_B` times the variance of these slopes.
 #[test]
 fn refinement_changes_neither_mean_nor_contrast() {
-    use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
     for wind in [5.0, 9.0] {
         let [fine, middle, coarse] =
             [1.25, 2.5, 5.0].map(|spacing| factors_of_the_modulation(spacing, wind));
@@ -221,16 +220,11 @@ fn refinement_changes_neither_mean_nor_contrast() {
             let sharp = [0.001, 0.02][q];
             assert!(4.0 * error < sharp, "wind {wind}: {error}");
         }
-        let sea = Scene::default().sea;
-        let sea = DirectionalSpectrum::new(&WindSea {
-            wind_speed: wind,
-            wind_toward: sea.wind_toward.to_radians(),
-            fetch: sea.fetch,
-            depth: sea.depth,
-            spectrum: sea.spectrum,
-            spreading: sea.spreading,
-        });
-        let left_out = sea.moments(PI / 5.0, PI / 2.5, 0.5).slope_xx;
+        let mut scene = Scene::default();
+        scene.sea.wind_speed = wind;
+        let left_out = crate::wind_sea(&scene)
+            .moments(PI / 5.0, PI / 2.5, 0.5)
+            .slope_xx;
         assert!(
             (coarse[0][0] - fine[0][0]).abs() < 5.0 * 4.0 * left_out,
             "wind {wind}: {fine:?} {coarse:?} {left_out}"

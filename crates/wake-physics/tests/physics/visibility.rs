@@ -107,6 +107,33 @@ fn the_contrast_is_that_of_the_expected_image() {
     }
 }
 
+/// What the label's image lacks, harmonics and the waves' displacement of each other, is to what it has as the change of the
+/// image is to 1. So a wake of waves a tenth as high (a ship of a tenth of the beam is as long and as deep), which changes the
+/// image by 0.04 to 0.13, is good to a tenth, rows and windows of 64 m included.
+#[test]
+fn the_contrast_of_a_weak_wake_is_that_of_the_expected_image() {
+    for (heading, wind) in [(50, 3), (50, 5), (50, 7), (20, 3)] {
+        let scene = scene(&[
+            &format!("sea.wind_speed={wind}"),
+            &format!("ship.heading={heading}"),
+            "ship.beam=2.6",
+            WITHOUT_DARK_LINE,
+        ]);
+        let stated = change(visibility(&scene));
+        // What is not seen at all counts in all of the wedge.
+        let length = match length_m(&scene) {
+            0.0 => f64::INFINITY,
+            length => length,
+        };
+        let seen = rms(&expected_change(&scene), &wedge(&scene, length));
+        println!("heading {heading} wind {wind}: stated {stated:.4} seen {seen:.4}");
+        assert!(
+            (stated / seen - 1.0).abs() < 0.1,
+            "heading {heading} wind {wind}: stated {stated:.4} seen {seen:.4}"
+        );
+    }
+}
+
 #[test]
 fn the_noise_is_that_of_the_simulated_image() {
     for (wind, looks) in [(3, 4), (5, 4), (7, 4), (5, 1), (5, 100)] {
@@ -180,7 +207,8 @@ fn no_wave_and_no_dark_line_have_no_box() {
     );
 }
 
-/// The turbulent wake with its edges, without waves: the same, over the windows on the track.
+/// The turbulent wake with its edges, without waves: the same, over the windows on the track. It is no linear image; along a
+/// row of windows of 64 m the edges change by some 64 m over the kilometre they have come from, 5 %.
 #[test]
 fn the_contrast_of_edges_is_that_of_the_expected_image() {
     let terms = "model.terms=[\"sea\", \"turbulent\", \"edge\", \"tilt_average\", \"specular\", \"bunching\", \"coherence\", \"speckle\"]";
@@ -205,14 +233,14 @@ fn the_contrast_of_edges_is_that_of_the_expected_image() {
         let seen = rms(&expected_change(&with), &inside);
         println!("heading {heading} wind toward {wind_toward}: stated {stated:.4} seen {seen:.4}");
         assert!(
-            (0.7..1.3).contains(&(stated / seen)),
+            (0.95..1.05).contains(&(stated / seen)),
             "heading {heading}: stated {stated:.4} seen {seen:.4}"
         );
     }
 }
 
 /// Waves that the pixels do not carry roughen the wedge: it is the brighter the nearer to the track, and the label says so: to the two digits of
-/// its means over slopes, and what its windows of 64 m blur of a wedge some 100 m wide.
+/// its means over slopes, the 5 % of its table, and what its windows of 64 m blur of a wedge some 100 m wide.
 #[test]
 fn the_contrast_of_short_waves_is_that_of_the_expected_image() {
     let terms = "model.terms=[\"sea\", \"unresolved\", \"tilt_average\", \"specular\", \"bunching\", \"coherence\", \"speckle\", \"response\"]";
@@ -237,7 +265,7 @@ fn the_contrast_of_short_waves_is_that_of_the_expected_image() {
         let seen = rms(&expected_change(&with), &wedge(&with, length_m(&with)));
         println!("{sensor} heading {heading}: stated {stated:.4} seen {seen:.4}");
         assert!(
-            (0.85..1.15).contains(&(stated / seen)),
+            (0.9..1.1).contains(&(stated / seen)),
             "{sensor} heading {heading}: stated {stated:.4} seen {seen:.4}"
         );
     }
@@ -280,8 +308,8 @@ fn farthest_seen<const N: usize>(scene: &Scene, multiples: [f64; N]) -> [f64; N]
 }
 
 /// Where the expected image differs from the sea by five times the noise of a pixel in windows of 16 × 16 pixels all across
-/// the image, the label does not end before: a wake of 195 m ship's length, 4 km long. The last windows count to their
-/// middle, half a window before the end.
+/// the image, the label does not end before: a wake of 195 m ship's length, 4 km long. Windows of the image count to their
+/// middle, up to 45 m from the next one's along the track; the label's end is half a window of 64 m beyond its last middle.
 #[test]
 fn a_wake_seen_to_the_edge_is_not_cut_short() {
     for (wind, heading) in [(5, 50), (7, 50), (7, 300)] {
@@ -290,15 +318,15 @@ fn a_wake_seen_to_the_edge_is_not_cut_short() {
         let stated = length_m(&scene);
         println!("wind {wind} heading {heading}: stated {stated} seen {farthest}");
         assert!(
-            (0.95..1.05).contains(&(stated / farthest)),
+            (stated - farthest).abs() <= 77.0,
             "wind {wind} heading {heading}: stated {stated} seen {farthest}"
         );
     }
 }
 
-/// The contrast is good to three tenths, as above, and that of arms falls by the cube root of the distance: the end of a
-/// faint wake lies between those at so much more and so much less contrast. Windows of the image count to their middle, up to
-/// 45 m from the next one's along the track; the label's end half a window of 64 m beyond its last middle.
+/// The contrast is good to three tenths, as above, and that of arms falls by
+/// the cube root of the distance: the end of a faint wake lies between those at so much more and so much less contrast, and
+/// the 77 m of windows.
 #[test]
 fn a_faint_wake_ends_where_the_error_of_its_contrast_can_move_it() {
     for wind in [8, 10] {

@@ -54,7 +54,7 @@ impl Imaging {
         let sum = Sum::new(self, sources, image, tolerance);
         let width = sum.block_width();
         // Each block of columns, `[steps, columns]`, in one piece.
-        let mut steps = workspace.floats.take(sum.count * image.columns, 0.0);
+        let mut steps = workspace.floats.take(sum.count * image.columns);
         steps
             .par_chunks_mut((sum.count * width).max(1))
             .enumerate()

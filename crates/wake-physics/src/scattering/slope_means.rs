@@ -1,0 +1,237 @@
+//! Means of σ⁰ over slopes that pixels do not carry, on as many nodes as an error asks for.
+
+use crate::scattering::slopes::SlopeCovariance;
+use rayon::prelude::*;
+use std::f64::consts::{FRAC_PI_4, SQRT_2};
+use std::sync::LazyLock;
+
+/// Nodes of the rules, the last of which only tells the errors of the others.
+const COUNTS: [usize; 10] = [1, 3, 5, 7, 9, 13, 19, 27, 39, 55];
+/// Number of rules that are taken.
+const USED: usize = COUNTS.len() - 1;
+
+/// Nodes of a smaller weight are left out: with them goes a ten-millionth of what σ⁰ is five deviations away.
+const LEAST_WEIGHT: f64 = 1e-7;
+
+/// The rules: nodes, rising, and weights.
+static RULES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| gauss_hermite(&COUNTS));
+
+/// Deviations at which the errors of the rules are looked at: each a factor of √2 below the one before.
+const DEVIATIONS: usize = 14;
+
+/// Share of the variance along the second axis below which there is none: what rounding leaves of one wave alone.
+const ROUNDED: f64 = 1e-5;
+
+/// Which rule a mean over slopes takes, by the deviation of the slopes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SlopeMeans {
+    /// Largest variance of each rule.
+    largest: [f64; USED],
+    /// Error of the last rule at the largest deviation.
+    error: f64,
+}
+
+impl SlopeMeans {
+    /// The farthest node from the middle, at most, for slopes of a variance in all.
+    pub(crate) fn reach(variance: f64) -> f64 {
+        let farthest = RULES.iter().filter_map(|rule| rule.last());
+        farthest.map(|node| node[0]).fold(0.0, f64::max) * variance.sqrt()
+    }
+
+    /// Rules for the means of a function to an absolute `error`, by what more nodes make of it along four directions.
+    ///
+    /// - `places`: slopes around which means are taken
+    /// - `largest`: largest variance
+    pub(crate) fn new(
+        function: impl Fn([f64; 2]) -> f64 + Sync,
+        places: &[[f64; 2]],
+        (largest, error): (f64, f64),
+    ) -> Self {
+        let deviation = |n: usize| largest.sqrt() * SQRT_2.powi(-(n as i32));
+        let along = |n: usize, place: &[f64; 2], turn: u8| -> [f64; USED] {
+            let (sin, cos) = (FRAC_PI_4 * f64::from(turn)).sin_cos();
+            let at = |u: f64| function([place[0] + u * cos, place[1] + u * sin]);
+            let mean = |rule: &Vec<[f64; 2]>| -> f64 {
+                rule.iter().map(|[z, w]| w * at(z * deviation(n))).sum()
+            };
+            let means: Vec<f64> = RULES.iter().map(mean).collect();
+            let best = means[USED];
+            std::array::from_fn(|rule| (means[rule] - best).abs())
+        };
+        let worse = |a: [f64; USED], b: [f64; USED]| std::array::from_fn(|n| a[n].max(b[n]));
+        let none = || [0.0; USED];
+        let errors: Vec<[f64; USED]> = (0..DEVIATIONS)
+            .into_par_iter()
+            .map(|n| {
+                let pairs = places
+                    .iter()
+                    .flat_map(|p| (0..4).map(move |turn| (p, turn)));
+                pairs
+                    .map(|(place, turn)| along(n, place, turn))
+                    .fold(none(), worse)
+            })
+            .collect();
+        let limit = |rule: usize| {
+            // Two axes may err both.
+            let keeps = |e: &&[f64; USED]| 2.0 * e[rule] <= error;
+            let kept = errors.iter().rev().take_while(keeps).count();
+            kept.checked_sub(1).map_or(0.0, |kept| {
+                deviation(DEVIATIONS - 1 - kept).powi(2) * (1.0 + 1e-9)
+            })
+        };
+        Self {
+            largest: std::array::from_fn(limit),
+            error: 2.0 * errors[0][USED - 1],
+        }
+    }
+
+    /// Stated error of a mean.
+    pub(crate) fn error(&self) -> f64 {
+        self.error
+    }
+
+    /// The rule for a variance.
+    #[inline(always)]
+    fn rule<'r>(&self, rules: &'r [Vec<[f64; 2]>], variance: f64) -> &'r [[f64; 2]] {
+        let fits = self.largest.iter().position(|&v| variance <= v);
+        &rules[fits.unwrap_or(USED - 1)]
+    }
+
+    /// The mean of a function over slopes of a covariance around one.
+    #[inline(always)]
+    pub(crate) fn around(
+        &self,
+        covariance: &SlopeCovariance,
+        slope: [f64; 2],
+        function: impl Fn([f64; 2]) -> f64,
+    ) -> f64 {
+        let rules = &*RULES;
+        let axes = covariance.principal_axes();
+        let [deviation_u, deviation_v] = axes.variance.map(f64::sqrt);
+        let along = self.rule(rules, axes.variance[0]);
+        let across = if axes.variance[1] > ROUNDED * axes.variance[0] {
+            self.rule(rules, axes.variance[1])
+        } else {
+            &rules[0]
+        };
+        let mut sum = 0.0;
+        for [v, weight_v] in across {
+            let mut line = 0.0;
+            for [u, weight_u] in along {
+                let [dx, dy] = axes.slope([u * deviation_u, v * deviation_v]);
+                line += weight_u * function([slope[0] + dx, slope[1] + dy]);
+            }
+            sum += weight_v * line;
+        }
+        sum
+    }
+}
+
+/// For each count nodes and weights of the mean over a unit Gaussian, exact to the power 2·count − 1, less nodes without weight.
+///
+/// The nodes are the zeros of the Hermite polynomial, which lie between those of the one before.
+fn gauss_hermite(counts: &[usize]) -> Vec<Vec<[f64; 2]>> {
+    let largest = counts.iter().copied().max().unwrap_or(0);
+    let (mut zeros, mut rules) = (Vec::new(), Vec::new());
+    for n in 1..=largest {
+        let bound = 2.0 * (n as f64).sqrt() + 1.0;
+        let ends = [&[-bound], &zeros[..], &[bound]].concat();
+        let of = |pair: &[f64]| zero_between([pair[0], pair[1]], |x| hermite(n, x)[0]);
+        zeros = ends.windows(2).map(of).collect::<Vec<f64>>();
+        if counts.contains(&n) {
+            let nodes = zeros.iter().map(|&z| [z, 1.0 / hermite(n, z)[1]]);
+            rules.push(nodes.filter(|[_, weight]| *weight > LEAST_WEIGHT).collect());
+        }
+    }
+    rules
+}
+
+/// The Hermite polynomial of degree `n` at x, of mean square 1 over a unit Gaussian, and the sum of the squares of those before.
+fn hermite(n: usize, x: f64) -> [f64; 2] {
+    let (mut before, mut p, mut squares) = (0.0, 1.0, 0.0);
+    for k in 0..n {
+        let k = k as f64;
+        squares += p * p;
+        (before, p) = (p, (x * p - k.sqrt() * before) / (k + 1.0).sqrt());
+    }
+    [p, squares]
+}
+
+/// The zero of a function that changes sign once in an interval, by halving it to rounding.
+fn zero_between([mut low, mut high]: [f64; 2], function: impl Fn(f64) -> f64) -> f64 {
+    let positive = function(low) > 0.0;
+    for _ in 0..56 {
+        let middle = 0.5 * (low + high);
+        if (function(middle) > 0.0) == positive {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Moments of a unit Gaussian, 1, 1, 3, 15, …, (2n − 1)!!, but for the nodes left out.
+    #[test]
+    fn rules_are_exact_for_powers() {
+        assert_eq!(RULES.len(), COUNTS.len());
+        for (count, rule) in COUNTS.into_iter().zip(RULES.iter()) {
+            let mut expected = 1.0;
+            for power in 0..(2 * count).min(12) {
+                let moment: f64 = rule.iter().map(|[z, w]| w * z.powi(power as i32)).sum();
+                if power % 2 == 1 {
+                    assert!(moment.abs() < 1e-3, "{count} {power}");
+                    continue;
+                }
+                // Nodes that are left out lie from five deviations on, each with a tenth of the weight of the one before.
+                let left_out = 4e-7 * 5.8f64.powi(power as i32);
+                assert!(
+                    (moment / expected - 1.0).abs() < 1e-12 + left_out / expected,
+                    "{count} {power}: {moment}"
+                );
+                expected *= power as f64 + 1.0;
+            }
+        }
+    }
+
+    /// E exp(cᵀs) = exp(½ cᵀCc), for which few nodes do where the slopes are small, and more where they are not.
+    #[test]
+    fn means_are_as_exact_as_asked_for() {
+        let function = |[x, y]: [f64; 2]| (9.0 * x - 4.0 * y).exp();
+        let places: Vec<[f64; 2]> = vec![[0.0; 2], [0.1, 0.0], [-0.1, 0.1]];
+        let largest = 0.02;
+        let mut before = None;
+        for error in [1e-1, 1e-2, 1e-3] {
+            let means = SlopeMeans::new(function, &places, (largest, error));
+            assert!(means.error() <= error);
+            for variance in [0.02, 0.01, 1e-3, 1e-5] {
+                for degrees in [0.0f64, 30.0, 77.0, 140.0] {
+                    let (sin, cos) = degrees.to_radians().sin_cos();
+                    for second in [0.0, 0.3 * variance] {
+                        let covariance =
+                            SlopeCovariance::along_wind([variance, second], [cos, sin]);
+                        let c = &covariance;
+                        let square = 81.0 * c.xx - 72.0 * c.xy + 16.0 * c.yy;
+                        for &place in &places {
+                            let expected = function(place) * (0.5 * square).exp();
+                            let found = means.around(&covariance, place, function);
+                            // The error of each axis; other directions than the four may be worse by as much.
+                            assert!(
+                                (found - expected).abs() < 4.0 * error,
+                                "{error} {variance} {degrees}: {found} {expected}"
+                            );
+                        }
+                    }
+                }
+            }
+            let nodes = |variance: f64| means.rule(&RULES, variance).len();
+            assert!(nodes(1e-5) < nodes(0.02), "{error}");
+            assert!(before.is_none_or(|fewer| fewer <= nodes(0.02)));
+            before = Some(nodes(0.02));
+        }
+    }
+}
