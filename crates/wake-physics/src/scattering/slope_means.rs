@@ -22,11 +22,19 @@ const DEVIATIONS: usize = 14;
 /// Share of the variance along the second axis below which there is none: what rounding leaves of one wave alone.
 const ROUNDED: f64 = 1e-5;
 
-/// Which rule a mean over slopes takes, by the deviation of the slopes.
+/// Places along each axis of the slopes at which the errors of the rules are looked at.
+const PLACES: usize = 5;
+
+/// Cells between them.
+const CELLS: usize = PLACES - 1;
+
+/// Which rule a mean over slopes takes, by the slope it is around and the deviation of the others.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SlopeMeans {
-    /// Largest variance of each rule.
-    largest: [f64; USED],
+    /// Ranges of the slopes that means are around.
+    facets: [[f64; 2]; 2],
+    /// Largest variance of each rule, by cell: `[CELLS, CELLS]`, the first axis running fastest.
+    largest: Vec<[f64; USED]>,
     /// Error of the last rule at the largest deviation.
     error: f64,
 }
@@ -40,48 +48,47 @@ impl SlopeMeans {
 
     /// Rules for the means of a function to an absolute `error`, by what more nodes make of it along four directions.
     ///
-    /// - `places`: slopes around which means are taken
+    /// - `facets`: ranges of the slopes around which means are taken
     /// - `largest`: largest variance
     pub(crate) fn new(
         function: impl Fn([f64; 2]) -> f64 + Sync,
-        places: &[[f64; 2]],
+        facets: [[f64; 2]; 2],
         (largest, error): (f64, f64),
     ) -> Self {
-        let deviation = |n: usize| largest.sqrt() * SQRT_2.powi(-(n as i32));
-        let along = |n: usize, place: &[f64; 2], turn: u8| -> [f64; USED] {
-            let (sin, cos) = (FRAC_PI_4 * f64::from(turn)).sin_cos();
-            let at = |u: f64| function([place[0] + u * cos, place[1] + u * sin]);
-            let mean = |rule: &Vec<[f64; 2]>| -> f64 {
-                rule.iter().map(|[z, w]| w * at(z * deviation(n))).sum()
-            };
-            let means: Vec<f64> = RULES.iter().map(mean).collect();
-            let best = means[USED];
-            std::array::from_fn(|rule| (means[rule] - best).abs())
-        };
-        let worse = |a: [f64; USED], b: [f64; USED]| std::array::from_fn(|n| a[n].max(b[n]));
-        let none = || [0.0; USED];
-        let errors: Vec<[f64; USED]> = (0..DEVIATIONS)
+        let errors: Vec<Vec<[f64; USED]>> = (0..PLACES * PLACES)
             .into_par_iter()
             .map(|n| {
-                let pairs = places
-                    .iter()
-                    .flat_map(|p| (0..4).map(move |turn| (p, turn)));
-                pairs
-                    .map(|(place, turn)| along(n, place, turn))
-                    .fold(none(), worse)
+                let part = [n % PLACES, n / PLACES].map(|n| n as f64 / CELLS as f64);
+                let place = [0, 1].map(|axis| {
+                    let [first, last] = facets[axis];
+                    first + part[axis] * (last - first)
+                });
+                let of = |n| errors_at(&function, place, deviation(largest, n));
+                (0..DEVIATIONS).map(of).collect()
             })
             .collect();
-        let limit = |rule: usize| {
-            // Two axes may err both.
-            let keeps = |e: &&[f64; USED]| 2.0 * e[rule] <= error;
-            let kept = errors.iter().rev().take_while(keeps).count();
-            kept.checked_sub(1).map_or(0.0, |kept| {
-                deviation(DEVIATIONS - 1 - kept).powi(2) * (1.0 + 1e-9)
+        let cell = |n: usize| -> [f64; USED] {
+            let [i, j] = [n % CELLS, n / CELLS];
+            let corners = [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]];
+            let of_corner = |rule: usize, [i, j]: [usize; 2]| {
+                // Two axes may err both.
+                let keeps = |e: &&[f64; USED]| 2.0 * e[rule] <= error;
+                let at = errors[j * PLACES + i].iter().rev();
+                at.take_while(keeps).count()
+            };
+            std::array::from_fn(|rule| {
+                let kept = corners.map(|corner| of_corner(rule, corner));
+                match kept.into_iter().min() {
+                    None | Some(0) => 0.0,
+                    Some(kept) => deviation(largest, DEVIATIONS - kept).powi(2) * (1.0 + 1e-9),
+                }
             })
         };
+        let last = errors.iter().map(|place| place[0][USED - 1]);
         Self {
-            largest: std::array::from_fn(limit),
-            error: 2.0 * errors[0][USED - 1],
+            facets,
+            largest: (0..CELLS * CELLS).map(cell).collect(),
+            error: 2.0 * last.fold(0.0, f64::max),
         }
     }
 
@@ -92,9 +99,24 @@ impl SlopeMeans {
 
     /// The rule for a variance.
     #[inline(always)]
-    fn rule<'r>(&self, rules: &'r [Vec<[f64; 2]>], variance: f64) -> &'r [[f64; 2]] {
-        let fits = self.largest.iter().position(|&v| variance <= v);
+    fn rule<'r>(
+        rules: &'r [Vec<[f64; 2]>],
+        largest: &[f64; USED],
+        variance: f64,
+    ) -> &'r [[f64; 2]] {
+        let fits = largest.iter().position(|&v| variance <= v);
         &rules[fits.unwrap_or(USED - 1)]
+    }
+
+    /// Largest variance of each rule where a mean is around a slope.
+    #[inline(always)]
+    fn largest_at(&self, slope: [f64; 2]) -> &[f64; USED] {
+        let cell = |axis: usize| {
+            let [first, last] = self.facets[axis];
+            let part = (slope[axis] - first) / (last - first) * CELLS as f64;
+            (part.max(0.0) as usize).min(CELLS - 1)
+        };
+        &self.largest[cell(1) * CELLS + cell(0)]
     }
 
     /// The mean of a function over slopes of a covariance around one.
@@ -108,9 +130,10 @@ impl SlopeMeans {
         let rules = &*RULES;
         let axes = covariance.principal_axes();
         let [deviation_u, deviation_v] = axes.variance.map(f64::sqrt);
-        let along = self.rule(rules, axes.variance[0]);
+        let largest = self.largest_at(slope);
+        let along = Self::rule(rules, largest, axes.variance[0]);
         let across = if axes.variance[1] > ROUNDED * axes.variance[0] {
-            self.rule(rules, axes.variance[1])
+            Self::rule(rules, largest, axes.variance[1])
         } else {
             &rules[0]
         };
@@ -125,6 +148,27 @@ impl SlopeMeans {
         }
         sum
     }
+}
+
+/// Deviation number `n` of those at which errors are looked at.
+fn deviation(largest: f64, n: usize) -> f64 {
+    largest.sqrt() * SQRT_2.powi(-(n as i32))
+}
+
+/// Errors of the rules for means around a place along the worst of four directions.
+fn errors_at(function: impl Fn([f64; 2]) -> f64, place: [f64; 2], deviation: f64) -> [f64; USED] {
+    let mut worst = [0.0f64; USED];
+    for turn in 0..4 {
+        let (sin, cos) = (FRAC_PI_4 * f64::from(turn)).sin_cos();
+        let at = |u: f64| function([place[0] + u * cos, place[1] + u * sin]);
+        let mean =
+            |rule: &Vec<[f64; 2]>| -> f64 { rule.iter().map(|[z, w]| w * at(z * deviation)).sum() };
+        let means: Vec<f64> = RULES.iter().map(mean).collect();
+        for (worst, mean) in worst.iter_mut().zip(&means) {
+            *worst = worst.max((mean - means[USED]).abs());
+        }
+    }
+    worst
 }
 
 /// For each count nodes and weights of the mean over a unit Gaussian, exact to the power 2·count − 1, less nodes without weight.
@@ -203,10 +247,11 @@ mod tests {
     fn means_are_as_exact_as_asked_for() {
         let function = |[x, y]: [f64; 2]| (9.0 * x - 4.0 * y).exp();
         let places: Vec<[f64; 2]> = vec![[0.0; 2], [0.1, 0.0], [-0.1, 0.1]];
+        let facets = [[-0.1, 0.1]; 2];
         let largest = 0.02;
         let mut before = None;
         for error in [1e-1, 1e-2, 1e-3] {
-            let means = SlopeMeans::new(function, &places, (largest, error));
+            let means = SlopeMeans::new(function, facets, (largest, error));
             assert!(means.error() <= error);
             for variance in [0.02, 0.01, 1e-3, 1e-5] {
                 for degrees in [0.0f64, 30.0, 77.0, 140.0] {
@@ -228,7 +273,10 @@ mod tests {
                     }
                 }
             }
-            let nodes = |variance: f64| means.rule(&RULES, variance).len();
+            let nodes = |variance: f64| {
+                let largest = means.largest_at([0.0; 2]);
+                SlopeMeans::rule(&RULES, largest, variance).len()
+            };
             assert!(nodes(1e-5) < nodes(0.02), "{error}");
             assert!(before.is_none_or(|fewer| fewer <= nodes(0.02)));
             before = Some(nodes(0.02));

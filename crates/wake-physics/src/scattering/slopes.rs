@@ -75,6 +75,18 @@ impl SlopeCovariance {
         }
     }
 
+    /// The same covariance in coordinates along some axes.
+    #[inline(always)]
+    pub(crate) fn turned(&self, axes: &PrincipalAxes) -> Self {
+        let [a, b] = axes.axis;
+        let mixed = 2.0 * a * b * self.xy;
+        Self {
+            xx: a * a * self.xx + mixed + b * b * self.yy,
+            xy: (a * a - b * b) * self.xy + a * b * (self.yy - self.xx),
+            yy: a * a * self.yy - mixed + b * b * self.xx,
+        }
+    }
+
     /// Determinant xx·yy − xy² \[1\].
     #[must_use]
     pub fn determinant(&self) -> f64 {
@@ -207,6 +219,10 @@ mod tests {
             close(back.xx, c.xx);
             close(back.xy, c.xy);
             close(back.yy, c.yy);
+            let own = c.turned(&axes);
+            close(own.xx, axes.variance[0]);
+            close(own.yy, axes.variance[1]);
+            close(own.xy, 0.0);
             let there = axes.slope(axes.coordinates([0.3, -0.2]));
             close(there[0], 0.3);
             close(there[1], -0.2);

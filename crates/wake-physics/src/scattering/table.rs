@@ -120,18 +120,12 @@ impl BackscatterTable {
             return Self::interpolating(backscatter, made_for, made_for.error);
         }
         let mut table = Self::interpolating(backscatter, made_for, 0.5 * made_for.error);
-        let places = made_for.facets.map(|[first, last]| {
-            [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| first + part * (last - first))
-        });
-        let [along, across] = places;
-        let place = |(u, v)| table.axes.slope([u, v]);
-        let pairs = along.into_iter().flat_map(|u| across.map(|v| (u, v)));
-        let places: Vec<[f64; 2]> = pairs.map(place).collect();
         table.error *= OF_MEANS;
         let left = (made_for.error - table.error).max(0.0);
+        // In the coordinates of the table, whose axes are those of the nodes.
         let means = SlopeMeans::new(
-            |s| table.bragg_around(s),
-            &places,
+            |point| table.bragg_around(point),
+            made_for.facets,
             (made_for.variance, left),
         );
         table.error += means.error();
@@ -209,13 +203,13 @@ impl BackscatterTable {
         }
     }
 
-    /// The same at a node of a mean: where waves are steeper than any the table covers, that of its edge.
+    /// The same at a node of a mean, in coordinates along the axes: where waves are steeper than any the table covers, that of its edge.
     #[inline(always)]
-    fn bragg_around(&self, slope: [f64; 2]) -> f64 {
+    fn bragg_around(&self, point: [f64; 2]) -> f64 {
         let Some(table) = &self.interpolation else {
-            return self.backscatter.parts(slope)[0];
+            return self.backscatter.parts(self.axes.slope(point))[0];
         };
-        let [u, v] = self.axes.coordinates(slope);
+        let [u, v] = point;
         let [[left, right], [low, high]] = self.range;
         let inside = [u.max(left).min(right), v.max(low).min(high)];
         table.at(inside).map_or(0.0, |bragg| bragg.max(0.0))
@@ -288,7 +282,11 @@ impl BackscatterTable {
             let parts = match fields.unresolved(n).zip(self.means.as_ref()) {
                 None => [bragg, specular.sigma0(slope)],
                 Some((more, means)) => [
-                    means.around(&more, slope, |slope| self.bragg_around(slope)),
+                    {
+                        let point = self.axes.coordinates(slope);
+                        let more = more.turned(&self.axes);
+                        means.around(&more, point, |point| self.bragg_around(point))
+                    },
                     specular.over(&more).sigma0(slope),
                 ],
             };
