@@ -5,7 +5,7 @@
 //! cargo run --release --example speed_vs_error -- --part model
 //! ```
 //!
-//! Writes `report.json`, `table.md`, `frontier.svg` and `model.svg` (log-log).
+//! Writes `report.json`, `simulator.md`, `spacing.md`, `model.md`, `frontier.svg` and `model.svg` (log-log).
 //!
 //! The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the default scene, the paper's own method
 //! and scale; the oracle of both is the harmonic sum, the strong baseline the same sum as a matrix product. Where an
@@ -81,11 +81,11 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let out = &arguments.out;
     output::make_folder(out)?;
-    let (mut rows, mut text) = (Vec::new(), String::new());
+    let (mut rows, mut parts) = (Vec::new(), Vec::new());
     if arguments.part != Part::Model {
         let measured = simulator(arguments.largest as usize, &arguments.stage)?;
         plot::draw(&out.join("frontier.svg"), &plot::SIMULATOR, &measured)?;
-        text += &table(&measured);
+        parts.push(("simulator.md", table(&measured)));
         for row in measured {
             rows.push(serde_json::to_value(row)?);
         }
@@ -95,7 +95,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let bar = progress::bar(spacing::COUNT, "rows of the spacing");
         let measured = spacing::measure(|| bar.inc(1))?;
         bar.finish_and_clear();
-        text += &format!("\n{}", spacing::table(&measured));
+        parts.push(("spacing.md", spacing::table(&measured)));
         for row in measured {
             rows.push(serde_json::to_value(row)?);
         }
@@ -110,7 +110,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             &plot::MODEL,
             &model::steps(&measured),
         )?;
-        text += &format!("\n{}", model::table(&measured));
+        parts.push(("model.md", model::table(&measured)));
         for row in measured {
             rows.push(serde_json::to_value(row)?);
         }
@@ -120,11 +120,18 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     let report = json!({ "rows": rows });
     output::write_json(&out.join("report.json"), &report)?;
-    output::write_atomically(&out.join("table.md"), text.as_bytes())?;
+    for (name, table) in &parts {
+        output::write_atomically(&out.join(name), table.as_bytes())?;
+    }
     if arguments.json {
         exit::say(&report.to_string())?;
     } else {
-        exit::say(&format!("{text}\nwritten to {}", out.display()))?;
+        let tables: Vec<&str> = parts.iter().map(|(_, table)| table.as_str()).collect();
+        exit::say(&format!(
+            "{}\nwritten to {}",
+            tables.join("\n"),
+            out.display()
+        ))?;
     }
     Ok(())
 }

@@ -365,7 +365,9 @@ mod tests {
         let words = "[1-9][0-9]?(\\.5|,5)?|mps|m/s|km/h|knots|km|miles|degrees|deg\\.|°|±|to|between|and|ship|no|not|\
                      without|a|wind|fetch|of|incidence|angle|heading|from|toward|the|north|westerly|waves|length|at|[.,:-]";
         let prompts = prop::collection::vec(words, 0..12);
-        proptest!(ProptestConfig::with_cases(2000), |(words in prompts, extra in 3..40_u32)| {
+        // In front of one or two digits, 18 and 36 add whole turns, which leave a direction what it is.
+        let extras = (3..40_u32).prop_filter("no whole turn", |extra| extra % 18 != 0);
+        proptest!(ProptestConfig::with_cases(2000), |(words in prompts, extra in extras)| {
             let prompt = words.join(" ");
             let reading = Reading::of(&prompt);
             for (at, word) in words.iter().enumerate().filter(|(_, word)| word.starts_with(|c: char| c.is_ascii_digit())) {
