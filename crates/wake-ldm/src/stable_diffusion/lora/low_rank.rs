@@ -43,7 +43,7 @@ impl LowRank {
     /// # Errors
     ///
     /// [`Error::OutOfRange`](crate::Error::OutOfRange) for a rank of 0 or above 1024.
-    pub(crate) fn of_attentions<M: Module>(model: &M, layout: Layout, rank: usize) -> Result<Self> {
+    pub fn of_attentions<M: Module>(model: &M, layout: Layout, rank: usize) -> Result<Self> {
         check_range("rank", rank as f64, 1.0, 1024.0)?;
         let mut finder = Finder {
             path: ModulePath::default(),
