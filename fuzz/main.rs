@@ -19,6 +19,7 @@ use arbtest::arbtest;
 use burn::tensor::Device;
 use wake_ldm::dataset::{Folder, Recipe};
 use wake_ldm::network::{PatchTransform, WakeModelConfig};
+use wake_ldm::pipeline::Pipeline;
 use wake_ldm::scheduler::SchedulerConfig;
 use wake_ldm::train::{Checkpoint, Metrics};
 use wake_ldm::unet::UNetConfig;
@@ -132,7 +133,7 @@ fn tokens() {
                 .truncated_at
                 .is_none_or(|at| text.is_char_boundary(at))
         );
-        // Cleaned text is clean: reading what was read gives the same.
+        // The same text has the same tokens, whatever was read before.
         assert_eq!(Tokenizer::clip().encode(&text).ids, tokens.ids);
     });
 }
@@ -152,6 +153,33 @@ fn weights() {
         with_file(folder.path(), "model.safetensors", input, |path| {
             let empty = PatchTransform::zeros(4, &device);
             said(load(empty, Layout::Diffusers, path));
+        });
+    });
+}
+
+/// A folder of weights in shards whose index is the input.
+#[test]
+fn weights_in_shards() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let device = Device::default();
+    let shard = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/weights/one.safetensors");
+    std::fs::copy(shard, folder.path().join("a.safetensors")).expect("a shard");
+    attack("shards", |input| {
+        with_file(folder.path(), "model.safetensors.index.json", input, |_| {
+            let empty = PatchTransform::zeros(4, &device);
+            said(load(empty, Layout::Diffusers, folder.path()));
+        });
+    });
+}
+
+/// A folder of a pipeline whose `model_index.json` is the input; no model lies in it.
+#[test]
+fn pipelines() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let device = Device::default();
+    attack("pipeline", |input| {
+        with_file(folder.path(), "model_index.json", input, |_| {
+            said(Pipeline::load(folder.path(), &device));
         });
     });
 }

@@ -62,6 +62,7 @@ pub(crate) fn draw(path: &Path, plot: &Chart, rows: &[Row]) -> Result<(), Box<dy
         .build_cartesian_2d(axis(plot.errors), axis(plot.seconds))?;
     chart
         .configure_mesh()
+        .x_label_formatter(&|error| format!("{error:.0e}"))
         .x_desc("rms error (relative)")
         .y_desc("seconds")
         .draw()?;
