@@ -137,6 +137,20 @@ fn transposed_sum(
     re
 }
 
+/// Real part of a sum of the waves `[columns, rows]` of a period, of which an image of `rows` and `columns` is looked at.
+pub(crate) fn real_sum(
+    mut waves: Vec<Complex32>,
+    [high, wide]: [usize; 2],
+    [rows, columns]: [usize; 2],
+) -> Field {
+    let [values, _] = sums(&Synthesis::new(high, wide), &mut waves, [rows, columns]);
+    Field {
+        rows,
+        columns,
+        values,
+    }
+}
+
 /// Gaussian noise of variance 1 whose pixels are correlated: a spectrum from the correlation, on a torus that is larger
 /// than the image.
 ///
@@ -211,20 +225,7 @@ impl CorrelatedNoise {
         let pairs = normals[..self.normals()].as_chunks::<2>().0;
         let waves = self.amplitudes.iter().zip(pairs);
         let waves = waves.map(|(&a, &[re, im])| Complex32::new(a * re, a * im));
-        let mut waves: Vec<Complex32> = waves.collect();
-        let ([rows, columns], [high, wide]) = (self.size, self.period);
-        let [mut values, mut other] = [(); 2].map(|()| vec![0.0; rows * columns]);
-        Synthesis::new(high, wide).run(
-            &mut waves,
-            [rows, columns],
-            (&mut values, &mut other),
-            |_, _| {},
-        );
-        Field {
-            rows,
-            columns,
-            values,
-        }
+        real_sum(waves.collect(), self.period, self.size)
     }
 }
 

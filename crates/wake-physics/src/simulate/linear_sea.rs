@@ -1,8 +1,9 @@
 //! The open sea as a radar sees it to first order: a Gaussian field with the spectrum of the image.
 
+use crate::correlated::real_sum;
 use crate::dispersion::angular_frequency;
 use crate::error::Result;
-use crate::fft::{Synthesis, fast_length, signed_index};
+use crate::fft::{fast_length, signed_index};
 use crate::memory;
 use crate::models::Models;
 use crate::modulation::smear;
@@ -118,18 +119,7 @@ impl LinearSea {
     }
 
     /// The real part of a sum of waves.
-    fn sum(&self, mut waves: Vec<Complex32>, [rows, columns]: [usize; 2]) -> Field {
-        let [mut values, mut other] = [(); 2].map(|()| vec![0.0; rows * columns]);
-        Synthesis::new(self.period, self.period).run(
-            &mut waves,
-            [rows, columns],
-            (&mut values, &mut other),
-            |_, _| {},
-        );
-        Field {
-            rows,
-            columns,
-            values,
-        }
+    fn sum(&self, waves: Vec<Complex32>, size: [usize; 2]) -> Field {
+        real_sum(waves, [self.period; 2], size)
     }
 }
