@@ -247,7 +247,7 @@ fn is_drawn(name: &str, drawn: &str) {
     let kept = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         kept == drawn,
-        "{name} is old: `DRAW=1 cargo test -p wake --no-default-features --test tidy` writes it"
+        "{name} is old: `DRAW=1 cargo test -p wake --no-default-features --features checks --test tidy` writes it"
     );
 }
 

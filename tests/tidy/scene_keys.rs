@@ -61,7 +61,7 @@ pub(crate) fn page(sources: &Path) -> (String, Vec<String>) {
 const HEAD: &str = "\
 # Keys of a scene file
 
-Drawn from the code by `DRAW=1 cargo test -p wake --no-default-features --test tidy`; do not edit. A scene file is TOML;
+Drawn from the code by `DRAW=1 cargo test -p wake --no-default-features --features checks --test tidy`; do not edit. A scene file is TOML;
 `--set KEY=VALUE` assigns one key; unknown keys are errors and ranges are closed. \"none\" is a key that may be absent.
 [How scene files work](scene.md).
 
