@@ -5,6 +5,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use rayon::prelude::*;
 use serde_json::json;
 use wake_ldm::device_named;
 
@@ -170,20 +171,23 @@ fn simulated(
         for pair in source.items(first..count.min(first + AT_ONCE))? {
             let sample = Sample::of_pair(&pair);
             let image = Grey::from_levels(SIZE, SIZE, &sample.pixels);
-            for ((name, finder), judged) in finders.iter().zip(&mut judged) {
-                let begin = Instant::now();
-                let detections = finder.find(&image);
-                if *name == "network" {
-                    seconds += begin.elapsed().as_secs_f64();
-                    if pictures.len() < PICTURES {
-                        pictures.push(picture(&image, &sample.wakes, &detections));
-                    }
-                }
+            let begin = Instant::now();
+            let network = finders[0].1.find(&image);
+            seconds += begin.elapsed().as_secs_f64();
+            if pictures.len() < PICTURES {
+                pictures.push(picture(&image, &sample.wakes, &network));
+            }
+            let others = finders[1..]
+                .par_iter()
+                .map(|(_, finder)| finder.find(&image));
+            let others: Vec<_> = others.collect();
+            let all = std::iter::once(&network).chain(&others);
+            for (detections, judged) in all.zip(&mut judged) {
                 judged.push(Judged {
                     columns: SIZE as f64,
                     rows: SIZE as f64,
                     labels: sample.wakes.iter().map(label).collect(),
-                    found: found(&detections),
+                    found: found(detections),
                 });
             }
             wakes.push(sample.wakes);

@@ -28,6 +28,8 @@ pub(crate) enum Recipe {
     Sampled,
     /// Painted and simulated images (detector) in turn
     Mixed,
+    /// Painted and simulated images (cluttered) in turn
+    Full,
 }
 
 /// What the recipe detector is without gusts, swell, slicks, shallow water and a second ship.
@@ -66,6 +68,7 @@ impl Recipe {
             Self::Cluttered => "cluttered",
             Self::Sampled => "sampled",
             Self::Mixed => "mixed",
+            Self::Full => "full",
         }
     }
 
@@ -92,12 +95,8 @@ impl Recipe {
                     Simulated::new(recipe, seed)?,
                 )?));
             }
-            Self::Mixed => {
-                return Ok(Arc::new(Mixture::new(vec![
-                    (1.0, Self::Painted.source(seed, size)?),
-                    (1.0, Self::Detector.source(seed, size)?),
-                ])?));
-            }
+            Self::Mixed => return in_turn([Self::Painted, Self::Detector], seed, size),
+            Self::Full => return in_turn([Self::Painted, Self::Cluttered], seed, size),
         };
         Ok(Arc::new(simulated(&changes.concat(), seed, size)?))
     }
@@ -120,6 +119,15 @@ impl Recipe {
         let changes = [&changes.concat()[..], &empty].concat();
         Ok(Arc::new(simulated(&changes, seed, size)?))
     }
+}
+
+/// Images of both recipes in turn.
+fn in_turn(recipes: [Recipe; 2], seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
+    let part = |recipe: Recipe| Ok((1.0, recipe.source(seed, size)?));
+    let parts = recipes.into_iter().map(part);
+    Ok(Arc::new(Mixture::new(
+        parts.collect::<wake_ldm::Result<_>>()?,
+    )?))
 }
 
 /// The recipe detector with changes.

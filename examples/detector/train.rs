@@ -46,6 +46,9 @@ pub(crate) struct Options {
     /// Steps between checkpoints
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
+    /// flex, ndarray, wgpu or cuda, where compiled in
+    #[arg(long, default_value = "flex")]
+    device: String,
     /// Folder of the results; a run that was killed goes on from its last checkpoint there
     #[arg(long, value_name = "DIR", default_value = "out/detector")]
     out: PathBuf,
@@ -53,7 +56,7 @@ pub(crate) struct Options {
 
 /// Trains, and writes `detector.safetensors` (averaged weights), `train.jsonl` and `checkpoints/` into the folder.
 pub(crate) fn train(options: &Options) -> Result<(), Box<dyn Error>> {
-    let device = device_named("flex")?.autodiff();
+    let device = device_named(&options.device)?.autodiff();
     device.seed(options.seed);
     let steps = (options.images as usize).div_ceil(BATCH);
     let trainer_options = TrainerOptions {
