@@ -26,6 +26,8 @@ pub(crate) struct Judged<'a> {
     pub(crate) name: &'static str,
     /// Whether it is a model, not the simulator in its place.
     pub(crate) has_network: bool,
+    /// A model of images and prompts alone, beside it.
+    pub(crate) text_to_image: Option<&'a dyn ImageSource>,
     /// What it can be told besides sentence and numbers together; none for the simulator.
     pub(crate) conditions: Vec<Told>,
 }
@@ -108,7 +110,7 @@ const PAPER: Paper = Paper {
 /// Sums over the scenes.
 #[derive(Default)]
 struct Sums {
-    tallies: [Tally; 5],
+    tallies: [Tally; 6],
     simulated: Vec<Reading>,
     generated: Vec<Reading>,
     gaussian: Vec<Reading>,
@@ -144,19 +146,23 @@ pub(crate) fn judge(
         .collect();
     let swaps = swaps(plan.pairs, model, &told, || bar.inc(1))?;
     bar.set_message("seconds");
-    let seconds = timings(model)?;
+    let seconds = timings(model, judged.text_to_image)?;
     let [simulator, model_looks] = sums.looks.each_ref().map(|looks| quantile(looks, 0.5));
-    let [second, model_row, gaussian, constant, blurred] = &sums.tallies;
+    let [second, model_row, gaussian, constant, blurred, latent] = &sums.tallies;
+    let latent = judged.text_to_image.map(|_| latent.row("text to image"));
     Ok(Report {
         judged: judged.name,
         scenes: scenes.len(),
-        pixels: vec![
+        pixels: [
             model_row.row("model"),
             second.row("simulator, other sea"),
             gaussian.row("expected image, Gaussian sea"),
             constant.row("constant"),
             blurred.row("blurred simulator"),
-        ],
+        ]
+        .into_iter()
+        .chain(latent)
+        .collect(),
         rungs,
         speckle: Speckle {
             looks: scenes[0].radar.looks,
@@ -184,6 +190,8 @@ impl Sums {
         let seconds = Simulator.draw(&others, Told::Both)?;
         let generated = judged.source.draw(scenes, Told::Both)?;
         let linear = Gaussian.draw(scenes, Told::Both)?;
+        let latent = judged.text_to_image;
+        let latent = latent.map_or(Ok(Vec::new()), |source| source.draw(scenes, Told::Both))?;
         for (n, scene) in scenes.iter().enumerate() {
             let images = [&references[n], &seconds[n], &generated[n], &linear[n]];
             let [reference, second, model, gaussian] = images.map(grey);
@@ -191,6 +199,9 @@ impl Sums {
             let images = [&second, &model, &gaussian, &flat, &soft];
             for (tally, image) in self.tallies.iter_mut().zip(images) {
                 tally.add(&reference, image, lpips);
+            }
+            if let Some(image) = latent.get(n) {
+                self.tallies[5].add(&reference, &grey(image), lpips);
             }
             self.simulated.push(Reading::of(&references[n], scene)?);
             self.generated.push(Reading::of(&generated[n], scene)?);

@@ -30,6 +30,7 @@ mod sea_report;
 mod source;
 mod statistics;
 mod swaps;
+mod text_to_image;
 mod timing;
 mod wake;
 
@@ -38,9 +39,10 @@ use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use judge::{Judged, Plan, judge};
 use model::Model;
-use source::{OtherSea, Result, Told};
+use source::{ImageSource, OtherSea, Result, Told};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use text_to_image::TextToImage;
 use wake_ldm::device_named;
 use wake_ldm::metrics::{Lpips, LpipsNetwork};
 use wake_physics::output;
@@ -63,6 +65,9 @@ struct Arguments {
     /// Steps from noise to image; without it, the sampler's own number
     #[arg(long, conflicts_with = "simulator_only")]
     steps: Option<usize>,
+    /// Folder of a model that `train -- text-to-image` wrote, to stand beside the model
+    #[arg(long, value_name = "DIR")]
+    text_to_image: Option<PathBuf>,
     /// Held-out scenes
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
     count: u32,
@@ -109,6 +114,10 @@ fn run(arguments: &Arguments) -> Result<()> {
             Some(Model::load(folder, arguments.steps, &device)?)
         }
     };
+    let text_to_image = arguments.text_to_image.as_deref();
+    let text_to_image = text_to_image.map(|folder| TextToImage::load(folder, &device));
+    let text_to_image = text_to_image.transpose()?;
+    let beside = text_to_image.as_ref().map(|s| s as &dyn ImageSource);
     // What cannot be read leaves no folder behind.
     output::make_folder(&arguments.out)?;
     let judged = match &model {
@@ -116,12 +125,14 @@ fn run(arguments: &Arguments) -> Result<()> {
             source: model,
             name: "model",
             has_network: true,
+            text_to_image: beside,
             conditions: vec![Told::Text, Told::Numbers, Told::Paraphrase],
         },
         None => Judged {
             source: &OtherSea,
             name: "simulator with another random sea",
             has_network: false,
+            text_to_image: beside,
             conditions: Vec::new(),
         },
     };

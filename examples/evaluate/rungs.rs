@@ -46,6 +46,9 @@ fn sources<'a>(judged: &Judged<'a>) -> Vec<(&'static str, &'a dyn ImageSource)> 
     if judged.has_network {
         sources.push(("model", judged.source));
     }
+    if let Some(source) = judged.text_to_image {
+        sources.push(("text to image", source));
+    }
     sources.push(("simulator, other sea", &OtherSea));
     sources
 }

@@ -43,10 +43,15 @@ pub(crate) struct TimingRow {
     pub(crate) simulator_harmonic_sum: f64,
     /// Absent where the model draws another size only.
     pub(crate) model: Option<f64>,
+    /// Of the model of images and prompts alone.
+    pub(crate) text_to_image: Option<f64>,
 }
 
-/// Times all three in one run.
-pub(crate) fn timings(model: Option<&dyn ImageSource>) -> Result<Vec<TimingRow>> {
+/// Times all of them in one run.
+pub(crate) fn timings(
+    model: Option<&dyn ImageSource>,
+    text_to_image: Option<&dyn ImageSource>,
+) -> Result<Vec<TimingRow>> {
     SIZES
         .into_iter()
         .map(|size| {
@@ -56,18 +61,21 @@ pub(crate) fn timings(model: Option<&dyn ImageSource>) -> Result<Vec<TimingRow>>
                 simulate(&scene)?;
                 Ok(())
             })?;
-            let model = match model.filter(|_| size == SIZE) {
-                None => None,
-                Some(model) => Some(median(|| {
-                    model.draw(std::slice::from_ref(&scene), Told::Both)?;
-                    Ok(())
-                })?),
+            let drawn = |source: Option<&dyn ImageSource>| {
+                let draw = |source: &dyn ImageSource| {
+                    median(|| {
+                        source.draw(std::slice::from_ref(&scene), Told::Both)?;
+                        Ok(())
+                    })
+                };
+                source.filter(|_| size == SIZE).map(draw).transpose()
             };
             Ok(TimingRow {
                 size,
                 simulator_fast: fast,
                 simulator_harmonic_sum: harmonic_seconds(&scene),
-                model,
+                model: drawn(model)?,
+                text_to_image: drawn(text_to_image)?,
             })
         })
         .collect()

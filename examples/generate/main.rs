@@ -89,11 +89,11 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     match arguments.weights.as_deref() {
         None => wake_model::run(arguments),
-        Some(folder) if folder.join("config.json").is_file() => wake_model::run(arguments),
         Some(folder) if folder.join("unet").is_dir() => match &arguments.sea {
             None => diffusers::run(arguments, folder),
             Some(_) => Err("--sea is for the wake model; leave it out, or --weights".into()),
         },
+        Some(folder) if folder.join("config.json").is_file() => wake_model::run(arguments),
         Some(folder) => Err(format!(
             "--weights {}: no model there; a folder that `train` wrote holds config.json, one in diffusers layout unet/",
             folder.display()

@@ -25,6 +25,13 @@
 //! ```
 //!
 //! `fine-tune` changes a model in diffusers layout (as Stable Diffusion v1.4) instead, and writes the same layout.
+//!
+//! ```text
+//! cargo run --release --example train -- text-to-image --count 4000
+//! ```
+//!
+//! `text-to-image` learns a small model of that layout from nothing, from images and prompts alone: the autoencoder, then
+//! text encoder and U-Net together. `generate --weights`, `evaluate --text-to-image` and `fine-tune` read it.
 
 #[path = "../common/exit.rs"]
 mod exit;
@@ -37,9 +44,11 @@ mod progress;
 mod sea;
 #[path = "../common/sea_images.rs"]
 mod sea_images;
+mod sheet;
 mod source;
 mod stage;
 mod stages;
+mod text_to_image;
 
 use std::process::ExitCode;
 
@@ -66,6 +75,8 @@ enum Stage {
     Diffusion(Options),
     /// Learn the sea of a folder of real images, without labels.
     Sea(sea::Options),
+    /// Learn a model of Stable Diffusion's kind from nothing.
+    TextToImage(text_to_image::Options),
     /// Fit a model in diffusers layout to simulated pairs: its U-Net, or low-rank changes of it.
     FineTune(fine_tune::Options),
 }
@@ -77,6 +88,7 @@ fn main() -> ExitCode {
         Stage::Mean(options) => stages::mean(&options),
         Stage::Diffusion(options) => stages::diffusion(&options),
         Stage::Sea(options) => sea::run(&options),
+        Stage::TextToImage(options) => text_to_image::run(&options),
         Stage::FineTune(options) => fine_tune::run(&options),
     })
 }

@@ -22,10 +22,11 @@ use wake_text::Wording;
 use super::exit;
 use super::options::Options;
 use super::progress;
+use super::sheet::sheet;
 use super::source::Source;
 use super::stage::Stage;
 
-type Outcome<T> = Result<T, Box<dyn Error>>;
+pub(crate) type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// Images that the patch transform is fitted to.
 const FITTED: u64 = 400;
@@ -148,7 +149,7 @@ impl<'a> Work<'a> {
             grid: self.config.grid(),
             seed: options.seed,
         };
-        let examples = sheet_examples(source)?;
+        let examples = source.first(ACROSS)?;
         let (config, out) = (self.config.clone(), &options.out);
         let show = |run: &Run<Prior>| {
             let prior = run.averaged();
@@ -203,7 +204,7 @@ impl<'a> Work<'a> {
             config: &config,
             seed: options.seed,
         };
-        let examples = sheet_examples(source)?;
+        let examples = source.first(ACROSS)?;
         let scenes: Vec<Scene> = examples.iter().map(|pair| pair.scene.clone()).collect();
         let show = |run: &Run<Flow>| {
             let flow = run.averaged();
@@ -296,7 +297,7 @@ impl<'a> Work<'a> {
         for first in (0..source.len()).step_by(AT_ONCE) {
             let read = |pair: Pair| -> wake_ldm::Result<_> {
                 let Pair { image, scene, .. } = pair;
-                let expected = expected_grey(&scene)?;
+                let expected = expected_grey(&scene, &self.config.grey)?;
                 Ok(([image.pixels, expected], scene))
             };
             let pairs = source.items(first..source.len().min(first + AT_ONCE as u64))?;
@@ -336,19 +337,18 @@ fn config(options: &Options) -> Outcome<WakeModelConfig> {
     };
     Ok(match file {
         Some(file) => WakeModelConfig::read(file)?,
-        None => WakeModelConfig {
-            scene: trained_scene(options)?,
-            ..WakeModelConfig::standard(&vocabulary()?)
-        },
+        None => trained(options, &vocabulary()?)?,
     })
 }
 
-/// What the scenes of the data share, as far as a model is not told of it.
-fn trained_scene(options: &Options) -> wake_ldm::Result<Scene> {
-    Ok(match &options.data {
-        Some(path) => Folder::open(path)?.manifest().recipe.scene.clone(),
-        None => Scene::default(),
-    })
+/// The standard widths, and of the data what a model is not told: what its scenes share, and their grey.
+fn trained(options: &Options, vocabulary: &Vocabulary) -> wake_ldm::Result<WakeModelConfig> {
+    let mut config = WakeModelConfig::standard(vocabulary);
+    if let Some(path) = &options.data {
+        let recipe = Folder::open(path)?.manifest().recipe.clone();
+        (config.scene, config.grey) = (recipe.scene, recipe.grey);
+    }
+    Ok(config)
 }
 
 /// What prompts about wakes can contain: the words of every wording, and every digit.
@@ -365,10 +365,6 @@ fn vocabulary() -> Result<Vocabulary, wake_text::Error> {
     Ok(Vocabulary::new(ids))
 }
 
-fn sheet_examples(source: &Source) -> wake_ldm::Result<Vec<Pair>> {
-    source.items(0..source.len().min(ACROSS))
-}
-
 /// The mean images of some scenes.
 fn expected_images(
     prior: &Prior,
@@ -378,28 +374,10 @@ fn expected_images(
 ) -> wake_ldm::Result<Vec<Vec<f32>>> {
     let scenes: Vec<Scene> = examples.iter().map(|pair| pair.scene.clone()).collect();
     let conditions: Vec<Conditions> = scenes.iter().map(Conditions::of_scene).collect();
-    let wake = expected_latents(&scenes, patches)?;
+    let wake = expected_latents(&scenes, &config.grey, patches)?;
     let expected = prior.forward(&Known::new(&conditions, config.grid(), wake));
     let images = patches.decode(expected.mean, expected.grey).clamp(0.0, 1.0);
     let pixels: Vec<f32> = images.into_data().iter::<f32>().collect();
     let size = config.image_size * config.image_size;
     Ok(pixels.chunks(size).map(<[f32]>::to_vec).collect())
-}
-
-/// Simulated images above, images of the model below.
-fn sheet(examples: &[Pair], drawn: &[Vec<f32>], path: &Path) -> Outcome<()> {
-    let (size, width) = (
-        examples[0].image.rows,
-        examples[0].image.rows * examples.len(),
-    );
-    let mut sheet = vec![0; 2 * size * width];
-    for (i, (pair, drawn)) in examples.iter().zip(drawn).enumerate() {
-        for (row, pixels) in [(0, &pair.image.pixels), (1, drawn)] {
-            for (p, &grey) in pixels.iter().enumerate() {
-                let (x, y) = (i * size + p % size, row * size + p / size);
-                sheet[y * width + x] = (255.0 * grey).round() as u8;
-            }
-        }
-    }
-    Ok(output::write_png(path, &sheet, 2 * size, width)?)
 }

@@ -12,6 +12,8 @@ mod make_dataset;
 #[cfg(feature = "train")]
 mod sea;
 #[cfg(feature = "train")]
+mod text_to_image;
+#[cfg(feature = "train")]
 mod train;
 
 use std::collections::BTreeMap;

@@ -305,6 +305,18 @@ fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
             refused_by("train", &arguments, &[&pixels, "64 × 64"]);
         }
     }
+    // Grey in another mapping than the model's.
+    let set = toys.path("amplitude");
+    let changes = [
+        "scene.grid.rows=64",
+        "scene.grid.columns=64",
+        "grey.mapping=amplitude",
+    ];
+    let mut arguments = vec!["--count", "1"];
+    arguments.extend(changes.iter().flat_map(|change| ["--set", *change]));
+    done("make_dataset", &arguments, &set);
+    let arguments = ["mean", "--data", text(&set), "--config", text(&config)];
+    refused_by("train", &arguments, &["grey", "Amplitude", "Decibel"]);
     for rate in ["nan", "inf", "1e300", "0", "-1"] {
         let rate = format!("--rate={rate}");
         for stage in ["words", "mean", "diffusion"] {

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Error, Result};
+
 /// Grey between two fixed ends, the same for every scene: linear in decibel, or in amplitude as quick-looks are.
 ///
 /// ```text
@@ -68,6 +70,41 @@ impl GreyScale {
             brightest_db: 10.0 * mean_sigma0.log10() + 8.0,
             mapping: Mapping::Amplitude,
         }
+    }
+
+    /// Checks that grey rises with σ⁰.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] for an end beyond −200 to 100 dB, [`Error::Conflict`] for ends less than a thousandth of a
+    /// decibel apart or the wrong way round.
+    pub fn validate(&self) -> Result<()> {
+        let ends = [
+            ("grey.darkest_db", self.darkest_db),
+            ("grey.brightest_db", self.brightest_db),
+        ];
+        for (name, value) in ends {
+            if !(-200.0..=100.0).contains(&value) {
+                return Err(Error::OutOfRange {
+                    name: name.to_owned(),
+                    value,
+                    min: -200.0,
+                    max: 100.0,
+                    unit: "dB",
+                });
+            }
+        }
+        if self.brightest_db - self.darkest_db >= 1e-3 {
+            return Ok(());
+        }
+        Err(Error::Conflict {
+            name: "grey.brightest_db".to_owned(),
+            value: self.brightest_db.to_string(),
+            requirement: format!(
+                "but must be above grey.darkest_db, which is {}",
+                self.darkest_db
+            ),
+        })
     }
 
     /// Grey 0…1 of σ⁰ \[1\]; σ⁰ = 0 is black.
@@ -166,6 +203,26 @@ mod tests {
         let text = serde_json::to_string(&scale).unwrap();
         assert!(text.contains(r#""mapping":"amplitude""#), "{text}");
         assert_eq!(serde_json::from_str::<GreyScale>(&text).unwrap(), scale);
+    }
+
+    #[test]
+    fn ends_that_no_grey_lies_between_are_refused() {
+        let refused = |darkest_db, brightest_db| {
+            let scale = GreyScale {
+                darkest_db,
+                brightest_db,
+                mapping: Mapping::Amplitude,
+            };
+            scale.validate().unwrap_err().to_string()
+        };
+        assert_eq!(
+            refused(0.0, -10.0),
+            "grey.brightest_db is -10, but must be above grey.darkest_db, which is 0"
+        );
+        assert!(refused(-300.0, 0.0).starts_with("grey.darkest_db is -300, outside"));
+        assert!(refused(-30.0, f64::NAN).starts_with("grey.brightest_db is NaN, outside"));
+        GreyScale::default().validate().unwrap();
+        GreyScale::amplitude_around(0.01).validate().unwrap();
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub struct Manifest {
     pub seed: u64,
     /// Number of pairs of the whole set.
     pub count: u64,
-    /// The mapping from σ⁰ to grey.
+    /// The mapping from σ⁰ to grey, that of the recipe.
     pub grey: GreyScale,
     /// Share of the images that are for validation, 0 to 1.
     pub val_share: f64,
@@ -75,7 +75,7 @@ impl Manifest {
             seed,
             count,
             shard: None,
-            grey: GreyScale::default(),
+            grey: recipe.grey,
             val_share: VAL_SHARE,
             recipe,
             sea: None,
@@ -144,6 +144,10 @@ impl Manifest {
                 "format {} is not {FORMAT}; make the set again with this version",
                 manifest.format
             );
+            return Err(broken(&path, 1, message));
+        }
+        if manifest.grey != manifest.recipe.grey {
+            let message = "grey and recipe.grey differ; a set has one mapping".to_owned();
             return Err(broken(&path, 1, message));
         }
         manifest.shard = read_json(&Layout(folder).shard_note())?;

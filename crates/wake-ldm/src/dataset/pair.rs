@@ -23,7 +23,7 @@ pub struct Grey {
 pub struct Pair {
     /// Its number in the data set.
     pub index: u64,
-    /// The image, in the grey of [`GreyScale::default`], or as the quick-look that the recipe draws.
+    /// The image, in the grey of its recipe, or as the quick-look that the recipe draws.
     pub image: Grey,
     /// The scene in words.
     pub prompt: String,
@@ -80,7 +80,7 @@ impl Simulated {
     pub(super) fn grey(&self, power: &Field, index: u64) -> (Grey, Option<[f64; 2]>) {
         match self.quick_look(index) {
             Some([gain, offset]) => Grey::quick_look(power, gain, offset),
-            None => (Grey::of_power(power, &GreyScale::default()), None),
+            None => (Grey::of_power(power, &self.recipe().grey), None),
         }
     }
 

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::path::Path;
+use wake_physics::grey::GreyScale;
 use wake_physics::scene::Grid;
 use wake_physics::{Scene, sentence};
 
@@ -17,6 +18,10 @@ use wake_physics::{Scene, sentence};
 /// base = "detector"         # paper, ranges or detector
 /// speckle = true            # false: the image before speckle
 /// paraphrase = false        # true: four wordings in turn, false: the paper's
+/// [grey]                    # σ⁰ to grey, linear in decibel or in amplitude
+/// mapping = "amplitude"
+/// darkest_db = -60.0
+/// brightest_db = -2.0
 /// [scene.grid]              # [scene] is a scene file: what is not drawn
 /// rows = 128
 /// [draw]                    # see Draws
@@ -30,6 +35,9 @@ pub struct Recipe {
     pub speckle: bool,
     /// Whether prompts take all wordings of [`wake_text::Wording`] at random, or the paper's alone.
     pub paraphrase: bool,
+    /// The mapping from σ⁰ to grey, unless the recipe draws quick-looks.
+    #[serde(default)]
+    pub grey: GreyScale,
     /// How scenes are chosen.
     pub draw: Draw,
     /// The values that are not drawn.
@@ -101,6 +109,7 @@ impl Default for Recipe {
         Self {
             speckle: false,
             paraphrase: false,
+            grey: GreyScale::default(),
             draw: Draw::Values(Draws::ranges()),
             scene,
         }
@@ -113,6 +122,7 @@ impl Recipe {
         Self {
             speckle: true,
             paraphrase: false,
+            grey: GreyScale::default(),
             draw: Draw::PaperGrid,
             scene: Scene::default(),
         }
@@ -228,6 +238,7 @@ impl Recipe {
     /// [`Error::OutOfRange`] or [`Error::Scene`] with name, value and range.
     pub fn validate(&self) -> Result<()> {
         self.scene.validate()?;
+        self.grey.validate()?;
         match &self.draw {
             Draw::PaperGrid => Ok(()),
             Draw::Values(draws) => draws.validate(&self.scene),

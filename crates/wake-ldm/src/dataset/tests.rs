@@ -597,6 +597,49 @@ fn quick_looks_can_be_undone() {
     assert!(compared > 400, "{compared}");
 }
 
+/// One mapping in amplitude for a whole set: σ⁰ follows from any image and the manifest, to half a level, where grey is not
+/// cut.
+#[test]
+fn grey_in_amplitude_can_be_undone() {
+    let scale = wake_physics::grey::GreyScale::amplitude_around(0.05);
+    let changes = [
+        format!("grey.darkest_db = {}", scale.darkest_db),
+        format!("grey.brightest_db = {}", scale.brightest_db),
+        "grey.mapping = \"amplitude\"".to_owned(),
+        "draw.count = 1".to_owned(),
+        "speckle = false".to_owned(),
+    ];
+    let recipe = manifest().recipe.with_assignments(&changes).unwrap();
+    let manifest = Manifest::new(recipe, 11, 2).unwrap();
+    assert_eq!(manifest.grey, scale);
+    let folder = TempDir::new().unwrap();
+    assert_eq!(made(folder.path(), &manifest), 2);
+    let set = Folder::open(folder.path()).unwrap();
+    let mut compared = 0;
+    for index in 0..2 {
+        let pair = set.pair(index).unwrap();
+        assert_eq!(pair.amplitudes, None);
+        let image = wake_physics::simulate(&pair.scene).unwrap().intensity;
+        for (&grey, &power) in pair.image.pixels.iter().zip(&image.values) {
+            if (0.01..0.99).contains(&grey) {
+                let found = set.manifest().grey.sigma0(f64::from(grey)).sqrt();
+                let white = 10f64.powf(0.05 * scale.brightest_db);
+                let apart = (found - f64::from(power).sqrt()).abs();
+                assert!(apart <= 0.501 / 255.0 * white, "{apart}");
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 400, "{compared}");
+
+    // Two mappings in one manifest are none.
+    let path = folder.path().join("dataset.json");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("-60.0", "-50.0", 1)).unwrap();
+    let error = Folder::open(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("grey and recipe.grey differ"), "{error}");
+}
+
 /// A learnt sea of white noise and a flow without training.
 #[cfg(feature = "flex")]
 fn white_sea(spacing: Option<f64>) -> crate::sea_texture::SeaTexture {

@@ -20,6 +20,7 @@ mod sea;
 mod tasks;
 
 mod fine_tune;
+mod text_to_image;
 mod folder;
 mod metrics;
 
@@ -35,6 +36,9 @@ pub use optimizer::{AdamOptions, Rate};
 pub use run::{Run, RunOptions, Task, Terms};
 pub use sea::{SeaPatches, SeaTask};
 pub use tasks::{FlowTask, PriorTask, WordsTask};
+pub use text_to_image::{
+    AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
+};
 pub use trainer::{StepReport, Trainer, TrainerOptions};
 pub use two_sample::{TwoSample, TwoSampleOptions, two_sample};
 

@@ -196,6 +196,16 @@ impl AutoencoderKl {
         latents / self.config.scaling_factor + self.config.shift_factor
     }
 
+    /// The same with another shift and scale of latents, as [`to_latents`](Self::to_latents) has them.
+    #[cfg(feature = "train")]
+    pub(crate) fn with_latents(mut self, shift: f64, scale: f64) -> Self {
+        self.config = self
+            .config
+            .with_shift_factor(shift)
+            .with_scaling_factor(scale);
+        self
+    }
+
     /// What latents are multiplied with before diffusion.
     pub fn scaling_factor(&self) -> f64 {
         self.config.scaling_factor

@@ -190,13 +190,7 @@ impl Pipeline {
         if let Some(known) = cache.get(prompt) {
             return known.clone();
         }
-        let tokenizer = self.tokenizer.as_ref().unwrap_or_else(|| Tokenizer::clip());
-        let ids: Vec<i32> = tokenizer
-            .encode(prompt)
-            .ids
-            .iter()
-            .map(|&id| id as i32)
-            .collect();
+        let ids = token_ids(self.tokenizer.as_ref(), prompt);
         let length = ids.len();
         let ids: Tensor<2, Int> =
             Tensor::from_data(TensorData::new(ids, [1, length]), &self.device);
@@ -322,6 +316,13 @@ impl Pipeline {
             format!("{expected:?}"),
         ))
     }
+}
+
+/// The ids of a prompt, marks and padding included; without a tokenizer those of CLIP's own.
+pub(crate) fn token_ids(tokenizer: Option<&Tokenizer>, prompt: &str) -> Vec<i32> {
+    let tokenizer = tokenizer.unwrap_or_else(|| Tokenizer::clip());
+    let tokens = tokenizer.encode(prompt);
+    tokens.ids.iter().map(|&id| id as i32).collect()
 }
 
 fn last_two(x: &Tensor<4>) -> [usize; 2] {

@@ -244,41 +244,71 @@ impl FineTune {
         noise: Tensor<4>,
         context: Tensor<3>,
     ) -> Task {
-        let levels: Vec<NoiseLevel> = steps
-            .iter()
-            .map(|&t| self.frozen.schedule.noise_level(t))
-            .collect();
-        let device = clean.device();
-        let each = |values: Vec<f64>| -> Tensor<4> {
-            let data = TensorData::new(values.iter().map(|&x| x as f32).collect(), [steps.len()]);
-            Tensor::<1>::from_data(data, &device).reshape([-1, 1, 1, 1])
-        };
-        let signal = each(levels.iter().map(|level| level.signal).collect());
-        let spread = each(levels.iter().map(|level| level.noise).collect());
-        let sample = clean.clone() * signal.clone() + noise.clone() * spread.clone();
-        let target = match self.options.prediction {
-            Prediction::Velocity => noise * signal - clean * spread,
-            Prediction::Sample => clean,
-            Prediction::Flow => noise - clean,
-            Prediction::Epsilon => noise,
-        };
-        let snr: Vec<f64> = levels
-            .iter()
-            .map(|l| (l.signal / l.noise).powi(2))
-            .collect();
+        let noised = noised(
+            &self.frozen.schedule,
+            self.options.prediction,
+            steps,
+            clean,
+            noise,
+        );
+        let levels = steps.iter().map(|&t| self.frozen.schedule.noise_level(t));
+        let snr: Vec<f64> = levels.map(|l| (l.signal / l.noise).powi(2)).collect();
         let weights = self.options.snr_gamma.map_or_else(
             || vec![1.0; steps.len()],
             |gamma| min_snr_weights(&snr, gamma, self.options.prediction),
         );
-        let timesteps = each(steps.iter().map(|&t| t as f64).collect()).reshape([-1]);
+        let device = noised.sample.device();
         Task {
-            sample: Tensor::from_inner(sample),
-            timesteps: Tensor::from_inner(timesteps),
+            sample: Tensor::from_inner(noised.sample),
+            timesteps: Tensor::from_inner(noised.timesteps),
             context: Tensor::from_inner(context),
-            target: Tensor::from_inner(target),
-            weights: Tensor::from_inner(each(weights)),
+            target: Tensor::from_inner(noised.target),
+            weights: Tensor::from_inner(each(weights, &device)),
         }
     }
+}
+
+/// Noisy latents, their steps, and what the model should say of them.
+pub(super) struct Noised {
+    /// `[batch, channels, rows, columns]`
+    pub(super) sample: Tensor<4>,
+    /// `[batch]`
+    pub(super) timesteps: Tensor<1>,
+    /// As `sample`.
+    pub(super) target: Tensor<4>,
+}
+
+/// Mixes latents with noise, each as much as its step has.
+pub(super) fn noised(
+    schedule: &NoiseSchedule,
+    prediction: Prediction,
+    steps: &[usize],
+    clean: Tensor<4>,
+    noise: Tensor<4>,
+) -> Noised {
+    let levels: Vec<NoiseLevel> = steps.iter().map(|&t| schedule.noise_level(t)).collect();
+    let device = clean.device();
+    let signal = each(levels.iter().map(|level| level.signal).collect(), &device);
+    let spread = each(levels.iter().map(|level| level.noise).collect(), &device);
+    let sample = clean.clone() * signal.clone() + noise.clone() * spread.clone();
+    let target = match prediction {
+        Prediction::Velocity => noise * signal - clean * spread,
+        Prediction::Sample => clean,
+        Prediction::Flow => noise - clean,
+        Prediction::Epsilon => noise,
+    };
+    Noised {
+        sample,
+        timesteps: each(steps.iter().map(|&t| t as f64).collect(), &device).reshape([-1]),
+        target,
+    }
+}
+
+/// A number for each image, `[numbers, 1, 1, 1]`.
+fn each(values: Vec<f64>, device: &Device) -> Tensor<4> {
+    let numbers: Vec<f32> = values.into_iter().map(|x| x as f32).collect();
+    let count = numbers.len();
+    Tensor::from_data(TensorData::new(numbers, [count, 1, 1, 1]), device)
 }
 
 /// Refuses what no step can be made with.

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use wake_physics::Scene;
+use wake_physics::grey::GreyScale;
 use wake_physics::scene::Ship;
 
 use crate::error::{Error, Result, check_range};
@@ -41,6 +42,9 @@ pub struct WakeModelConfig {
     /// looked at.
     #[serde(default)]
     pub scene: Scene,
+    /// The mapping from σ⁰ to the grey of all training images.
+    #[serde(default)]
+    pub grey: GreyScale,
 }
 
 impl WakeModelConfig {
@@ -59,6 +63,7 @@ impl WakeModelConfig {
             norm_groups: 16,
             vocabulary: vocabulary.known().to_vec(),
             scene: Scene::default(),
+            grey: GreyScale::default(),
         }
     }
 
@@ -102,6 +107,7 @@ impl WakeModelConfig {
                 expected: "a multiple of 32 and of 8 fold".to_owned(),
             });
         }
+        self.grey.validate()?;
         check_range("fold", self.fold as f64, 1.0, 4.0)?;
         check_range("spacing", self.spacing, 0.1, 100.0)?;
         check_range("latent_channels", self.latent_channels as f64, 1.0, 64.0)?;

@@ -58,12 +58,11 @@ impl Known {
 /// # Errors
 ///
 /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
-pub fn expected_grey(scene: &Scene) -> Result<Vec<f32>> {
+pub fn expected_grey(scene: &Scene, scale: &GreyScale) -> Result<Vec<f32>> {
     scene.validate()?;
     if scene.ships.is_empty() {
         return Ok(vec![0.5; scene.grid.rows * scene.grid.columns]);
     }
-    let scale = GreyScale::default();
     let intensity = expected_intensity(scene)?;
     Ok(intensity
         .values
@@ -77,8 +76,8 @@ pub fn expected_grey(scene: &Scene) -> Result<Vec<f32>> {
 /// # Errors
 ///
 /// As [`expected_grey`].
-pub(crate) fn expected_greys(scenes: &[Scene]) -> Result<Vec<Vec<f32>>> {
-    runs_of_equals(scenes, expected_grey)
+pub(crate) fn expected_greys(scenes: &[Scene], scale: &GreyScale) -> Result<Vec<Vec<f32>>> {
+    runs_of_equals(scenes, |scene| expected_grey(scene, scale))
 }
 
 /// Latents of the images expected of some scenes of one size, see [`expected_grey`].
@@ -90,8 +89,13 @@ pub(crate) fn expected_greys(scenes: &[Scene]) -> Result<Vec<Vec<f32>>> {
 /// # Errors
 ///
 /// As [`expected_grey`].
-pub fn expected_latents(scenes: &[Scene], patches: &PatchTransform) -> Result<Tensor<4>> {
-    Ok(latents_of(scenes, expected_greys(scenes)?, patches))
+pub fn expected_latents(
+    scenes: &[Scene],
+    scale: &GreyScale,
+    patches: &PatchTransform,
+) -> Result<Tensor<4>> {
+    let images = expected_greys(scenes, scale)?;
+    Ok(latents_of(scenes, images, patches))
 }
 
 /// Latents of an image of each scene.
@@ -143,7 +147,8 @@ mod tests {
             ships: Vec::new(),
             ..scene.clone()
         };
-        let images = [&scene, &other].map(|scene| expected_grey(scene).unwrap());
+        let scale = GreyScale::default();
+        let images = [&scene, &other].map(|scene| expected_grey(scene, &scale).unwrap());
         let pixels = images.iter().map(Vec::as_slice);
         let (patches, _) = PatchTransform::fit(pixels, 64, 4, &device);
         let same = Scene {
@@ -151,7 +156,7 @@ mod tests {
             ..scene.clone()
         };
         let all = [scene.clone(), same, other, calm, scene];
-        let latents = expected_latents(&all, &patches).unwrap();
+        let latents = expected_latents(&all, &scale, &patches).unwrap();
         assert_eq!(latents.dims(), [5, 4, 8, 8]);
         let of = |k: usize| latents.clone().narrow(0, k, 1);
         let distance = |a, b| (of(a) - of(b)).abs().max().into_scalar::<f32>();

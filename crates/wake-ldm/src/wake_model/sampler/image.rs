@@ -33,13 +33,14 @@ pub struct WakeImage {
     pub labels: Labels,
     /// What was drawn: the scene that was told, and the default values of what was left open.
     pub scene: Scene,
+    /// The mapping between intensity and grey.
+    pub scale: GreyScale,
     /// Seconds by stage.
     pub seconds: SampleSeconds,
 }
 
 impl WakeImage {
-    pub(super) fn new(grey: Field, scene: Scene, seconds: SampleSeconds) -> Self {
-        let scale = GreyScale::default();
+    pub(super) fn new(grey: Field, scale: GreyScale, scene: Scene, seconds: SampleSeconds) -> Self {
         let intensity = Field {
             values: grey
                 .values
@@ -56,13 +57,18 @@ impl WakeImage {
             speckled,
             labels: labels_of(&scene),
             scene,
+            scale,
             seconds,
         }
     }
 
     /// An image whose intensity has its speckle already.
-    pub(super) fn with_speckle(intensity: Field, scene: Scene, seconds: SampleSeconds) -> Self {
-        let scale = GreyScale::default();
+    pub(super) fn with_speckle(
+        intensity: Field,
+        scale: GreyScale,
+        scene: Scene,
+        seconds: SampleSeconds,
+    ) -> Self {
         let grey = |&v: &f32| scale.grey(f64::from(v)) as f32;
         Self {
             grey: Field {
@@ -73,17 +79,17 @@ impl WakeImage {
             intensity,
             labels: labels_of(&scene),
             scene,
+            scale,
             seconds,
         }
     }
 
     /// The speckled image as 8-bit levels of grey, row after row.
     pub fn levels(&self) -> Vec<u8> {
-        let scale = GreyScale::default();
         self.speckled
             .values
             .iter()
-            .map(|&v| scale.level(f64::from(v)))
+            .map(|&v| self.scale.level(f64::from(v)))
             .collect()
     }
 }

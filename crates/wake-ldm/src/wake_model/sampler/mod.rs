@@ -46,7 +46,7 @@ pub enum Conditioning {
 /// What is told becomes one scene, which the result keeps: image, labels and speckle all follow from it, and
 /// [`sample_scenes`](Self::sample_scenes) of it draws the same image again. Its seed is the image's seed.
 ///
-/// Images are grey, [`GreyScale::default`](wake_physics::grey::GreyScale), free of speckle as the model makes them.
+/// Images are grey in the mapping that the model was trained with, [`WakeModelConfig::grey`], free of speckle as the model makes them.
 /// The sampler holds no gradients, whatever device its model was made on, and may be given to another thread, for
 /// instance to a data loader.
 ///
@@ -255,8 +255,9 @@ impl WakeSampler {
             seconds.denoise = lap();
             seconds.total = seconds.text + seconds.denoise;
             return Ok(Drawn {
-                grey: grey_of(&intensities, &self.device),
+                grey: grey_of(&intensities, &self.config.grey, &self.device),
                 pixels: Pixels::WithSpeckle(intensities),
+                scale: self.config.grey,
                 scenes,
                 seconds,
             });
@@ -273,7 +274,7 @@ impl WakeSampler {
         // Neither needs the other, and one of a single image does not fill all cores.
         let encoder = self.model.patches.encoder_rows();
         let (expected, seas) = rayon::join(
-            || expected_greys(&scenes),
+            || expected_greys(&scenes, &self.config.grey),
             || SeaFields::new(&scenes, &sources, &encoder),
         );
         let (expected, seas) = (expected?, seas?);
@@ -294,6 +295,7 @@ impl WakeSampler {
         Ok(Drawn {
             scenes,
             grey,
+            scale: self.config.grey,
             pixels: Pixels::Grey(pixels),
             seconds,
         })
@@ -367,6 +369,7 @@ struct Drawn {
     /// What they show.
     scenes: Vec<Scene>,
     grey: Tensor<4>,
+    scale: GreyScale,
     pixels: Pixels,
     seconds: SampleSeconds,
 }
@@ -380,8 +383,7 @@ enum Pixels {
 }
 
 /// Grey of some intensities of one size, `[images, 1, rows, columns]`.
-fn grey_of(intensities: &[Field], device: &Device) -> Tensor<4> {
-    let scale = GreyScale::default();
+fn grey_of(intensities: &[Field], scale: &GreyScale, device: &Device) -> Tensor<4> {
     let size = intensities.first().map_or([0, 0], |f| [f.rows, f.columns]);
     let values = intensities.iter().flat_map(|f| &f.values);
     let grey: Vec<f32> = values.map(|&v| scale.grey(f64::from(v)) as f32).collect();
@@ -398,7 +400,9 @@ impl Drawn {
             Pixels::WithSpeckle(intensities) => {
                 let images = intensities.into_par_iter().zip(self.scenes);
                 return images
-                    .map(|(image, scene)| WakeImage::with_speckle(image, scene, self.seconds))
+                    .map(|(image, scene)| {
+                        WakeImage::with_speckle(image, self.scale, scene, self.seconds)
+                    })
                     .collect();
             }
         };
@@ -411,7 +415,7 @@ impl Drawn {
                     columns,
                     values: pixels.to_vec(),
                 };
-                WakeImage::new(grey, scene, self.seconds)
+                WakeImage::new(grey, self.scale, scene, self.seconds)
             })
             .collect()
     }

@@ -66,6 +66,39 @@ fn a_prompt_becomes_an_image_with_the_labels_of_its_numbers() {
     );
 }
 
+/// The grey of a model's own mapping: levels, intensity, and that of a learnt sea.
+#[test]
+fn grey_is_that_of_the_models_mapping() {
+    let mut sampler = sampler();
+    let decibel = sampler.sample(PROMPT, 3).unwrap();
+    sampler.config.grey = GreyScale::amplitude_around(0.05);
+    let scale = sampler.config.grey;
+    let on_sea = sampler.clone().with_sea(white_sea(Some(4.0))).unwrap();
+    for image in [
+        sampler.sample(PROMPT, 3).unwrap(),
+        on_sea.sample(PROMPT, 3).unwrap(),
+    ] {
+        assert_eq!(image.scale, scale);
+        for (&grey, &power) in image.grey.values.iter().zip(&image.intensity.values) {
+            let expected = scale.grey(f64::from(power));
+            // Grey of the network may lie beyond its ends; what is cut is not compared.
+            if (0.0..=1.0).contains(&grey) {
+                assert!(
+                    (f64::from(grey) - expected).abs() < 1e-6,
+                    "{grey} {expected}"
+                );
+            }
+        }
+        let levels = image.levels();
+        for (&level, &power) in levels.iter().zip(&image.speckled.values) {
+            assert_eq!(level, scale.level(f64::from(power)));
+        }
+    }
+    // The expected image that it starts from is in that mapping, too.
+    let other = sampler.sample(PROMPT, 3).unwrap();
+    assert!(distance(&decibel.grey.values, &other.grey.values) > 1e-3);
+}
+
 #[test]
 fn levels_fall_from_all_noise_in_equal_steps() {
     assert_eq!(levels(4).collect::<Vec<_>>(), [1.0, 0.75, 0.5, 0.25]);
@@ -79,7 +112,9 @@ fn steps_follow_the_velocity_from_noise_to_latents() {
     sampler.model.flow = sampler.model.flow.clone().map(&mut Constant);
     let scene = sampler.base_scene();
     let conditions = [Conditions::of_scene(&scene)];
-    let wake = crate::network::expected_latents(&[scene], &sampler.model.patches).unwrap();
+    let wake =
+        crate::network::expected_latents(&[scene], &sampler.config.grey, &sampler.model.patches)
+            .unwrap();
     let known = Known::new(&conditions, sampler.config.grid(), wake);
     let expected = sampler.model.prior.forward(&known);
     let noise = expected.mean.zeros_like() + 0.5;
