@@ -168,21 +168,28 @@ fn simulated(
     let count = u64::from(options.images);
     let bar = progress::bar(count, recipe.name());
     for first in (0..count).step_by(AT_ONCE as usize) {
-        for pair in source.items(first..count.min(first + AT_ONCE))? {
-            let sample = Sample::of_pair(&pair);
-            let image = Grey::from_levels(SIZE, SIZE, &sample.pixels);
+        let pairs = source.items(first..count.min(first + AT_ONCE))?;
+        let samples: Vec<Sample> = pairs.iter().map(Sample::of_pair).collect();
+        let image = |sample: &Sample| Grey::from_levels(SIZE, SIZE, &sample.pixels);
+        let images: Vec<Grey> = samples.iter().map(image).collect();
+        if first == 0 {
+            // Alone, for its time.
             let begin = Instant::now();
-            let network = finders[0].1.find(&image);
-            seconds += begin.elapsed().as_secs_f64();
-            if pictures.len() < PICTURES {
-                pictures.push(picture(&image, &sample.wakes, &network));
+            for image in &images {
+                finders[0].1.find(image);
             }
-            let others = finders[1..]
-                .par_iter()
-                .map(|(_, finder)| finder.find(&image));
-            let others: Vec<_> = others.collect();
-            let all = std::iter::once(&network).chain(&others);
-            for (detections, judged) in all.zip(&mut judged) {
+            seconds = begin.elapsed().as_secs_f64() / images.len() as f64;
+        }
+        let find = |image: &Grey| -> Vec<Vec<Detection>> {
+            let all = finders.par_iter().map(|(_, finder)| finder.find(image));
+            all.collect()
+        };
+        let found_in: Vec<Vec<Vec<Detection>>> = images.par_iter().map(find).collect();
+        for ((image, sample), detections) in images.iter().zip(samples).zip(found_in) {
+            if pictures.len() < PICTURES {
+                pictures.push(picture(image, &sample.wakes, &detections[0]));
+            }
+            for (detections, judged) in detections.iter().zip(&mut judged) {
                 judged.push(Judged {
                     columns: SIZE as f64,
                     rows: SIZE as f64,
@@ -207,7 +214,7 @@ fn simulated(
     report
         .visibility
         .push(by_visibility(recipe, &judged, &wakes));
-    let megapixels = f64::from(options.images) * (SIZE * SIZE) as f64 * 1e-6;
+    let megapixels = (SIZE * SIZE) as f64 * 1e-6;
     println!(
         "{}: {:.2} megapixels a second",
         recipe.name(),
@@ -315,8 +322,9 @@ fn judge_real(
 ) -> Result<(), Box<dyn Error>> {
     let mut judged = [Vec::new(), Vec::new()];
     let mut pictures = Vec::new();
-    for (image, known) in tiles {
-        let detections = finder.find(image);
+    let found_in = tiles.par_iter().map(|(image, _)| finder.find(image));
+    let found_in: Vec<Vec<Detection>> = found_in.collect();
+    for ((image, known), detections) in tiles.iter().zip(found_in) {
         for (judged, known) in judged.iter_mut().zip(known) {
             judged.push(Judged {
                 found: found(&detections),

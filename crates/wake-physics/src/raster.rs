@@ -188,6 +188,7 @@ impl Field {
         (step, first): (usize, usize),
         change: impl Fn(&mut f32, f32) + Sync,
     ) {
+        let to_the_right: Vec<f32> = (0..step).map(|k| k as f32 / step as f32).collect();
         let rows = self.values.par_chunks_mut(self.columns.max(1));
         rows.enumerate().for_each_init(
             || vec![0.0f32; coarse.columns],
@@ -199,10 +200,10 @@ impl Field {
                 for (value, (a, b)) in line.iter_mut().zip(above.iter().zip(below)) {
                     *value = a + down * (b - a);
                 }
-                for (j, value) in row.iter_mut().enumerate() {
-                    let right = (j % step) as f32 / step as f32;
-                    let [a, b] = [line[j / step], line[j / step + 1]];
-                    change(value, a + right * (b - a));
+                for (row, ends) in row.chunks_mut(step).zip(line.windows(2)) {
+                    for (value, right) in row.iter_mut().zip(&to_the_right) {
+                        change(value, ends[0] + right * (ends[1] - ends[0]));
+                    }
                 }
             },
         );

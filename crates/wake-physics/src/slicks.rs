@@ -9,6 +9,7 @@
 
 use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
+use num_complex::Complex64;
 use rand::Rng;
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -30,8 +31,8 @@ pub struct Slicks {
     pub scale: f64,
 }
 
-/// One plane wave: wavenumber [rad/m] and phase.
-type Wave = ([f64; 2], f64);
+/// One plane wave: wavenumber [rad/m] and phase e^{iφ}.
+type Wave = ([f64; 2], Complex64);
 
 impl Slicks {
     /// What is left of the short waves at every pixel, 1 − damping \[1\]; 1 everywhere in a wind above
@@ -61,9 +62,17 @@ impl Slicks {
         let above = rows.start / step;
         let [below, columns] = raster.every(step);
         let below = below.min(rows.end.div_ceil(step) + 1);
+        // The turn of a wave at a place is that of its column times that of its row.
+        let turns =
+            |axis: usize, at: f64| waves.iter().map(move |(k, _)| Complex64::cis(k[axis] * at));
+        let of_columns = (0..columns).flat_map(|j| turns(0, raster.x(step * j)));
+        let of_columns: Vec<Complex64> = of_columns.collect();
+        let of_rows = (above..below).flat_map(|i| turns(1, raster.y(step * i)));
+        let of_rows: Vec<Complex64> = of_rows.collect();
         let damping = Field::from_fn(&Raster::image(below - above, columns, 1.0), |i, j| {
-            let place = [raster.x(step * j), raster.y(step * (above + i))];
-            let off = 2.0 * distance(&waves, place) / self.width;
+            let turns = of_rows[i * WAVES..].iter().zip(&of_columns[j * WAVES..]);
+            let turns = turns.map(|(row, column)| row * column);
+            let off = 2.0 * distance(&waves, turns) / self.width;
             (self.damping * (-0.5 * off * off).exp()) as f32
         });
         let first = rows.start - above * step;
@@ -78,20 +87,22 @@ impl Slicks {
         (0..WAVES)
             .map(|_| {
                 let (sin, cos) = turn().sin_cos();
-                ([k * sin, k * cos], turn())
+                ([k * sin, k * cos], Complex64::cis(turn()))
             })
             .collect()
     }
 }
 
 /// Distance from the nearest zero of ψ to first order, |ψ|/|∇ψ| \[m\].
-fn distance(waves: &[Wave], [x, y]: [f64; 2]) -> f64 {
+///
+/// - `turns`: of every wave e^{i(kx x + ky y)} at the place, in the order of the waves
+fn distance(waves: &[Wave], turns: impl Iterator<Item = Complex64>) -> f64 {
     let (mut value, mut slope) = (0.0, [0.0; 2]);
-    for ([kx, ky], phase) in waves {
-        let (sin, cos) = (kx * x + ky * y + phase).sin_cos();
-        value += cos;
-        slope[0] -= kx * sin;
-        slope[1] -= ky * sin;
+    for (([kx, ky], phase), turn) in waves.iter().zip(turns) {
+        let wave = turn * phase;
+        value += wave.re;
+        slope[0] -= kx * wave.im;
+        slope[1] -= ky * wave.im;
     }
     value.abs() / slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE)
 }
@@ -106,14 +117,20 @@ mod tests {
         scale: 2500.0,
     };
 
+    /// The distance at a place.
+    fn at(waves: &[Wave], [x, y]: [f64; 2]) -> f64 {
+        let turn = |(k, _): &Wave| Complex64::cis(k[0] * x + k[1] * y);
+        distance(waves, waves.iter().map(turn))
+    }
+
     /// One wave alone: parallel bands, where the distance is that of tan: d(1 + O((kd)²/3)).
     #[test]
     fn one_wave_makes_straight_bands() {
-        let waves = [([0.002, 0.0], -TAU / 4.0)];
+        let waves = [([0.002, 0.0], Complex64::cis(-TAU / 4.0))];
         for d in [0.0, 10.0, 40.0] {
             let kd: f64 = 0.002 * d;
-            assert!((distance(&waves, [d, 77.0]) - kd.tan() / 0.002).abs() < 1e-9);
-            assert!((distance(&waves, [d, 0.0]) / d.max(1e-9) - 1.0).abs() < kd * kd || d < 1.0);
+            assert!((at(&waves, [d, 77.0]) - kd.tan() / 0.002).abs() < 1e-9);
+            assert!((at(&waves, [d, 0.0]) / d.max(1e-9) - 1.0).abs() < kd * kd || d < 1.0);
         }
     }
 
@@ -127,7 +144,7 @@ mod tests {
             let waves = SLICKS.waves(seed);
             for i in 0..100 {
                 for j in 0..100 {
-                    let near = distance(&waves, [raster.x(j), raster.y(i)]) < 25.0;
+                    let near = at(&waves, [raster.x(j), raster.y(i)]) < 25.0;
                     area += f64::from(u8::from(near)) / 1e4;
                 }
             }
@@ -155,7 +172,7 @@ mod tests {
         let mut square = 0.0;
         for i in 0..320 {
             for j in 0..360 {
-                let off = 2.0 * distance(&waves, [fine.x(j), fine.y(i)]) / 50.0;
+                let off = 2.0 * at(&waves, [fine.x(j), fine.y(i)]) / 50.0;
                 let exact = 1.0 - 0.5 * (-0.5 * off * off).exp();
                 square += (f64::from(field.at(i, j)) - exact).powi(2) / (320.0 * 360.0);
             }
