@@ -59,6 +59,10 @@ pub struct TwoSample {
     pub accuracy: f64,
     /// Half of the width of its 95 % interval, from the spread over the unseen images.
     pub half_width: f64,
+    /// Distance of both kinds in the feature that the network tells them apart by: the means of its answers to patches of
+    /// unseen images, apart by so many of their standard deviations. Of kinds that are alike 0, and it goes on where the
+    /// accuracy ends at 1; 0 where neither has a deviation.
+    pub distance: f64,
     /// Unseen images of both kinds.
     pub images: usize,
 }
@@ -117,14 +121,18 @@ pub fn two_sample(
     }
     let network = trainer.averaged().valid();
     let mut shares = Vec::new();
+    let mut answers = [Vec::new(), Vec::new()];
     for image in 0..half {
         let mut places = places(options, (1 << 40) + image as u64, JUDGED, 1, first);
         places.iter_mut().for_each(|place| place[0] = image);
         let logits = network.forward(patches([first, second], &places, 1, options, device));
-        let right = logits * signs(JUDGED, device);
-        let right: Vec<f32> = right.to_data().iter::<f32>().collect();
-        for kind in right.chunks(JUDGED) {
-            shares.push(kind.iter().filter(|margin| **margin > 0.0).count() as f64 / JUDGED as f64);
+        let logits: Vec<f32> = logits.to_data().iter::<f32>().collect();
+        for (n, kind) in logits.chunks(JUDGED).enumerate() {
+            let right = kind
+                .iter()
+                .filter(|&&x| if n == 0 { x > 0.0 } else { x < 0.0 });
+            shares.push(right.count() as f64 / JUDGED as f64);
+            answers[n].extend(kind.iter().map(|&x| f64::from(x)));
         }
     }
     let count = shares.len() as f64;
@@ -133,8 +141,24 @@ pub fn two_sample(
     Ok(TwoSample {
         accuracy,
         half_width: STANDARD_ERRORS * (squares / (count - 1.0) / count).sqrt(),
+        distance: apart(&answers),
         images: shares.len(),
     })
+}
+
+/// Difference of the means of two sets of numbers in their standard deviation.
+fn apart(numbers: &[Vec<f64>; 2]) -> f64 {
+    let [one, other] = numbers.each_ref().map(|numbers| {
+        let count = numbers.len() as f64;
+        let mean = numbers.iter().sum::<f64>() / count;
+        let squares = numbers.iter().map(|x| (x - mean).powi(2));
+        [mean, squares.sum::<f64>() / (count - 1.0)]
+    });
+    let variance = 0.5 * (one[1] + other[1]);
+    match variance > 0.0 {
+        true => (one[0] - other[0]) / variance.sqrt(),
+        false => 0.0,
+    }
 }
 
 fn check(first: &[Field], second: &[Field], options: &TwoSampleOptions) -> Result<()> {
@@ -341,10 +365,21 @@ mod tests {
         assert_eq!(same.images, 16);
         let tolerance = 2.0 * same.half_width.max(0.05);
         assert!((same.accuracy - 0.5).abs() < tolerance, "{same:?}");
+        // 64 patches of each kind: a mean is known to 1/8 of a deviation, the difference of two to √2/8, and four of these.
+        assert!(same.distance.abs() < 4.0 * 2f64.sqrt() / 8.0, "{same:?}");
         let other = two_sample(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();
         assert!(other.accuracy > 0.95, "{other:?}");
+        // Two normal kinds of which 95 of 100 lie on their side of the middle are 2 · 1.645 deviations apart.
+        assert!(other.distance > 3.29, "{other:?}");
         let again = two_sample(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();
         assert_eq!(other, again);
+    }
+
+    #[test]
+    fn the_distance_is_that_of_the_means_in_deviations() {
+        let numbers = [vec![1.0, 3.0, 2.0], vec![-4.0, -2.0, -3.0]];
+        assert_eq!(apart(&numbers), 5.0);
+        assert_eq!(apart(&[vec![1.0; 3], vec![1.0; 3]]), 0.0);
     }
 
     #[test]
