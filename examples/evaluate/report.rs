@@ -180,18 +180,28 @@ fn swaps(report: &Report) -> String {
 }
 
 fn seconds(report: &Report) -> String {
-    let mut text =
-        "## Seconds per image\n\n| pixels | simulator | harmonic sum, 2 x 10⁴ waves | model | text to image |\n\
-        | --- | --- | --- | --- | --- |\n"
-            .to_owned();
+    let beside = report.seconds.iter().any(|r| r.text_to_image.is_some());
+    let cell = |text: &str| {
+        if beside {
+            format!(" {text} |")
+        } else {
+            String::new()
+        }
+    };
+    let mut text = format!(
+        "## Seconds per image\n\n| pixels | simulator | harmonic sum, 2 x 10⁴ waves | model |{}\n\
+         | --- | --- | --- | --- |{}\n",
+        cell("text to image"),
+        cell("---")
+    );
     for r in &report.seconds {
         text += &format!(
-            "| {0} x {0} | {1:.3} | {2:.1} | {3} | {4} |\n",
+            "| {0} x {0} | {1:.3} | {2:.1} | {3} |{4}\n",
             r.size,
             r.simulator_fast,
             r.simulator_harmonic_sum,
             number(r.model, 3),
-            number(r.text_to_image, 2)
+            cell(&number(r.text_to_image, 2))
         );
     }
     text + &format!(
