@@ -1,6 +1,6 @@
 //! `train -- text-to-image`, and what reads the model that it writes.
 
-use super::{done, files, refused_by, refused_into, run, text};
+use super::{done, files, refused_by, refused_into, text};
 
 const SHORT: [&str; 8] = [
     "--autoencoder-steps",
@@ -79,6 +79,6 @@ fn what_no_model_can_be_made_of_is_named() {
         &["rate is 0", "outside"],
     );
     refused_by("train", &["text-to-image", "--resume"], &["resume"]);
-    let unknown = run("evaluate", &["--text-to-image", "no/such/folder"]);
-    assert_eq!(unknown.status.code(), Some(2));
+    let nowhere = ["--text-to-image", "no/such/folder"];
+    refused_by("evaluate", &nowhere, &["cannot read", "no/such/folder"]);
 }

@@ -61,6 +61,12 @@ pub(crate) mod uniform {
     /// Places of patches that a sea is learnt from.
     #[cfg(feature = "train")]
     pub(crate) const SEA_PLACES: u32 = 2003;
+    /// Places of the squares that an autoencoder learns from.
+    #[cfg(feature = "train")]
+    pub(crate) const CROPS: u32 = 2004;
+    /// Prompts that are left out.
+    #[cfg(feature = "train")]
+    pub(crate) const LEFT_OUT: u32 = 2101;
     /// Training steps of fine-tuning.
     #[cfg(feature = "train")]
     pub(crate) const STEPS: u32 = 2100;
@@ -214,7 +220,9 @@ mod tests {
             one(uniform::CELLS),
             one(uniform::PLACES),
             one(uniform::SEA_PLACES),
+            one(uniform::CROPS),
             one(uniform::STEPS),
+            one(uniform::LEFT_OUT),
             (uniform::ORDER, uniform::VALUES - uniform::ORDER),
             (uniform::VALUES, u32::MAX - uniform::VALUES),
         ];

@@ -243,16 +243,28 @@ impl ClipText {
     ///
     /// When a prompt is longer than the model allows.
     pub fn forward(&self, ids: Tensor<2, Int>) -> ClipTextOutput {
-        let mut x = self.embed(ids.clone());
-        for layer in &self.layers {
-            x = layer.forward(x);
-        }
-        let last_hidden_state = self.final_layer_norm.forward(x);
+        let last_hidden_state = self.last_hidden_state(ids.clone());
         let pooled = self.pool(ids, &last_hidden_state);
         ClipTextOutput {
             last_hidden_state,
             pooled,
         }
+    }
+
+    /// The tokens alone, without the one for the whole prompt, whose place is looked for on the host.
+    ///
+    /// # Shapes
+    ///
+    /// `ids`: `[batch, tokens]`; result: `[batch, tokens, hidden_size]`.
+    ///
+    /// # Panics
+    ///
+    /// When a prompt is longer than the model allows.
+    pub fn last_hidden_state(&self, ids: Tensor<2, Int>) -> Tensor<3> {
+        let tokens = self.embed(ids);
+        let layers = self.layers.iter();
+        let tokens = layers.fold(tokens, |x, layer| layer.forward(x));
+        self.final_layer_norm.forward(tokens)
     }
 
     /// The tokens as they enter each layer, and as they leave the last, before its normalisation.

@@ -140,12 +140,12 @@ impl LatentSet {
 
     /// Latents of some examples, `[indices, channels, rows, columns]`.
     pub fn latents(&self, indices: &[usize], device: &Device) -> Tensor<4> {
-        self.whole(&self.latents, indices, device)
+        batch(&self.latents, self.shape, indices, device)
     }
 
     /// Latents of the images expected of their scenes.
     pub fn expected(&self, indices: &[usize], device: &Device) -> Tensor<4> {
-        self.whole(&self.expected, indices, device)
+        batch(&self.expected, self.shape, indices, device)
     }
 
     fn some(&self, images: &[f16], index: usize, cells: &[usize]) -> Vec<f32> {
@@ -155,18 +155,23 @@ impl LatentSet {
         let places = (0..channels).flat_map(of_channel);
         places.map(|i| image[i].to_f32()).collect()
     }
+}
 
-    fn whole(&self, images: &[f16], indices: &[usize], device: &Device) -> Tensor<4> {
-        let [channels, rows, columns] = self.shape;
-        let length = channels * rows * columns;
-        let numbers: Vec<f32> = indices
-            .iter()
-            .flat_map(|&i| &images[i * length..(i + 1) * length])
-            .map(|x| x.to_f32())
-            .collect();
-        let shape = [indices.len(), channels, rows, columns];
-        Tensor::from_data(TensorData::new(numbers, shape), device)
-    }
+/// Some of many images of one shape, `[indices, channels, rows, columns]`.
+pub(super) fn batch(
+    images: &[f16],
+    [channels, rows, columns]: [usize; 3],
+    indices: &[usize],
+    device: &Device,
+) -> Tensor<4> {
+    let length = channels * rows * columns;
+    let numbers: Vec<f32> = indices
+        .iter()
+        .flat_map(|&i| &images[i * length..(i + 1) * length])
+        .map(|x| x.to_f32())
+        .collect();
+    let shape = [indices.len(), channels, rows, columns];
+    Tensor::from_data(TensorData::new(numbers, shape), device)
 }
 
 /// The numbers of a tensor in 16 bits.

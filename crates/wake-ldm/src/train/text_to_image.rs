@@ -7,6 +7,7 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use half::f16;
 
 use super::fine_tune::noised;
+use super::latents::batch;
 use super::run::{Task, Terms, number};
 use super::tasks::{examples, noise_of};
 use crate::autoencoder::AutoencoderKl;
@@ -149,15 +150,6 @@ impl PromptedLatents {
     pub fn shape(&self) -> [usize; 3] {
         self.shape
     }
-
-    fn batch(&self, indices: &[usize], device: &Device) -> Tensor<4> {
-        let [channels, rows, columns] = self.shape;
-        let length = channels * rows * columns;
-        let of = |&i: &usize| &self.latents[i * length..(i + 1) * length];
-        let numbers = indices.iter().flat_map(of).map(|z| z.to_f32());
-        let shape = [indices.len(), channels, rows, columns];
-        Tensor::from_data(TensorData::new(numbers.collect(), shape), device)
-    }
 }
 
 /// Learning to encode and decode: squared error of the pixels, and a little of the divergence of the latents from a
@@ -194,7 +186,7 @@ impl Task<AutoencoderKl> for AutoencoderTask<'_> {
         let place = |position: u64| -> [usize; 2] {
             std::array::from_fn(|axis| {
                 let room = self.images.size[axis] - crop[axis] + 1;
-                let draw = random.uniform(uniform::PLACES, 2 * position + axis as u64);
+                let draw = random.uniform(uniform::CROPS, 2 * position + axis as u64);
                 (draw * room as f64) as usize
             })
         };
@@ -268,7 +260,7 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let draw = |p: u64| (random.uniform(uniform::STEPS, p) * count) as usize;
         let steps: Vec<usize> = positions.clone().map(draw).collect();
         let told = positions.clone().zip(&indices).flat_map(|(p, &i)| {
-            match random.uniform(uniform::LEVELS, p) < WITHOUT_PROMPT {
+            match random.uniform(uniform::LEFT_OUT, p) < WITHOUT_PROMPT {
                 true => &self.set.empty,
                 false => &self.set.prompts[i],
             }
@@ -278,12 +270,12 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(told, shape), device);
         let sources: Vec<NoiseSource> = positions.map(|p| noise_of(self.seed, p)).collect();
         let noise = normal_batch(&sources, FINE_TUNE_STREAM, self.set.shape, device);
-        let clean = self.set.batch(&indices, device);
+        let clean = batch(&self.set.latents, self.set.shape, &indices, device);
         let noised = noised(self.schedule, Prediction::Epsilon, &steps, clean, noise);
         let found = model.unet.forward(UNetInput {
             sample: noised.sample,
             timesteps: noised.timesteps,
-            context: model.text_encoder.forward(ids).last_hidden_state,
+            context: model.text_encoder.last_hidden_state(ids),
             condition: None,
         });
         let loss = (found - noised.target).square().mean();

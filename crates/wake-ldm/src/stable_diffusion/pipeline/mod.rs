@@ -194,7 +194,7 @@ impl Pipeline {
         let length = ids.len();
         let ids: Tensor<2, Int> =
             Tensor::from_data(TensorData::new(ids, [1, length]), &self.device);
-        let embedding = self.text_encoder.forward(ids).last_hidden_state;
+        let embedding = self.text_encoder.last_hidden_state(ids);
         if cache.len() >= CACHED_PROMPTS {
             cache.clear();
         }

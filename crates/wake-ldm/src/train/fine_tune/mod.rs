@@ -233,7 +233,7 @@ impl FineTune {
         let steps: Vec<usize> = (0..batch as u64)
             .map(|i| (random.uniform(uniform::STEPS, first + i) * count) as usize)
             .collect();
-        let context = self.frozen.text.forward(ids).last_hidden_state;
+        let context = self.frozen.text.last_hidden_state(ids);
         self.mixed(&steps, clean, noise, context)
     }
 
