@@ -69,7 +69,9 @@ fn input(config: &UNetConfig, batch: usize, size: usize, device: &Device) -> UNe
     UNetInput {
         sample: random([batch, config.in_channels, size, size], device),
         timesteps: Tensor::full([batch], 500.0, device),
-        context: random([batch, 77, config.cross_attention_dim], device),
+        context: config
+            .cross_attention_dim
+            .map(|channels| random([batch, 77, channels], device)),
         condition: None,
     }
 }
@@ -81,7 +83,7 @@ fn call(unet: &UNet, input: &UNetInput) {
 /// The small U-Net on 32 × 32 latents.
 fn small_unet(criterion: &mut Criterion) {
     let device = Device::flex();
-    let config = UNetConfig::small(16, 256, None);
+    let config = UNetConfig::small(16, Some(256), None);
     let unet = config.init(&device);
     let mut group = criterion.benchmark_group("small_unet_32x32");
     group.sample_size(10);
@@ -154,7 +156,7 @@ fn training() {
             drop(black_box(tracked().square().mean().backward()));
         });
     }
-    let config = UNetConfig::small(16, 256, None);
+    let config = UNetConfig::small(16, Some(256), None);
     let (unet, tracked) = (config.init(&plain), config.init(&tracking));
     let (x, y) = (
         input(&config, 16, 32, &plain),

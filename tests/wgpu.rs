@@ -56,7 +56,7 @@ fn the_u_net_agrees_with_torch() {
     let out = unet.forward(UNetInput {
         sample: golden.tensor("sample", &device),
         timesteps: Tensor::from_floats(steps.as_slice(), &device),
-        context: golden.tensor("encoder_hidden_states", &device),
+        context: Some(golden.tensor("encoder_hidden_states", &device)),
         condition: None,
     });
     expect("U-Net", &numbers(&out), &golden.f32s("out_ref"));

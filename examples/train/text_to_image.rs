@@ -122,7 +122,7 @@ fn widths() -> (AutoencoderKlConfig, ClipTextConfig, UNetConfig) {
     (
         AutoencoderKlConfig::small(LATENTS, 3),
         text,
-        UNetConfig::small(LATENTS, TOKENS, None),
+        UNetConfig::small(LATENTS, Some(TOKENS), None),
     )
 }
 

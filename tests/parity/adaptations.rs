@@ -30,7 +30,7 @@ fn input(golden: &Golden, device: &Device) -> UNetInput {
     UNetInput {
         sample: golden.tensor("sample", device),
         timesteps: Tensor::full([1], golden.i64s("timestep")[0] as f64, device),
-        context: golden.tensor("encoder_hidden_states", device),
+        context: Some(golden.tensor("encoder_hidden_states", device)),
         condition: None,
     }
 }
@@ -80,7 +80,7 @@ fn adaptations_of_other_models_are_refused() {
     let absent = merge_lora(unet, Layout::Diffusers, "text_encoder", &file, 1.0);
     assert!(matches!(absent, Err(Error::WeightsMismatch { .. })));
     let other = UNetConfig {
-        cross_attention_dim: 5,
+        cross_attention_dim: Some(5),
         ..config
     };
     let misfit = merge_lora(other.init(&device), Layout::Diffusers, "unet", &file, 1.0);

@@ -33,7 +33,7 @@ fn check_unet(folder: &Path, model: &Value, cases: &[(String, Golden)], device: 
         let out = unet.forward(UNetInput {
             sample: golden.tensor("sample", device),
             timesteps: Tensor::from_data(TensorData::new(timesteps, [count]), device),
-            context: golden.tensor("encoder_hidden_states", device),
+            context: Some(golden.tensor("encoder_hidden_states", device)),
             condition: None,
         });
         expect(

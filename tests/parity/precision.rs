@@ -38,7 +38,7 @@ fn models_run_in_half_precision_where_the_device_does() {
             let out = loaded.unwrap().forward(UNetInput {
                 sample: golden.tensor("sample", &device),
                 timesteps: Tensor::from_floats(steps.as_slice(), &device),
-                context: golden.tensor("encoder_hidden_states", &device),
+                context: Some(golden.tensor("encoder_hidden_states", &device)),
                 condition: None,
             });
             assert_eq!(out.dtype(), DType::F32, "the sample's own precision");

@@ -98,7 +98,7 @@ fn small(device: &Device) -> Pipeline {
     let parts = PipelineParts {
         tokenizer: None,
         text_encoder: text.init(device),
-        unet: UNetConfig::small(8, 32, None).init(device),
+        unet: UNetConfig::small(8, Some(32), None).init(device),
         autoencoder: AutoencoderKlConfig::small(8, 2).init(device),
         scheduler: SchedulerConfig::stable_diffusion("dpm++").unwrap(),
         latent_size: 4,

@@ -128,14 +128,14 @@ impl Tap<'_> {
     fn transformer(&self, context: Tensor<3>) -> Vec<f32> {
         let shape = TransformerShape {
             channels: self.out_shape()[1],
-            context_channels: context.dims()[2],
+            context_channels: Some(context.dims()[2]),
             heads: self.heads(),
             layers: 1,
             groups: self.groups(),
             linear_projection: self.config["use_linear_projection"].as_bool() == Some(true),
         };
         let layer = self.load(Transformer2d::new(shape, self.device), "");
-        numbers(&layer.forward(self.x(), context))
+        numbers(&layer.forward(self.x(), Some(&context)))
     }
 
     /// The autoencoder's attention: a normalisation, one head over all pixels, and the input added.

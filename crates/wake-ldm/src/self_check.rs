@@ -86,7 +86,7 @@ fn text(device: &Device) -> Outcome {
 
 fn unet(device: &Device) -> Outcome {
     let cpu = Device::flex();
-    let config = UNetConfig::small(4, 64, None);
+    let config = UNetConfig::small(4, Some(64), None);
     let model = config.init(&cpu);
     let input = |device: &Device| UNetInput {
         sample: normal_batch(
@@ -96,13 +96,15 @@ fn unet(device: &Device) -> Outcome {
             device,
         ),
         timesteps: Tensor::from_data([20.0, 980.0], device),
-        context: normal_batch(
-            &[NoiseSource::new(3), NoiseSource::new(4)],
-            0,
-            [1, 9, 64],
-            device,
-        )
-        .reshape([2, 9, 64]),
+        context: Some(
+            normal_batch(
+                &[NoiseSource::new(3), NoiseSource::new(4)],
+                0,
+                [1, 9, 64],
+                device,
+            )
+            .reshape([2, 9, 64]),
+        ),
         condition: None,
     };
     let reference = numbers(model.forward(input(&cpu)));

@@ -16,8 +16,8 @@ use super::norm::GroupNorm;
 pub struct TransformerShape {
     /// Channels of the image.
     pub channels: usize,
-    /// Channels of the prompt's tokens.
-    pub context_channels: usize,
+    /// Channels of the prompt's tokens; `None` for pixels that are mixed with each other alone.
+    pub context_channels: Option<usize>,
     /// Heads of both attentions.
     pub heads: usize,
     /// Blocks in a row.
@@ -67,9 +67,13 @@ impl Transformer2d {
     /// # Shapes
     ///
     /// - `x`: `[batch, channels, rows, columns]`
-    /// - `context`: `[batch, tokens, context_channels]`
+    /// - `context`: `[batch, tokens, context_channels]`, where the blocks attend to one
     /// - result: as `x`
-    pub fn forward(&self, x: Tensor<4>, context: Tensor<3>) -> Tensor<4> {
+    ///
+    /// # Panics
+    ///
+    /// Without a context that the blocks attend to.
+    pub fn forward(&self, x: Tensor<4>, context: Option<&Tensor<3>>) -> Tensor<4> {
         let [batch, channels, rows, columns] = x.dims();
         let pixels = self
             .norm
@@ -77,7 +81,7 @@ impl Transformer2d {
             .reshape([batch, channels, rows * columns]);
         let mut tokens = self.proj_in.to_tokens(pixels);
         for block in &self.transformer_blocks {
-            tokens = block.forward(tokens, context.clone());
+            tokens = block.forward(tokens, context);
         }
         self.proj_out
             .to_pixels(tokens)
@@ -86,13 +90,13 @@ impl Transformer2d {
     }
 }
 
-/// Self-attention, attention to the context, and a feed-forward layer, each added to its input.
+/// Self-attention, attention to the context where there is one, and a feed-forward layer, each added to its input.
 #[derive(Module, Debug)]
 pub struct TransformerBlock {
     norm1: LayerNorm,
     attn1: CrossAttention,
-    norm2: LayerNorm,
-    attn2: CrossAttention,
+    norm2: Option<LayerNorm>,
+    attn2: Option<CrossAttention>,
     norm3: LayerNorm,
     ff: FeedForward,
 }
@@ -109,8 +113,9 @@ impl TransformerBlock {
         Self {
             norm1: norm(),
             attn1: CrossAttention::new(channels, channels, heads, false, device),
-            norm2: norm(),
-            attn2: CrossAttention::new(channels, context_channels, heads, false, device),
+            norm2: context_channels.map(|_| norm()),
+            attn2: context_channels
+                .map(|context| CrossAttention::new(channels, context, heads, false, device)),
             norm3: norm(),
             ff: FeedForward::new(channels, device),
         }
@@ -121,14 +126,21 @@ impl TransformerBlock {
     /// # Shapes
     ///
     /// - `x`: `[batch, tokens, channels]`
-    /// - `context`: `[batch, tokens of the context, context_channels]`
+    /// - `context`: `[batch, tokens of the context, context_channels]`, where the block attends to one
     /// - result: as `x`
-    pub fn forward(&self, x: Tensor<3>, context: Tensor<3>) -> Tensor<3> {
+    ///
+    /// # Panics
+    ///
+    /// Without a context that the block attends to.
+    pub fn forward(&self, x: Tensor<3>, context: Option<&Tensor<3>>) -> Tensor<3> {
         let x = self.attn1.forward(self.norm1.forward(x.clone()), None) + x;
-        let x = self
-            .attn2
-            .forward(self.norm2.forward(x.clone()), Some(context))
-            + x;
+        let x = match (&self.norm2, &self.attn2, context) {
+            (Some(norm), Some(attention), Some(context)) => {
+                attention.forward(norm.forward(x.clone()), Some(context.clone())) + x
+            }
+            (Some(_), Some(_), None) => panic!("this transformer attends to a context; give one"),
+            _ => x,
+        };
         self.ff.forward(self.norm3.forward(x.clone())) + x
     }
 }

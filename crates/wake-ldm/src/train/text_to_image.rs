@@ -275,7 +275,7 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let found = model.unet.forward(UNetInput {
             sample: noised.sample,
             timesteps: noised.timesteps,
-            context: model.text_encoder.last_hidden_state(ids),
+            context: Some(model.text_encoder.last_hidden_state(ids)),
             condition: None,
         });
         let loss = (found - noised.target).square().mean();

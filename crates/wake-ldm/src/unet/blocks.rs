@@ -22,13 +22,13 @@ impl DownBlock {
         &self,
         mut x: Tensor<4>,
         time: &Tensor<2>,
-        context: &Tensor<3>,
+        context: Option<&Tensor<3>>,
         skips: &mut Vec<Tensor<4>>,
     ) -> Tensor<4> {
         for (i, resnet) in self.resnets.iter().enumerate() {
             x = resnet.forward(x, Some(time.clone()));
             if let Some(attention) = self.attentions.get(i) {
-                x = attention.forward(x, context.clone());
+                x = attention.forward(x, context);
             }
             skips.push(x.clone());
         }
@@ -48,10 +48,10 @@ pub(super) struct MidBlock {
 }
 
 impl MidBlock {
-    pub(super) fn forward(&self, x: Tensor<4>, time: &Tensor<2>, context: &Tensor<3>) -> Tensor<4> {
+    pub(super) fn forward(&self, x: Tensor<4>, time: &Tensor<2>, context: Option<&Tensor<3>>) -> Tensor<4> {
         let mut x = self.resnets[0].forward(x, Some(time.clone()));
         for (attention, resnet) in self.attentions.iter().zip(&self.resnets[1..]) {
-            x = attention.forward(x, context.clone());
+            x = attention.forward(x, context);
             x = resnet.forward(x, Some(time.clone()));
         }
         x
@@ -72,14 +72,14 @@ impl UpBlock {
         &self,
         mut x: Tensor<4>,
         time: &Tensor<2>,
-        context: &Tensor<3>,
+        context: Option<&Tensor<3>>,
         skips: &mut Vec<Tensor<4>>,
     ) -> Tensor<4> {
         for (i, resnet) in self.resnets.iter().enumerate() {
             let skip = skips.split_off(skips.len() - 1);
             x = resnet.forward(concatenate(x, skip), Some(time.clone()));
             if let Some(attention) = self.attentions.get(i) {
-                x = attention.forward(x, context.clone());
+                x = attention.forward(x, context);
             }
         }
         let size = skips

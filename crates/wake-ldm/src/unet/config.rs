@@ -37,9 +37,9 @@ pub struct UNetConfig {
     /// Attention heads of each level.
     #[config(default = "vec![8, 8, 8, 8]")]
     pub heads: Vec<usize>,
-    /// Channels of the prompt's tokens.
-    #[config(default = 768)]
-    pub cross_attention_dim: usize,
+    /// Channels of the prompt's tokens; `None` for a model whose attention mixes pixels alone.
+    #[config(default = "Some(768)")]
+    pub cross_attention_dim: Option<usize>,
     /// Length of a vector of numbers that conditions the image beside the prompt, if any.
     pub condition_channels: Option<usize>,
     /// Groups of every group normalisation.
@@ -70,10 +70,10 @@ impl UNetConfig {
     /// The small model for wake images: 32 × 32 latents, three levels, attention at 16 and 8 only.
     ///
     /// `latent_channels` of noise, `context_channels` of the prompt's tokens, and a vector of
-    /// `condition_channels` numbers, if any.
+    /// `condition_channels` numbers, each if any.
     pub fn small(
         latent_channels: usize,
-        context_channels: usize,
+        context_channels: Option<usize>,
         condition_channels: Option<usize>,
     ) -> Self {
         Self::new()
@@ -128,7 +128,8 @@ impl UNetConfig {
             layers_per_block: options.usize("layers_per_block", 2)?,
             transformer_layers: options.usize("transformer_layers_per_block", 1)?,
             heads: options.usizes("attention_head_dim", levels, 8)?,
-            cross_attention_dim: options.usize("cross_attention_dim", 1280)?,
+            cross_attention_dim: Some(options.usize("cross_attention_dim", 1280)?)
+                .filter(|&channels| channels > 0),
             condition_channels: take_condition(options)?,
             norm_groups: options.usize("norm_num_groups", 32)?,
             norm_epsilon: options.f64("norm_eps", 1e-5)?,
@@ -139,7 +140,7 @@ impl UNetConfig {
         })
     }
 
-    /// The `config.json` that diffusers reads as this model.
+    /// The `config.json` that diffusers reads as this model; a `cross_attention_dim` of 0, which diffusers lacks, for none.
     pub fn to_json(&self) -> Value {
         let names = |flags: &[bool], names: [&str; 2]| -> Vec<String> {
             flags
@@ -155,7 +156,7 @@ impl UNetConfig {
             "block_out_channels": self.block_out_channels,
             "center_input_sample": false,
             "class_embed_type": condition,
-            "cross_attention_dim": self.cross_attention_dim,
+            "cross_attention_dim": self.cross_attention_dim.unwrap_or(0),
             "down_block_types": names(&self.down_attention, DOWN),
             "downsample_padding": 1,
             "flip_sin_to_cos": self.cos_first,
@@ -205,7 +206,7 @@ impl UNetConfig {
                 self.transformer_layers,
                 64.0,
             ),
-            ("cross_attention_dim", self.cross_attention_dim, 65536.0),
+            ("cross_attention_dim", self.cross_attention_dim.unwrap_or(1), 65536.0),
             ("norm_num_groups", self.norm_groups, 65536.0),
             (
                 "projection_class_embeddings_input_dim",

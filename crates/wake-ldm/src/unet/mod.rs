@@ -27,8 +27,8 @@ pub struct UNetInput {
     pub sample: Tensor<4>,
     /// The step of each image, `[batch]`; fractions are allowed.
     pub timesteps: Tensor<1>,
-    /// The prompt's tokens, `[batch, tokens, cross_attention_dim]`.
-    pub context: Tensor<3>,
+    /// The prompt's tokens, `[batch, tokens, cross_attention_dim]`; `None` for a model that attends to none.
+    pub context: Option<Tensor<3>>,
     /// Numbers that condition the image beside the prompt, `[batch, condition_channels]`; `None`
     /// leaves the model unconditioned by them.
     pub condition: Option<Tensor<2>>,
@@ -122,11 +122,12 @@ impl UNet {
     ///
     /// # Panics
     ///
-    /// When the shapes do not fit, or a condition is given to a model that has none.
+    /// When the shapes do not fit, a condition is given to a model that has none, or no context to one that attends to it.
     pub fn forward(&self, input: UNetInput) -> Tensor<4> {
         let dtype = self.conv_in.weight.val().dtype();
         let sample_dtype = input.sample.dtype();
-        let context = cast_to(input.context, dtype);
+        let context = input.context.map(|context| cast_to(context, dtype));
+        let context = context.as_ref();
         let time = cast_to(
             silu(self.embed_step(input.timesteps, input.condition)),
             dtype,
@@ -135,11 +136,11 @@ impl UNet {
         let mut x = convolve(&self.conv_in, cast_to(input.sample, dtype));
         let mut skips = vec![x.clone()];
         for block in &self.down_blocks {
-            x = block.forward(x, &time, &context, &mut skips);
+            x = block.forward(x, &time, context, &mut skips);
         }
-        x = self.mid_block.forward(x, &time, &context);
+        x = self.mid_block.forward(x, &time, context);
         for block in &self.up_blocks {
-            x = block.forward(x, &time, &context, &mut skips);
+            x = block.forward(x, &time, context, &mut skips);
         }
         cast_to(
             convolve(&self.conv_out, self.conv_norm_out.forward_silu(x)),

@@ -50,7 +50,7 @@ impl Pipeline {
         let config = unet.config();
         must_agree(
             "cross_attention_dim",
-            config.cross_attention_dim,
+            config.cross_attention_dim.unwrap_or(0),
             text.hidden_size,
         )?;
         let autoencoder = AutoencoderKl::from_folder(&folder.join("vae"), device)?;

@@ -170,7 +170,7 @@ impl<'a> Sampling<'a> {
         self.pipeline.unet.forward(UNetInput {
             sample,
             timesteps,
-            context,
+            context: Some(context),
             condition,
         })
     }

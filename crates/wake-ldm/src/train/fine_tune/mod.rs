@@ -358,7 +358,7 @@ impl Task {
         let input = UNetInput {
             sample: self.sample.clone(),
             timesteps: self.timesteps.clone(),
-            context: self.context.clone(),
+            context: Some(self.context.clone()),
             condition: None,
         };
         let error = unet.forward(input) - self.target.clone();

@@ -16,7 +16,7 @@ use crate::unet::{UNet, UNetConfig};
 const BATCH: usize = 4;
 
 fn unet(device: &Device) -> UNet {
-    let config = UNetConfig::small(2, 8, None)
+    let config = UNetConfig::small(2, Some(8), None)
         .with_block_out_channels(vec![8, 16])
         .with_down_attention(vec![false, true])
         .with_up_attention(vec![true, false])

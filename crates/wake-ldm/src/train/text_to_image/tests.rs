@@ -133,7 +133,7 @@ fn the_prompt_says_which_image() {
             .with_layers(1)
             .with_heads(1)
             .init(device),
-        unet: UNetConfig::small(2, 8, None)
+        unet: UNetConfig::small(2, Some(8), None)
             .with_block_out_channels(vec![8, 16])
             .with_down_attention(vec![false, true])
             .with_up_attention(vec![true, false])

@@ -26,7 +26,7 @@ pub struct WakeModelConfig {
     pub fold: usize,
     /// Width of each level of the U-Net; each but the last halves the image.
     pub widths: Vec<usize>,
-    /// Whether a level attends to itself and to the numbers.
+    /// Whether the pixels of a level attend to each other.
     pub attention: Vec<bool>,
     /// Channels of a token in the reader.
     pub text_width: usize,
@@ -205,7 +205,7 @@ impl WakeModelConfig {
     pub(super) fn unet(&self) -> UNetConfig {
         let folded = self.latent_channels * self.fold * self.fold;
         let upward = self.attention.iter().rev().copied().collect();
-        UNetConfig::small(folded, FEATURES, Some(FEATURES))
+        UNetConfig::small(folded, None, Some(FEATURES))
             .with_in_channels(folded + self.map_channels)
             .with_block_out_channels(self.widths.clone())
             .with_down_attention(self.attention.clone())

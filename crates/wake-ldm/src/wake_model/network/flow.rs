@@ -21,7 +21,7 @@ const STEPS: f64 = 1000.0;
 /// The noise is Gaussian, correlated as the sea is (`sea.rs`). Were the residual like it, the velocity would be 0 everywhere: the flow only
 /// has to learn what tells the two apart.
 ///
-/// The numbers enter every residual block, and every attention as its only token; the places in the ship's frame and
+/// The numbers enter every residual block; the places in the ship's frame and
 /// the expected image are laid over the noisy one.
 ///
 /// # References
@@ -80,7 +80,7 @@ impl Flow {
         let velocity = self.unet.forward(UNetInput {
             sample: Tensor::cat(vec![folded, maps], 1),
             timesteps: sigma * STEPS,
-            context: known.numbers.clone().unsqueeze_dim(1),
+            context: None,
             condition: Some(known.numbers.clone()),
         });
         depth_to_space(velocity, self.fold)
