@@ -65,13 +65,13 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     count: u64,
     /// Steps of the autoencoder
-    #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
     autoencoder_steps: u32,
     /// Steps of text encoder and U-Net
-    #[arg(long, default_value_t = 12_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 5000, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Images of a batch
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
     batch: u16,
     /// Largest step of the optimizer
     #[arg(long, default_value_t = 5e-4)]

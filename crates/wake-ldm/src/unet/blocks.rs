@@ -48,7 +48,12 @@ pub(super) struct MidBlock {
 }
 
 impl MidBlock {
-    pub(super) fn forward(&self, x: Tensor<4>, time: &Tensor<2>, context: Option<&Tensor<3>>) -> Tensor<4> {
+    pub(super) fn forward(
+        &self,
+        x: Tensor<4>,
+        time: &Tensor<2>,
+        context: Option<&Tensor<3>>,
+    ) -> Tensor<4> {
         let mut x = self.resnets[0].forward(x, Some(time.clone()));
         for (attention, resnet) in self.attentions.iter().zip(&self.resnets[1..]) {
             x = attention.forward(x, context);

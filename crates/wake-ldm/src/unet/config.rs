@@ -206,7 +206,11 @@ impl UNetConfig {
                 self.transformer_layers,
                 64.0,
             ),
-            ("cross_attention_dim", self.cross_attention_dim.unwrap_or(1), 65536.0),
+            (
+                "cross_attention_dim",
+                self.cross_attention_dim.unwrap_or(1),
+                65536.0,
+            ),
             ("norm_num_groups", self.norm_groups, 65536.0),
             (
                 "projection_class_embeddings_input_dim",

@@ -14,7 +14,7 @@ pub(super) struct Rows<'a> {
 
 impl<'a> Rows<'a> {
     /// Row `i`, or the last, from its first to its `length`th number.
-    fn get(&self, i: usize, length: usize) -> &'a [f32] {
+    pub(super) fn get(&self, i: usize, length: usize) -> &'a [f32] {
         &self.values[i.min(self.count - 1) * self.step..][..length]
     }
 

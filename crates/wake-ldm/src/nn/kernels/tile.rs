@@ -57,6 +57,41 @@ pub(super) fn multiply<S: Simd>(
     }
 }
 
+/// Adds the product of the transpose of six columns with a panel that is one tile wide.
+///
+/// ```text
+/// sums[i][j] += Σ_k left[k][columns.start + i] · panel[k][j]
+/// ```
+///
+/// # Shapes
+///
+/// - `left`: rows `step` apart, `[k, columns.end]`; of fewer than six columns the sums of the others are left
+/// - `panel`: `[k, width]`
+#[inline(always)]
+pub(super) fn multiply_columns<S: Simd>(
+    simd: S,
+    left: &[f32],
+    step: usize,
+    columns: std::ops::Range<usize>,
+    panel: &[f32],
+    sums: &mut Sums<S>,
+) {
+    let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<2>();
+    for ([near, far], row) in panel.iter().zip(left.chunks(step)) {
+        let row = &row[columns.clone()];
+        let mut few = [0.0; ROWS];
+        let values = row.first_chunk().unwrap_or_else(|| {
+            few[..row.len()].copy_from_slice(row);
+            &few
+        });
+        for (sum, &value) in sums.iter_mut().zip(values) {
+            let value = simd.splat_f32s(value);
+            sum[0] = simd.mul_add_f32s(value, *near, sum[0]);
+            sum[1] = simd.mul_add_f32s(value, *far, sum[1]);
+        }
+    }
+}
+
 /// Sums that start at one value per row.
 #[inline(always)]
 pub(super) fn start<S: Simd>(simd: S, values: [f32; ROWS]) -> Sums<S> {

@@ -4,9 +4,9 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::super::product::{Rows, Target, multiply};
-use super::super::sum::product_sum;
 use super::super::tile;
-use super::{Scores, Shape};
+use super::Shape;
+use super::forward::{TOKENS, add_values, exponentials, hide, products};
 
 /// Gradients to query, key and value.
 ///
@@ -71,95 +71,92 @@ impl WithSimd for Backward<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> [Vec<f32>; 3] {
         let (width, depth) = (tile::width::<S>(), self.shape.depth());
         let [asking, seen] = self.shape.tokens;
-        let key_transposed = self.key.pack_transposed(depth, width);
-        let value_transposed = self.value.pack_transposed(depth, width);
-        let key = self.key.pack(depth, width);
         let mut out = [asking, seen, seen].map(|tokens| vec![0.0; tokens * depth]);
-        let block = self.shape.block();
-        for first in (0..asking).step_by(block) {
-            let query = self.query.from(first, block);
-            let gradient = self.gradient.from(first, block);
-            let scores = Scores {
-                query,
-                key: &key_transposed,
-                first,
-                shape: self.shape,
-            };
-            let (mut weights, inverses) = scores.softmax(simd);
-            for (weights, inverse) in weights.chunks_exact_mut(seen).zip(inverses) {
-                for weight in weights {
-                    *weight *= inverse;
-                }
+        // One column a query.
+        let [mut weights, mut slopes] = [0, 1].map(|_| vec![0.0; seen * width]);
+        for first in (0..asking).step_by(width) {
+            let [query, gradient] = [self.query, self.gradient].map(|rows| rows.from(first, width));
+            let columns = query.pack_transposed(depth, width);
+            products::<S>(simd, &self.key, &columns, &mut weights);
+            if self.shape.causal {
+                hide(&mut weights, width, 0, first);
             }
-            let mut slopes = vec![0.0; weights.len()];
-            let mut target = rows_of(&mut slopes, seen, false);
-            multiply(simd, &gradient, depth, &value_transposed, &mut target);
-            through_softmax(&weights, &mut slopes, seen, self.shape.scale());
+            normalise::<S>(&mut weights, self.shape.scale());
+            let columns = gradient.pack_transposed(depth, width);
+            products::<S>(simd, &self.value, &columns, &mut slopes);
+            through_softmax::<S>(&weights, &mut slopes, self.shape.scale());
 
             let [dquery, dkey, dvalue] = &mut out;
-            let rows = matrix(&slopes, seen);
-            let mut target = rows_of(&mut dquery[first * depth..], depth, false);
-            multiply(simd, &rows, seen, &key, &mut target);
+            let mut sums = vec![0.0; depth * width];
+            add_values::<S>(simd, &self.key, &slopes, depth, &mut sums);
+            let rows = dquery[first * depth..]
+                .chunks_exact_mut(depth)
+                .take(query.count);
+            for (j, row) in rows.enumerate() {
+                let column = sums[j..].iter().step_by(width);
+                row.iter_mut()
+                    .zip(column)
+                    .for_each(|(out, sum)| *out = *sum);
+            }
             for (left, right, out) in [(&slopes, query, dkey), (&weights, gradient, dvalue)] {
-                let left = transpose(left, seen);
-                let right = right.pack(depth, width);
-                let mut target = rows_of(out, depth, true);
-                multiply(
-                    simd,
-                    &matrix(&left, query.count),
-                    query.count,
-                    &right,
-                    &mut target,
-                );
+                let left = Rows {
+                    values: left,
+                    step: width,
+                    count: seen,
+                };
+                let mut target = Target {
+                    values: out,
+                    step: depth,
+                    columns: depth,
+                    add: true,
+                };
+                let packed = right.pack(depth, width);
+                multiply(simd, &left, right.count, &packed, &mut target);
             }
         }
         out
     }
 }
 
-fn matrix(values: &[f32], columns: usize) -> Rows<'_> {
-    Rows {
-        values,
-        step: columns,
-        count: values.len() / columns,
+/// From scores to weights: the softmax of every column.
+#[inline(always)]
+fn normalise<S: Simd>(scores: &mut [f32], scale: f32) {
+    let width = tile::width::<S>();
+    let [mut largest, mut totals] = [f32::NEG_INFINITY, 0.0].map(|x| vec![x; width]);
+    exponentials::<S>(scores, &mut largest, &mut totals, scale);
+    for total in &mut totals {
+        *total = 1.0 / *total;
     }
-}
-
-fn rows_of(values: &mut [f32], columns: usize, add: bool) -> Target<'_> {
-    Target {
-        values,
-        step: columns,
-        columns,
-        add,
+    for row in scores.chunks_exact_mut(width) {
+        for (weight, inverse) in row.iter_mut().zip(&totals) {
+            *weight *= inverse;
+        }
     }
 }
 
 /// From the gradient to the weights to the gradient to the scores before they were scaled.
 #[inline(always)]
-fn through_softmax(weights: &[f32], slopes: &mut [f32], seen: usize, scale: f32) {
+fn through_softmax<S: Simd>(weights: &[f32], slopes: &mut [f32], scale: f32) {
+    let width = tile::width::<S>();
+    let mut means = vec![0.0; width];
+    let blocks = weights.chunks(TOKENS * width);
+    for (weights, slopes) in blocks.zip(slopes.chunks(TOKENS * width)) {
+        let mut sums = vec![0.0; width];
+        for (weights, slopes) in weights.chunks_exact(width).zip(slopes.chunks_exact(width)) {
+            for ((sum, weight), slope) in sums.iter_mut().zip(weights).zip(slopes) {
+                *sum += weight * slope;
+            }
+        }
+        for (mean, sum) in means.iter_mut().zip(sums) {
+            *mean += sum;
+        }
+    }
     let rows = weights
-        .chunks_exact(seen)
-        .zip(slopes.chunks_exact_mut(seen));
+        .chunks_exact(width)
+        .zip(slopes.chunks_exact_mut(width));
     for (weights, slopes) in rows {
-        let mean = product_sum(weights, slopes, |v| v);
-        for (slope, weight) in slopes.iter_mut().zip(weights) {
+        for ((slope, weight), mean) in slopes.iter_mut().zip(weights).zip(&means) {
             *slope = scale * weight * (*slope - mean);
         }
     }
-}
-
-/// `[rows, columns]` to `[columns, rows]`.
-fn transpose(values: &[f32], columns: usize) -> Vec<f32> {
-    const SQUARE: usize = 8;
-    let rows = values.len() / columns;
-    let mut out = vec![0.0; values.len()];
-    for first in (0..columns).step_by(SQUARE) {
-        let end = columns.min(first + SQUARE);
-        for (i, row) in values.chunks_exact(columns).enumerate() {
-            for (j, value) in row[first..end].iter().enumerate() {
-                out[(first + j) * rows + i] = *value;
-            }
-        }
-    }
-    out
 }
