@@ -35,11 +35,12 @@ fn ratio(model: Option<f64>, simulator: Option<f64>) -> String {
 
 fn rungs(report: &Report) -> String {
     let mut text = "## Rungs\n\nWhat each kind of image has of a sea, means over the scenes: the shape of the grey that is left \
-        when the expected image is subtracted; variance on crests of the wake over that in its troughs; share of patches of \
+        when the expected image is subtracted; variance on crests of the wake over that in its troughs; squared differences of neighbours across the borders of squares of \
+        8 pixels over those elsewhere; share of patches of \
         unseen scenes that a small network tells from simulated ones, 0.5 where it cannot, and the distance of both kinds in the \
         feature that it tells them by, in standard deviations.\n\n\
-        | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests | seams |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
     for r in &report.rungs {
         let told = r.two_sample.map_or("–".to_owned(), |t| {
@@ -47,13 +48,14 @@ fn rungs(report: &Report) -> String {
         });
         let [range, azimuth, wind] = r.steepness.map(|s| number(s, 3));
         text += &format!(
-            "| {} | {told} | {} | {} | {} | {range}, {azimuth}, {wind} | {} | {} |\n",
+            "| {} | {told} | {} | {} | {} | {range}, {azimuth}, {wind} | {} | {} | {} |\n",
             r.image,
             number(r.two_sample.map(|t| t.distance), 2),
             number(r.skewness, 3),
             number(r.kurtosis, 3),
             number(r.grouping, 3),
-            number(r.crest_variance, 2)
+            number(r.crest_variance, 2),
+            number(r.seams, 2)
         );
     }
     text

@@ -8,10 +8,12 @@ use crate::statistics::mean;
 use burn::tensor::Device;
 use serde::Serialize;
 use wake_ldm::train::{TwoSample, TwoSampleOptions, two_sample};
-use wake_physics::measure::{SeaShape, crest_variance, sea_shape};
+use wake_physics::measure::{SeaShape, crest_variance, sea_shape, seams};
 use wake_physics::picture::Picture;
 use wake_physics::{Field, Scene};
 
+/// Side of the squares of pixels that the model draws by.
+const SQUARE: usize = 8;
 /// Panels of the picture in a row.
 const ACROSS: usize = 3;
 
@@ -27,6 +29,8 @@ pub(crate) struct RungRow {
     pub(crate) grouping: Option<f64>,
     /// Variance on crests of the wake over that in its troughs.
     pub(crate) crest_variance: Option<f64>,
+    /// Squared differences of neighbours across the borders of the model's squares over those elsewhere.
+    pub(crate) seams: Option<f64>,
     /// Against simulated images of the same scenes.
     pub(crate) two_sample: Option<TwoSample>,
 }
@@ -123,7 +127,7 @@ fn row(
     two_sample: Option<TwoSample>,
 ) -> RungRow {
     let mut shapes: Vec<SeaShape> = Vec::new();
-    let mut crests = Vec::new();
+    let (mut crests, mut borders) = (Vec::new(), Vec::new());
     for ((scene, image), expected) in scenes.iter().zip(images).zip(expected) {
         let left = image.values.iter().zip(&expected.values);
         let left = Field {
@@ -132,6 +136,7 @@ fn row(
         };
         shapes.extend(sea_shape(&left, scene.sea.wind_toward.to_radians()));
         crests.extend(crest_variance(image, expected));
+        borders.extend(seams(&left, SQUARE));
     }
     let of = |value: &dyn Fn(&SeaShape) -> f64| {
         let values: Vec<f64> = shapes.iter().map(value).collect();
@@ -144,6 +149,7 @@ fn row(
         steepness: std::array::from_fn(|n| of(&|s| s.steepness[n])),
         grouping: of(&|s| s.grouping),
         crest_variance: mean(&crests),
+        seams: mean(&borders),
         two_sample,
     }
 }
