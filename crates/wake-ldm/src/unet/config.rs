@@ -317,3 +317,41 @@ fn whole(number: f64) -> Value {
         json!(number.trunc() as i64)
     }
 }
+
+#[cfg(all(test, feature = "flex"))]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use burn::module::Module;
+    use burn::tensor::{Device, Tensor};
+
+    use super::*;
+    use crate::unet::UNetInput;
+
+    /// Without a context there are no weights for one, the file says so, and none is needed.
+    #[test]
+    fn a_model_may_attend_to_pixels_alone() {
+        let attending = UNetConfig::small(2, Some(8), Some(3))
+            .with_block_out_channels(vec![16, 16])
+            .with_down_attention(vec![false, true])
+            .with_up_attention(vec![true, false])
+            .with_heads(vec![1, 1]);
+        let config = attending.clone().with_cross_attention_dim(None);
+        for config in [&attending, &config] {
+            let text = config.to_json().to_string();
+            let again = UNetConfig::from_json(&text, Path::new("config.json")).unwrap();
+            assert_eq!(again, *config);
+        }
+        let device = Device::flex();
+        let unet = config.init(&device);
+        let fewer = attending.init(&device).num_params() - unet.num_params();
+        // Four transformers, in each a norm, maps of 16 and 8 channels to 16, and one out with its bias.
+        assert_eq!(fewer, 4 * (2 * 16 + 16 * 16 + 2 * 8 * 16 + 16 * 16 + 16));
+        let out = unet.forward(UNetInput {
+            sample: Tensor::ones([1, 2, 8, 8], &device),
+            timesteps: Tensor::ones([1], &device),
+            context: None,
+            condition: Some(Tensor::ones([1, 3], &device)),
+        });
+        assert_eq!(out.dims(), [1, 2, 8, 8]);
+    }
+}

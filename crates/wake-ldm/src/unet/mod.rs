@@ -27,7 +27,8 @@ pub struct UNetInput {
     pub sample: Tensor<4>,
     /// The step of each image, `[batch]`; fractions are allowed.
     pub timesteps: Tensor<1>,
-    /// The prompt's tokens, `[batch, tokens, cross_attention_dim]`; `None` for a model that attends to none.
+    /// The prompt's tokens, `[batch, tokens, cross_attention_dim]`; a model that attends to none takes `None`, and does not
+    /// look at any.
     pub context: Option<Tensor<3>>,
     /// Numbers that condition the image beside the prompt, `[batch, condition_channels]`; `None`
     /// leaves the model unconditioned by them.
