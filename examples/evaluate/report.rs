@@ -37,7 +37,7 @@ fn rungs(report: &Report) -> String {
     let mut text = "## Rungs\n\nWhat each kind of image has of a sea, means over the scenes: the shape of the grey that is left \
         when the expected image is subtracted; variance on crests of the wake over that in its troughs; squared differences of neighbours across the borders of squares of \
         8 pixels over those elsewhere; share of patches of \
-        unseen scenes that a small network tells from simulated ones, 0.5 where it cannot, and the distance of both kinds in the \
+        unseen scenes that the best of up to three small networks tells from simulated ones, 0.5 where it cannot, and the distance of both kinds in the \
         feature that it tells them by, in standard deviations.\n\n\
         | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests | seams |\n\
         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"

@@ -14,6 +14,10 @@ use wake_physics::{Field, Scene};
 
 /// Side of the squares of pixels that the model draws by.
 const SQUARE: usize = 8;
+/// Networks that are trained to tell images from simulated ones, if those before were right less often than this: one that
+/// finds nothing proves little.
+const NETWORKS: u64 = 3;
+const FOUND: f64 = 0.9;
 /// Panels of the picture in a row.
 const ACROSS: usize = 3;
 
@@ -79,20 +83,34 @@ pub(crate) fn rungs(
     let mut rows = Vec::new();
     for (name, source) in sources(judged) {
         let images = draw(source, scenes)?;
-        let told = match images.len() >= 4 {
-            true => Some(two_sample(
-                &simulated,
-                &images,
-                &TwoSampleOptions::default(),
-                device,
-            )?),
-            false => None,
-        };
+        let told = told_apart(&simulated, &images, device)?;
         rows.push(row(name, scenes, &images, &expected, told));
         step();
     }
     rows.push(row("simulator", scenes, &simulated, &expected, None));
     Ok(rows)
+}
+
+/// What the network that tells two kinds of images apart best says of them; `None` of too few.
+fn told_apart(first: &[Field], second: &[Field], device: &Device) -> Result<Option<TwoSample>> {
+    let mut best: Option<TwoSample> = None;
+    if first.len() < 4 {
+        return Ok(best);
+    }
+    for seed in 1..=NETWORKS {
+        let options = TwoSampleOptions {
+            seed,
+            ..TwoSampleOptions::default()
+        };
+        let told = two_sample(first, second, &options, device)?;
+        best = best
+            .filter(|best| best.accuracy >= told.accuracy)
+            .or(Some(told));
+        if told.accuracy > FOUND {
+            break;
+        }
+    }
+    Ok(best)
 }
 
 /// One scene on every rung, in one stretch of grey: three standard deviations of the simulator's image to each side of its mean.

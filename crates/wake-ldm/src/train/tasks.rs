@@ -14,7 +14,8 @@ use crate::conditioning::{
 };
 use crate::dataset::{Prompts, shuffled};
 use crate::network::{
-    Flow, Known, PatchTransform, Prior, PromptParser, WakeModelConfig, sea_noise, windows,
+    ChannelWindows, Flow, Known, PatchTransform, Prior, PromptParser, SeaFields, WakeModelConfig,
+    windows,
 };
 use crate::noise::{NoiseSource, uniform};
 
@@ -213,15 +214,14 @@ impl FlowTask<'_> {
         let scenes = indices.iter().map(|&i| &self.set.example(i).scene);
         let pairs: Vec<(&Scene, u64)> = scenes.zip(positions).collect();
         let [channels, rows, columns] = self.set.shape();
+        let windows = ChannelWindows::new(self.patches);
         let noise = pairs.par_iter().map(|&(scene, position)| {
-            sea_noise(
-                std::slice::from_ref(scene),
-                &[noise_of(self.seed, position)],
-                self.patches,
+            let (scenes, sources) = (std::slice::from_ref(scene), [noise_of(self.seed, position)]);
+            let seas = SeaFields::new(scenes, &sources, &windows);
+            seas.map_or_else(
+                |_| Tensor::full([1, channels, rows, columns], f32::NAN, &Device::default()),
+                |seas| seas.noise(scenes, &sources, self.patches),
             )
-            .unwrap_or_else(|_| {
-                Tensor::full([1, channels, rows, columns], f32::NAN, &Device::default())
-            })
         });
         Tensor::cat(noise.collect(), 0)
     }

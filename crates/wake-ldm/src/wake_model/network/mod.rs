@@ -4,6 +4,7 @@ mod config;
 mod flow;
 mod known;
 mod model;
+mod overlap;
 mod patches;
 mod prior;
 mod prompt_parser;
@@ -18,6 +19,4 @@ pub use patches::{PatchTransform, Shares};
 pub use prior::{Expected, Prior};
 pub use prompt_parser::PromptParser;
 pub(crate) use prompt_parser::windows;
-pub(crate) use sea::SeaFields;
-#[cfg(feature = "train")]
-pub(crate) use sea::sea_noise;
+pub(crate) use sea::{ChannelWindows, SeaFields};

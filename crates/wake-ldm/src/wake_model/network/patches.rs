@@ -1,32 +1,37 @@
-//! The autoencoder in closed form: squares of pixels as a few whitened principal components.
+//! The autoencoder in closed form: squares of pixels that overlap as a few whitened principal components.
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
+use super::overlap::{self, REACH};
 use crate::nn::patch::{depth_to_space, space_to_depth};
 use crate::wake_model::conditioning::PATCH;
 
 /// Pixels of a square.
-pub(super) const PIXELS: usize = PATCH * PATCH;
+const PIXELS: usize = PATCH * PATCH;
+/// Rows and columns of pixels that one square of latents reaches.
+pub(super) const WINDOW: usize = PATCH + 2 * REACH;
 
-/// A linear map between squares of 8 × 8 pixels and a few numbers, both ways.
+/// A linear map between squares of 8 × 8 pixels that overlap and a few numbers, both ways.
 ///
 /// ```text
-/// z = W p,    p ≈ V z,    W = Λ^(−1/2) Vᵀ,  V = E Λ^(1/2)
+/// z = W p,    p ≈ V z,    W = Λ^(−1/2) Eᵀ,  V = E Λ^(1/2)
 /// ```
 ///
-/// - p: the grey of a square of an image whose mean has been taken away
+/// - p: a square of the grey of an image whose mean has been taken away, after an orthogonal filter across the borders of
+///   squares (`overlap.rs`): each p is of 16 × 16 pixels, so that what is left out of it, or drawn wrongly, makes no edge
 /// - E, Λ: the first principal components of such squares and their variances
 ///
-/// Each z has variance 1 over the data. No linear map of so many numbers loses less.
+/// Each z has variance 1 over the data. No other map of so many numbers that is linear in p loses less.
 ///
 /// # References
 ///
-/// Pearson (1901), "On Lines and Planes of Closest Fit to Systems of Points in Space".
+/// Pearson (1901), "On Lines and Planes of Closest Fit to Systems of Points in Space"; Malvar & Staelin (1989), "The LOT:
+/// Transform Coding Without Blocking Effects".
 #[derive(Module, Debug)]
 pub struct PatchTransform {
-    encoder: Param<Tensor<2>>,
-    decoder: Param<Tensor<2>>,
+    analysis: Param<Tensor<2>>,
+    synthesis: Param<Tensor<2>>,
 }
 
 /// How much of the variance each principal component holds.
@@ -58,8 +63,8 @@ impl PatchTransform {
     /// A transform that still has to be fitted or loaded.
     pub fn zeros(channels: usize, device: &Device) -> Self {
         Self {
-            encoder: Param::from_tensor(Tensor::zeros([channels, PIXELS], device)),
-            decoder: Param::from_tensor(Tensor::zeros([PIXELS, channels], device)),
+            analysis: Param::from_tensor(Tensor::zeros([channels, PIXELS], device)),
+            synthesis: Param::from_tensor(Tensor::zeros([PIXELS, channels], device)),
         }
     }
 
@@ -72,34 +77,49 @@ impl PatchTransform {
         channels: usize,
         device: &Device,
     ) -> (Self, Shares) {
-        let (values, vectors) = symmetric_eigen(covariance(images, size));
-        let mut encoder = vec![0.0; channels * PIXELS];
-        let mut decoder = vec![0.0; PIXELS * channels];
+        let filtered = images.map(|image| {
+            let data = TensorData::new(image.to_vec(), [1, 1, size, size]);
+            let image = overlap::before_encoding(Tensor::from_data(data, device));
+            image.into_data().iter::<f32>().collect()
+        });
+        let (values, vectors) = symmetric_eigen(covariance(filtered, size));
+        let mut analysis = vec![0.0; channels * PIXELS];
+        let mut synthesis = vec![0.0; PIXELS * channels];
         for (c, &value) in values.iter().take(channels).enumerate() {
             let deviation = value.max(1e-12).sqrt();
             for p in 0..PIXELS {
-                encoder[c * PIXELS + p] = (vectors[p][c] / deviation) as f32;
-                decoder[p * channels + c] = (vectors[p][c] * deviation) as f32;
+                analysis[c * PIXELS + p] = (vectors[p][c] / deviation) as f32;
+                synthesis[p * channels + c] = (vectors[p][c] * deviation) as f32;
             }
         }
         let matrix = |numbers, shape: [usize; 2]| {
             Param::from_tensor(Tensor::from_data(TensorData::new(numbers, shape), device))
         };
         let transform = Self {
-            encoder: matrix(encoder, [channels, PIXELS]),
-            decoder: matrix(decoder, [PIXELS, channels]),
+            analysis: matrix(analysis, [channels, PIXELS]),
+            synthesis: matrix(synthesis, [PIXELS, channels]),
         };
         (transform, Shares { variances: values })
     }
 
     /// Where the transform lies.
     pub(super) fn device(&self) -> Device {
-        self.encoder.val().device()
+        self.analysis.val().device()
     }
 
-    /// What each channel weighs the pixels of a square with, `[channels, 64]`.
-    pub(crate) fn encoder_rows(&self) -> Vec<f32> {
-        self.encoder.val().into_data().iter::<f32>().collect()
+    /// What each channel weighs the pixels of a square and of half its neighbours with, `[channels, 16 × 16]` in rows.
+    pub(crate) fn windows(&self) -> Vec<f32> {
+        let analysis = self.analysis.val();
+        let [channels, _] = analysis.dims();
+        let square = analysis.reshape([channels, PIXELS, 1, 1]);
+        // The transpose of the filter is its inverse.
+        let alone = square.pad((1, 1, 1, 1), 0.0);
+        overlap::after_decoding(depth_to_space(alone, PATCH))
+            .narrow(2, PATCH - REACH, WINDOW)
+            .narrow(3, PATCH - REACH, WINDOW)
+            .into_data()
+            .iter::<f32>()
+            .collect()
     }
 
     /// Encodes images.
@@ -111,8 +131,9 @@ impl PatchTransform {
     pub fn encode(&self, images: Tensor<4>) -> (Tensor<4>, Tensor<2>) {
         let [batch, _, rows, columns] = images.dims();
         let mean = images.clone().reshape([batch, rows * columns]).mean_dim(1);
-        let squares = space_to_depth(images - mean.clone().reshape([batch, 1, 1, 1]), PATCH);
-        (mix(self.encoder.val(), squares), mean)
+        let images = overlap::before_encoding(images - mean.clone().reshape([batch, 1, 1, 1]));
+        let squares = space_to_depth(images, PATCH);
+        (mix(self.analysis.val(), squares), mean)
     }
 
     /// Decodes latents to grey; values may lie a little beyond 0…1.
@@ -124,7 +145,8 @@ impl PatchTransform {
     /// - result: `[batch, 1, 8 rows, 8 columns]`
     pub fn decode(&self, latents: Tensor<4>, mean: Tensor<2>) -> Tensor<4> {
         let [batch, ..] = latents.dims();
-        depth_to_space(mix(self.decoder.val(), latents), PATCH) + mean.reshape([batch, 1, 1, 1])
+        let squares = depth_to_space(mix(self.synthesis.val(), latents), PATCH);
+        overlap::after_decoding(squares) + mean.reshape([batch, 1, 1, 1])
     }
 }
 
@@ -140,7 +162,7 @@ fn mix(matrix: Tensor<2>, image: Tensor<4>) -> Tensor<4> {
 }
 
 /// Covariance of the squares of images whose means have been taken away.
-fn covariance<'a>(images: impl Iterator<Item = &'a [f32]>, size: usize) -> Vec<Vec<f64>> {
+fn covariance(images: impl Iterator<Item = Vec<f32>>, size: usize) -> Vec<Vec<f64>> {
     let mut sums = vec![vec![0.0; PIXELS]; PIXELS];
     let mut count = 0.0;
     for image in images {
@@ -217,6 +239,9 @@ fn rotate(a: &mut [Vec<f64>], vectors: &mut [Vec<f64>], p: usize, q: usize) {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
+    use crate::noise::NoiseSource;
+    use wake_physics::Field;
+    use wake_physics::measure::seams;
 
     /// Waves of two directions: two components hold almost all of it.
     fn images() -> Vec<Vec<f32>> {
@@ -267,5 +292,48 @@ mod tests {
             let variance = latents.square().mean().into_scalar::<f32>();
             assert!((variance - 1.0).abs() < 1e-3, "{variance}");
         }
+    }
+
+    #[test]
+    fn a_channel_weighs_the_pixels_of_its_window() {
+        let device = Device::flex();
+        let images = images();
+        let (transform, _) = PatchTransform::fit(images.iter().map(Vec::as_slice), 64, 3, &device);
+        let windows = transform.windows();
+        let (latents, mean) = {
+            let data = TensorData::new(images[1].clone(), [1, 1, 64, 64]);
+            transform.encode(Tensor::from_data(data, &device))
+        };
+        let mean = mean.into_scalar::<f32>();
+        let latents: Vec<f32> = latents.into_data().iter::<f32>().collect();
+        let (row, column) = (3, 5);
+        for (c, window) in windows.chunks(WINDOW * WINDOW).enumerate() {
+            let pixel = |n: usize| {
+                let (i, j) = (8 * row - 4 + n / WINDOW, 8 * column - 4 + n % WINDOW);
+                images[1][i * 64 + j] - mean
+            };
+            let sum: f32 = window.iter().enumerate().map(|(n, w)| w * pixel(n)).sum();
+            let encoded = latents[(c * 8 + row) * 8 + column];
+            // Latents are of order 1, sums of 256 products in f32.
+            assert!((sum - encoded).abs() < 1e-4, "{c}: {sum} {encoded}");
+        }
+    }
+
+    /// Latents that know nothing of their neighbours: squares that touch would have edges of some 90 times the differences inside.
+    #[test]
+    fn squares_of_random_latents_have_no_edges() {
+        let device = Device::flex();
+        let images = images();
+        let (transform, _) = PatchTransform::fit(images.iter().map(Vec::as_slice), 64, 2, &device);
+        let random = NoiseSource::new(1).normal(0, 2 * 32 * 32);
+        let latents = Tensor::from_data(TensorData::new(random, [1, 2, 32, 32]), &device);
+        let image = transform.decode(latents, Tensor::zeros([1, 1], &device));
+        let field = Field {
+            rows: 256,
+            columns: 256,
+            values: image.into_data().iter::<f32>().collect(),
+        };
+        let seams = seams(&field, PATCH).unwrap_or(f64::INFINITY);
+        assert!(seams < 3.0, "{seams}");
     }
 }

@@ -21,7 +21,8 @@ use crate::noise::NoiseSource;
 use crate::self_check::check_once;
 use crate::wake_model::conditioning::{Conditions, Vocabulary};
 use crate::wake_model::network::{
-    Expected, Known, SeaFields, WakeModel, WakeModelConfig, expected_greys, latents_of,
+    ChannelWindows, Expected, Known, SeaFields, WakeModel, WakeModelConfig, expected_greys,
+    latents_of,
 };
 use crate::wake_model::sea_texture::SeaTexture;
 pub use image::{SampleSeconds, WakeImage};
@@ -59,6 +60,7 @@ pub struct WakeSampler {
     config: WakeModelConfig,
     vocabulary: Vocabulary,
     device: Device,
+    windows: ChannelWindows,
     steps: usize,
     conditioning: Conditioning,
     sea: Option<SeaTexture>,
@@ -81,6 +83,7 @@ impl WakeSampler {
         Ok(Self {
             vocabulary: Vocabulary::new(config.vocabulary.iter().copied()),
             device,
+            windows: ChannelWindows::new(&model.patches),
             model,
             config,
             steps: STEPS,
@@ -272,10 +275,9 @@ impl WakeSampler {
             .map(|scene| NoiseSource::new(scene.seed))
             .collect();
         // Neither needs the other, and one of a single image does not fill all cores.
-        let encoder = self.model.patches.encoder_rows();
         let (expected, seas) = rayon::join(
             || expected_greys(&scenes, &self.config.grey),
-            || SeaFields::new(&scenes, &sources, &encoder),
+            || SeaFields::new(&scenes, &sources, &self.windows),
         );
         let (expected, seas) = (expected?, seas?);
         let wake = latents_of(&scenes, expected, &self.model.patches);
