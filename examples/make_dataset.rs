@@ -111,22 +111,29 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 }
 
 fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
-    let (recipe, default_count) = match arguments.grid.as_str() {
-        "paper" => (Recipe::paper(), PAPER_COUNT),
-        file if Path::new(file).is_file() => (Recipe::read(Path::new(file))?, 100),
-        name => {
-            let told =
-                |_| format!("--grid is {name}, expected paper, ranges, detector or a TOML file");
-            (Recipe::named(name).map_err(told)?, 100)
-        }
+    let default_count = match arguments.grid.as_str() {
+        "paper" => PAPER_COUNT,
+        _ => 100,
     };
     let count = arguments.count.unwrap_or(default_count);
-    let recipe = recipe.with_assignments(&arguments.set)?;
+    let recipe = recipe(&arguments.grid)?.with_assignments(&arguments.set)?;
     Ok(Manifest {
         shard: arguments.shard,
         sea: arguments.sea.as_deref().map(fingerprint).transpose()?,
         ..Manifest::new(recipe, arguments.seed, count)?.with_val_share(arguments.val_share)?
     })
+}
+
+/// A recipe that is built in, which no file of its name hides; else that of a file.
+fn recipe(grid: &str) -> Result<Recipe, Box<dyn Error>> {
+    let file = Path::new(grid);
+    match Recipe::named(grid) {
+        Ok(recipe) => Ok(recipe),
+        Err(_) if file.is_file() => Ok(Recipe::read(file)?),
+        Err(_) => {
+            Err(format!("--grid is {grid}, expected paper, ranges, detector or a TOML file").into())
+        }
+    }
 }
 
 /// The pairs of a set, on the learnt sea that is asked for.

@@ -56,6 +56,21 @@ fn wrong_recipes_shares_and_numbers_are_named() {
 }
 
 #[test]
+fn a_file_does_not_hide_a_recipe_of_its_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("detector"), [0xff, 0xfe]).expect("a file");
+    let made = Command::new(example("make_dataset"))
+        .args(["--grid", "detector", "--count", "1", "--out", "set"])
+        .args(SMALL)
+        .current_dir(folder.path())
+        .output()
+        .expect("a program that runs");
+    let message = String::from_utf8_lossy(&made.stderr);
+    assert!(made.status.success(), "{message}");
+    assert!(folder.path().join("set/dataset.json").is_file());
+}
+
+#[test]
 fn shards_made_on_other_threads_merge_to_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let (whole, joined) = (folder.path().join("whole"), folder.path().join("joined"));
