@@ -126,7 +126,7 @@ impl PatchTransform {
     ///
     /// # Shapes
     ///
-    /// - `images`: `[batch, 1, rows, columns]`, grey 0…1
+    /// - `images`: `[batch, 1, rows, columns]`, multiples of 8, grey 0…1
     /// - result: latents `[batch, channels, rows / 8, columns / 8]` and the mean grey `[batch, 1]`
     pub fn encode(&self, images: Tensor<4>) -> (Tensor<4>, Tensor<2>) {
         let [batch, _, rows, columns] = images.dims();
