@@ -11,7 +11,7 @@ use crate::wake_model::conditioning::PATCH;
 /// Pixels on each side of a border that are filtered.
 pub(super) const REACH: usize = PATCH / 2;
 /// Pixels of a square.
-const PIXELS: usize = PATCH * PATCH;
+pub(super) const PIXELS: usize = PATCH * PATCH;
 
 /// Filters images across the borders of their squares, so that what a square holds afterwards reaches into its neighbours.
 ///

@@ -3,12 +3,10 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::overlap::{self, REACH};
+use super::overlap::{self, PIXELS, REACH};
 use crate::nn::patch::{depth_to_space, space_to_depth};
 use crate::wake_model::conditioning::PATCH;
 
-/// Pixels of a square.
-const PIXELS: usize = PATCH * PATCH;
 /// Rows and columns of pixels that one square of latents reaches.
 pub(super) const WINDOW: usize = PATCH + 2 * REACH;
 
