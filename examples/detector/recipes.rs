@@ -24,7 +24,7 @@ pub(crate) enum Recipe {
     Detector,
     /// The same, clear wakes more often, under painted land, piers, streaks, fronts and borders
     Cluttered,
-    /// Drawn by the wake model
+    /// The recipe detector, drawn by the wake model
     Sampled,
     /// Painted and simulated images (detector) in turn
     Mixed,
@@ -50,13 +50,6 @@ const PLAIN: [&str; 5] = [
     "draw.radar.noise_floor = -60",
     "draw.radar.looks = [1, 8]",
 ];
-/// What the wake model draws, as a quick-look shows it.
-const SAMPLED: [&str; 3] = [
-    "speckle = true",
-    "draw.quick_look.gain = { log = [0.09, 0.43] }",
-    "draw.quick_look.offset = [-0.03, 0.05]",
-];
-
 impl Recipe {
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -89,11 +82,8 @@ impl Recipe {
             Self::Painted => return Ok(Arc::new(Painted { seed, size })),
             Self::Sampled => {
                 let sampler = WakeSampler::pretrained(&Device::flex())?;
-                let recipe = SceneRecipe::default().with_assignments(&SAMPLED)?;
-                return Ok(Arc::new(Sampled::new(
-                    sampler,
-                    Simulated::new(recipe, seed)?,
-                )?));
+                let scenes = simulated(&[], seed, size)?;
+                return Ok(Arc::new(Sampled::new(sampler, scenes)?));
             }
             Self::Mixed => return in_turn([Self::Painted, Self::Detector], seed, size),
             Self::Full => return in_turn([Self::Painted, Self::Cluttered], seed, size),

@@ -3,16 +3,19 @@
 //! ```text
 //! cargo run --release --example evaluate
 //! cargo run --release --example evaluate -- --simulator-only
+//! cargo run --release --example evaluate -- domain --recipe detector
 //! cargo run --release --example evaluate -- sea --real chips --weights out/sea/sea.safetensors
 //! ```
 //!
 //! Writes `report.json`, `report.md`, `spectrum.svg` and `wake_correlation.svg`. `docs/evaluation.md` says what each
-//! figure means. `sea` sets a learnt sea beside real images instead, and writes `report.json`, `report.md` and `learned_sea.png`.
+//! figure means. `domain` judges
+//! the model over a recipe and writes `domain.json`, `domain.md` and `domain.png`. `sea` sets a learnt sea beside real images instead, and writes `report.json`, `report.md` and `learned_sea.png`.
 
 #[path = "../common/exit.rs"]
 mod exit;
 #[path = "../common/grey.rs"]
 mod grey;
+mod domain;
 mod judge;
 mod measurements;
 mod model;
@@ -90,6 +93,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
+    /// Judge the model over all scenes of a recipe
+    Domain(domain::Options),
     /// Judge a sea that was learnt from real images against their other halves
     Sea(sea::Options),
 }
@@ -98,6 +103,7 @@ fn main() -> ExitCode {
     exit::code(|| {
         let arguments = Arguments::parse();
         match &arguments.task {
+            Some(Task::Domain(options)) => domain::run(options),
             Some(Task::Sea(options)) => sea::run(options),
             None => run(&arguments),
         }

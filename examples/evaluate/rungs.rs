@@ -92,7 +92,11 @@ pub(crate) fn rungs(
 }
 
 /// What the network that tells two kinds of images apart best says of them; `None` of too few.
-fn told_apart(first: &[Field], second: &[Field], device: &Device) -> Result<Option<TwoSample>> {
+pub(crate) fn told_apart(
+    first: &[Field],
+    second: &[Field],
+    device: &Device,
+) -> Result<Option<TwoSample>> {
     let mut best: Option<TwoSample> = None;
     if first.len() < 4 {
         return Ok(best);

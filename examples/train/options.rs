@@ -1,11 +1,12 @@
 //! What a stage is told on the command line.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use burn::tensor::{DType, Device};
 use clap::Args;
 use serde_json::Value;
+use wake_ldm::dataset::Recipe;
 use wake_ldm::device_named;
 use wake_ldm::train::{Rate, RunOptions, TrainerOptions};
 
@@ -14,6 +15,9 @@ pub(crate) struct Options {
     /// Folder that `make_dataset` wrote; without it, pairs are simulated first
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
+    /// paper, ranges, detector or model, or a recipe file: the pairs to simulate where there is no --data
+    #[arg(long, default_value = "model", conflicts_with = "data")]
+    pub(crate) recipe: String,
     /// Pairs to simulate where there is no --data
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     pub(crate) count: u64,
@@ -32,9 +36,9 @@ pub(crate) struct Options {
     /// Parts of a batch that are computed one after the other, to save memory
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) accumulation: u16,
-    /// Largest step of the optimizer
-    #[arg(long, default_value_t = 1e-3)]
-    pub(crate) rate: f64,
+    /// Largest step of the optimizer [default: words 1e-3, mean 2e-3, diffusion 1e-3]
+    #[arg(long)]
+    pub(crate) rate: Option<f64>,
     /// Steps between checkpoints and sheets
     #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) every: u32,
@@ -65,7 +69,7 @@ impl Options {
         Self {
             steps: u32::try_from(left).ok().filter(|&steps| steps > 0),
             batch,
-            rate: state["trainer"]["rate"].as_f64().unwrap_or(self.rate),
+            rate: state["trainer"]["rate"].as_f64(),
             bf16: state["trainer"]["bf16"].as_bool().unwrap_or(self.bf16),
             seed: state["seed"].as_u64().unwrap_or(self.seed),
             resume: left > 0,
@@ -80,15 +84,16 @@ impl Options {
 
     /// Constants of a run.
     ///
+    /// - `usual`: batch and rate of its stage
     /// - `identity`: what it learns from
-    pub(crate) fn run(&self, steps: usize, batch: u16, identity: Value) -> RunOptions {
+    pub(crate) fn run(&self, steps: usize, usual: (u16, f64), identity: Value) -> RunOptions {
         RunOptions {
-            batch: usize::from(self.batch.unwrap_or(batch)),
+            batch: usize::from(self.batch.unwrap_or(usual.0)),
             seed: self.seed,
             identity,
             trainer: TrainerOptions {
                 rate: Rate {
-                    peak: self.rate,
+                    peak: self.rate.unwrap_or(usual.1),
                     warmup: 100,
                     steps,
                 },
@@ -96,6 +101,14 @@ impl Options {
                 bf16: self.bf16,
                 ..TrainerOptions::default()
             },
+        }
+    }
+
+    /// The recipe of simulated pairs: one that is built in, else that of a file.
+    pub(crate) fn recipe(&self) -> wake_ldm::Result<Recipe> {
+        match Recipe::named(&self.recipe) {
+            Err(_) if Path::new(&self.recipe).is_file() => Recipe::read(Path::new(&self.recipe)),
+            named => named,
         }
     }
 

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use wake_ldm::dataset::{self, Folder, Manifest, Pair, Recipe, Simulated};
 use wake_ldm::network::WakeModelConfig;
-use wake_physics::Scene;
 
 use super::options::Options;
 
@@ -23,11 +22,9 @@ impl Source {
     /// Pairs that a model can learn from: those of --data, of which every scene must fit it, or simulated ones.
     pub(crate) fn new(options: &Options, config: &WakeModelConfig) -> Result<Self, Box<dyn Error>> {
         let Some(path) = &options.data else {
-            let mut recipe = Recipe::default();
-            recipe.scene = Scene {
-                model: recipe.scene.model,
-                ..config.base_scene()
-            };
+            let mut recipe = options.recipe()?;
+            recipe.scene.grid.rows = config.image_size;
+            recipe.scene.grid.columns = config.image_size;
             recipe.grey = config.grey;
             return Self::simulated(recipe, options.seed, options.count);
         };

@@ -2,20 +2,22 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::sync::Arc;
 
 use burn::module::Module;
-use burn::tensor::Device;
+use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use wake_ldm::conditioning::{Conditions, Vocabulary, tokens};
+use wake_ldm::conditioning::{Vocabulary, tokens};
 use wake_ldm::dataset::{Folder, Pair, Prompts, Recipe, Simulated};
 use wake_ldm::network::{
-    Flow, Known, PatchTransform, Prior, PromptParser, Shares, WakeModel, WakeModelConfig,
-    expected_grey, expected_latents,
+    Domain, Flow, Foreseen, PatchTransform, Prior, PromptParser, Shares, WakeModel,
+    WakeModelConfig, expected_grey,
 };
 use wake_ldm::train::{Checkpoint, FlowTask, LatentSet, PriorTask, Run, RunFolder, WordsTask};
 use wake_ldm::weights::{Layout, Precision, load, save_as};
 use wake_ldm::{WakeSampler, fingerprint};
+use wake_physics::grey::GreyScale;
 use wake_physics::{Scene, available_memory, output};
 use wake_text::Wording;
 
@@ -34,8 +36,16 @@ const FITTED: u64 = 400;
 const AT_ONCE: usize = 64;
 /// Images in a row of a sheet.
 const ACROSS: u64 = 8;
-/// Examples of a batch by default.
-const BATCHES: [(&str, u16); 3] = [("words", 128), ("mean", 32), ("diffusion", 8)];
+/// Examples of a batch and the largest step of the optimizer by default.
+const USUAL: [(&str, (u16, f64)); 3] = [
+    ("words", (128, 1e-3)),
+    ("mean", (32, 2e-3)),
+    ("diffusion", (8, 1e-3)),
+];
+/// The patch transform is fitted to what images have beyond the expected ones, each brought to this deviation of grey, if it
+/// is not below the least.
+const DEVIATION: f32 = 0.05;
+const LEAST_DEVIATION: f32 = 1e-3;
 /// Names of what the stages write.
 const PATCHES: &str = "patches.safetensors";
 const PARSER: &str = "reader.safetensors";
@@ -78,6 +88,8 @@ struct Work<'a> {
     config: WakeModelConfig,
     source: Option<Source>,
     folder: RunFolder,
+    /// Of all pairs, once they were asked for.
+    latents: Option<Arc<LatentSet>>,
 }
 
 impl<'a> Work<'a> {
@@ -85,9 +97,9 @@ impl<'a> Work<'a> {
     fn new(options: &'a Options, stage: &str, with_data: bool) -> Outcome<Self> {
         let devices = options.learning_devices()?.len();
         let config = config(options)?;
-        let batch = BATCHES.iter().find(|(name, _)| *name == stage);
-        if let Some(&(_, batch)) = batch {
-            options.run(1, batch, Value::Null).validate(devices)?;
+        let usual = USUAL.iter().find(|(name, _)| *name == stage);
+        if let Some(&(_, usual)) = usual {
+            options.run(1, usual, Value::Null).validate(devices)?;
         }
         let source = with_data
             .then(|| Source::new(options, &config))
@@ -100,6 +112,7 @@ impl<'a> Work<'a> {
             options,
             config,
             source,
+            latents: None,
         })
     }
 
@@ -115,7 +128,7 @@ impl<'a> Work<'a> {
         let steps = options.steps(4000);
         let devices = options.learning_devices()?;
         let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
-        let constants = options.run(steps, BATCHES[0].1, identity);
+        let constants = options.run(steps, USUAL[0].1, identity);
         let run = Run::new("words", &self.config, init, constants, devices)?;
         let task = WordsTask {
             prompts: &prompts,
@@ -135,18 +148,17 @@ impl<'a> Work<'a> {
     }
 
     fn mean(&mut self, options: &Options) -> Outcome<()> {
-        let source = self.source()?;
         let patches = self.patches()?;
-        let identity = json!({"data": source.identity(), "patches": self.fingerprint(PATCHES)?});
         let set = self.latents(&patches)?;
+        let source = self.source()?;
+        let identity = json!({"data": source.identity(), "patches": self.fingerprint(PATCHES)?});
         let steps = options.steps(6000);
         let devices = options.learning_devices()?;
         let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
-        let constants = options.run(steps, BATCHES[1].1, identity);
+        let constants = options.run(steps, USUAL[1].1, identity);
         let run = Run::new("mean", &self.config, init, constants, devices)?;
         let task = PriorTask {
             set: &set,
-            grid: self.config.grid(),
             seed: options.seed,
         };
         let examples = source.first(ACROSS)?;
@@ -175,7 +187,7 @@ impl<'a> Work<'a> {
         if let Some(earlier) = self.earlier("mean", &[PRIOR])? {
             self.mean(&earlier)?;
         }
-        let (config, source) = (self.config.clone(), self.source()?);
+        let config = self.config.clone();
         let device = options.devices()?.remove(0);
         let model = WakeModel {
             patches: self.patches()?,
@@ -183,25 +195,25 @@ impl<'a> Work<'a> {
             prior: part(config.init_prior(&device), options, PRIOR)?,
             flow: config.init_flow(&device),
         };
+        let set = self.latents(&model.patches)?;
+        let source = self.source()?;
         let identity = json!({
             "data": source.identity(), "patches": self.fingerprint(PATCHES)?,
             "prior": self.fingerprint(PRIOR)?,
         });
-        let set = self.latents(&model.patches)?;
         let bar = progress::bar(set.len() as u64, "residuals");
-        let set = set.residuals(&model.prior, config.grid(), |n| {
+        let set = set.residuals(&model.prior, |n| {
             bar.inc(n as u64);
         });
         bar.finish_and_clear();
         let steps = options.steps(6000);
         let devices = options.learning_devices()?;
         let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
-        let constants = options.run(steps, BATCHES[2].1, identity);
+        let constants = options.run(steps, USUAL[2].1, identity);
         let run = Run::new("diffusion", &config, init, constants, devices)?;
         let task = FlowTask {
             set: &set,
             patches: &model.patches,
-            config: &config,
             seed: options.seed,
         };
         let examples = source.first(ACROSS)?;
@@ -252,7 +264,8 @@ impl<'a> Work<'a> {
         for first in (0..count).step_by(AT_ONCE) {
             let pairs = source.items(first..count.min(first + AT_ONCE as u64))?;
             bar.inc(pairs.len() as u64);
-            images.extend(pairs.into_iter().map(|pair| pair.image.pixels));
+            let left = pairs.into_par_iter().map(|pair| beyond(pair, &config.grey));
+            images.extend(left.collect::<wake_ldm::Result<Vec<_>>>()?);
         }
         bar.finish_and_clear();
         let pixels = images.iter().map(Vec::as_slice);
@@ -278,7 +291,10 @@ impl<'a> Work<'a> {
     }
 
     /// Encodes all pairs and the images expected of their scenes, which then stay in memory.
-    fn latents(&self, patches: &PatchTransform) -> Outcome<LatentSet> {
+    fn latents(&mut self, patches: &PatchTransform) -> Outcome<Arc<LatentSet>> {
+        if let Some(latents) = &self.latents {
+            return Ok(latents.clone());
+        }
         let source = self.source()?;
         // Two numbers of 16 bits for each of the latents of an image.
         let each = 4 * self.config.latent_channels * self.config.latent_size().pow(2);
@@ -297,20 +313,35 @@ impl<'a> Work<'a> {
         for first in (0..source.len()).step_by(AT_ONCE) {
             let read = |pair: Pair| -> wake_ldm::Result<_> {
                 let Pair { image, scene, .. } = pair;
-                let expected = expected_grey(&scene, &self.config.grey)?;
-                Ok(([image.pixels, expected], scene))
+                let foreseen = Foreseen::new(&scene, &self.config.grey, patches)?;
+                Ok((image.pixels, foreseen, scene))
             };
             let pairs = source.items(first..source.len().min(first + AT_ONCE as u64))?;
-            let pairs: Vec<_> = pairs.into_par_iter().map(read).collect();
-            for pair in pairs {
-                let (images, scene) = pair?;
-                set.push(patches, images, scene)?;
-                bar.inc(1);
-            }
+            let count = pairs.len() as u64;
+            let pairs = pairs.into_par_iter().map(read);
+            set.extend(patches, pairs.collect::<wake_ldm::Result<_>>()?)?;
+            bar.inc(count);
         }
         bar.finish_and_clear();
+        let set = Arc::new(set);
+        self.latents = Some(set.clone());
         Ok(set)
     }
+}
+
+/// What an image has beyond the expected one, brought to one deviation.
+fn beyond(pair: Pair, scale: &GreyScale) -> wake_ldm::Result<Vec<f32>> {
+    let expected = expected_grey(&pair.scene, scale)?;
+    let mut left = pair.image.pixels;
+    left.iter_mut()
+        .zip(&expected)
+        .for_each(|(grey, expected)| *grey -= expected);
+    let count = left.len() as f32;
+    let mean = left.iter().sum::<f32>() / count;
+    let variance = left.iter().map(|grey| (grey - mean).powi(2)).sum::<f32>() / count;
+    let factor = DEVIATION / variance.sqrt().max(LEAST_DEVIATION);
+    left.iter_mut().for_each(|grey| *grey *= factor);
+    Ok(left)
 }
 
 /// Writes a part of the model as it ships.
@@ -341,13 +372,25 @@ fn config(options: &Options) -> Outcome<WakeModelConfig> {
     })
 }
 
-/// The standard widths, and of the data what a model is not told: what its scenes share, and their grey.
+/// The standard widths, and of the data their grey and which scenes there are.
 fn trained(options: &Options, vocabulary: &Vocabulary) -> wake_ldm::Result<WakeModelConfig> {
     let mut config = WakeModelConfig::standard(vocabulary);
-    if let Some(path) = &options.data {
-        let recipe = Folder::open(path)?.manifest().recipe.clone();
-        (config.scene, config.grey) = (recipe.scene, recipe.grey);
-    }
+    let recipe = match &options.data {
+        Some(path) => {
+            let folder = Folder::open(path)?;
+            config.domain = Domain::of(folder.scenes())?;
+            folder.manifest().recipe.clone()
+        }
+        None => {
+            let simulated = Simulated::new(options.recipe()?, options.seed)?;
+            let scenes = (0..options.count).map(|index| simulated.scene(index));
+            let scenes: Vec<Scene> = scenes.collect::<wake_ldm::Result<_>>()?;
+            config.domain = Domain::of(&scenes)?;
+            simulated.recipe().clone()
+        }
+    };
+    (config.scene, config.grey) = (recipe.scene, recipe.grey);
+    config.spacing = config.scene.grid.spacing;
     Ok(config)
 }
 
@@ -372,12 +415,28 @@ fn expected_images(
     config: &WakeModelConfig,
     examples: &[Pair],
 ) -> wake_ldm::Result<Vec<Vec<f32>>> {
-    let scenes: Vec<Scene> = examples.iter().map(|pair| pair.scene.clone()).collect();
-    let conditions: Vec<Conditions> = scenes.iter().map(Conditions::of_scene).collect();
-    let wake = expected_latents(&scenes, &config.grey, patches)?;
-    let expected = prior.forward(&Known::new(&conditions, config.grid(), wake));
-    let images = patches.decode(expected.mean, expected.grey).clamp(0.0, 1.0);
-    let pixels: Vec<f32> = images.into_data().iter::<f32>().collect();
-    let size = config.image_size * config.image_size;
-    Ok(pixels.chunks(size).map(<[f32]>::to_vec).collect())
+    let mut set = LatentSet::default();
+    let mut images = Vec::new();
+    for pair in examples {
+        let foreseen = Foreseen::new(&pair.scene, &config.grey, patches)?;
+        images.extend_from_slice(&foreseen.grey);
+        let pixels = pair.image.pixels.clone();
+        set.extend(patches, vec![(pixels, foreseen, pair.scene.clone())])?;
+    }
+    let all: Vec<usize> = (0..set.len()).collect();
+    let known = set.known(
+        &all,
+        &patches.devices().into_iter().next().unwrap_or_default(),
+    );
+    let expected = prior.forward(&known);
+    let size = config.image_size;
+    let grey = TensorData::new(images, [set.len(), 1, size, size]);
+    let grey: Tensor<4> = Tensor::from_data(grey, &known.wake.device());
+    let added = patches.decode(expected.mean - known.wake, expected.grey);
+    let pixels: Vec<f32> = (grey + added)
+        .clamp(0.0, 1.0)
+        .into_data()
+        .iter::<f32>()
+        .collect();
+    Ok(pixels.chunks(size * size).map(<[f32]>::to_vec).collect())
 }

@@ -37,7 +37,7 @@ fn wrong_options_are_named() {
         ),
         (
             ["--scene", "assets/scenes/default.toml"],
-            ["512 × 512", "2.5 m", "256 × 256 pixels of 4 m"],
+            ["512 × 512", "2.5 m", "256 × 256 pixels"],
         ),
         (
             ["--weights", "no/such/folder"],

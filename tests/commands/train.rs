@@ -5,6 +5,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use wake_ldm::dataset::{Recipe, Simulated};
+use wake_ldm::network::{Domain, WakeModelConfig};
+use wake_physics::Scene;
+
 use super::{done, example, files, refused_by, refused_into, text};
 
 /// Data of 64 × 64 pixels, and a model that fits it, in a folder.
@@ -366,7 +370,16 @@ fn scenes_that_the_model_is_not_told_of_are_refused_by_name() {
     let mut arguments = vec!["--count", "1"];
     arguments.extend(changes.iter().flat_map(|change| ["--set", *change]));
     done("make_dataset", &arguments, &set);
-    let config = toys.path("model.json");
+    let recipe = Recipe::default().with_assignments(&changes[..2]).unwrap();
+    let simulated = Simulated::new(recipe, 1).unwrap();
+    let scenes: Vec<Scene> = (0..200).map(|n| simulated.scene(n).unwrap()).collect();
+    let model = WakeModelConfig::read(&toys.path("model.json")).unwrap();
+    let model = WakeModelConfig {
+        domain: Domain::of(&scenes).unwrap(),
+        ..model
+    };
+    let config = toys.path("told.json");
+    std::fs::write(&config, serde_json::to_vec(&model).unwrap()).unwrap();
     let arguments = ["mean", "--data", text(&set), "--config", text(&config)];
     refused_by("train", &arguments, &["radar.polarization", "HH", "VV"]);
 }

@@ -138,6 +138,17 @@ impl GreyScale {
         }
     }
 
+    /// Change of grey by the relative change of σ⁰, dg/d ln σ⁰ \[1\], between the ends.
+    #[must_use]
+    pub fn slope(&self, sigma0: f64) -> f64 {
+        let by_value = match self.mapping {
+            Mapping::Decibel => 10.0 / std::f64::consts::LN_10,
+            Mapping::Amplitude => 0.5 * sigma0.max(0.0).sqrt(),
+        };
+        let [dark, bright] = self.ends();
+        by_value / (bright - dark)
+    }
+
     /// Grey as the nearest level of 8 bits.
     #[must_use]
     pub fn level(&self, sigma0: f64) -> u8 {
@@ -154,6 +165,20 @@ impl GreyScale {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Against differences of the mapping itself.
+    #[test]
+    fn the_slope_is_that_of_the_grey() {
+        for scale in [GreyScale::default(), GreyScale::amplitude_around(0.1)] {
+            for sigma0 in [0.02, 0.1, 0.3] {
+                let step = 1e-5;
+                let difference =
+                    scale.grey(sigma0 * (1.0 + step)) - scale.grey(sigma0 * (1.0 - step));
+                // Central: an error of step²; rounding 1e-16/step.
+                assert!((scale.slope(sigma0) - 0.5 * difference / step).abs() < 1e-9);
+            }
+        }
+    }
 
     #[test]
     #[allow(clippy::float_cmp, reason = "the ends are exact")]

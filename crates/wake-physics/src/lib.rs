@@ -103,6 +103,6 @@ pub use raster::{Field, Raster};
 pub use scene::Scene;
 pub use simulate::{
     Accuracy, DirectPixels, LinearSea, Method, Reached, SarImage, Seconds, Simulation, Simulator,
-    direct_intensity, expected_intensity, simulate, simulate_with,
+    direct_intensity, expected_intensity, simulate, simulate_with, unit_speckle,
 };
 pub use track::Track;

@@ -51,7 +51,12 @@ impl Swell {
             return 0.0;
         }
         let bell = (-0.5 * (z * z + t * t)).exp() / (TAU * width * SPREAD * k);
-        self.height * self.height / 16.0 * bell
+        self.variance() * bell
+    }
+
+    /// Variance of the elevation (H/4)² \[m²\].
+    pub(crate) fn variance(&self) -> f64 {
+        self.height * self.height / 16.0
     }
 
     /// Waves that stand for it, with their variance \[m²\]: one of each cell of wavenumber and direction, at a place that

@@ -111,6 +111,14 @@ impl Window {
         (transform / self.moment(2)).powi(2)
     }
 
+    /// Transfer of the mean intensity at the frequency f/B, 1 at 0: ∫W(u − f/2) W(u + f/2) du/∫W² du; 0 from f = 1 on.
+    #[must_use]
+    pub fn intensity_transfer(self, f: f64) -> f64 {
+        let shared = (1.0 - f.abs()).max(0.0);
+        let pair = |u: f64| self.weight(u * shared - 0.5 * f) * self.weight(u * shared + 0.5 * f);
+        shared * over_band(pair) / self.moment(2)
+    }
+
     /// Length over which the intensity is correlated, ∫ρ² dx = ∫W⁴ df/(∫W² df)² \[1/B\].
     ///
     /// A pixel of a smaller spacing holds less than one independent sample.
@@ -274,6 +282,33 @@ mod tests {
         // In closed form: the first sidelobe of sinc² is −13.26 dB; half power at πx = 1.39156.
         assert!((Window::Uniform.peak_sidelobe() + 13.2615).abs() < 1e-3);
         assert!((Window::Uniform.width() - 2.0 * 1.391_557_378 / PI).abs() < 1e-9);
+    }
+
+    /// Of a uniform window the triangle 1 − |f|; of all windows the transform of |h|², summed one by one.
+    #[test]
+    fn the_transfer_of_the_intensity_is_that_of_the_squared_response() {
+        for f in [0.0, 0.2, 0.5, 0.9, 1.0, 1.3] {
+            let triangle = (1.0 - f64::abs(f)).max(0.0);
+            assert!((Window::Uniform.intensity_transfer(f) - triangle).abs() < 1e-12);
+        }
+        for window in WINDOWS {
+            for f in [0.1, 0.4, 0.8] {
+                let (step, farthest) = (5e-3, 200.0);
+                let count = (farthest / step) as u32;
+                let sum = |k: f64| -> f64 {
+                    let at = |n: u32| (f64::from(n) + 0.5) * step;
+                    (0..count)
+                        .map(|n| window.response(at(n)).powi(2) * (TAU * k * at(n)).cos())
+                        .sum()
+                };
+                // Beyond 200 resolutions |h|² leaves 1/(2π² · 200) of the whole at most.
+                let found = sum(f) / sum(0.0);
+                assert!(
+                    (window.intensity_transfer(f) - found).abs() < 5e-4,
+                    "{window:?} {f}"
+                );
+            }
+        }
     }
 
     /// The sidelobes summed one by one, far out, against the rest of Parseval's sum.

@@ -335,7 +335,7 @@ fn replace_radar(table: &mut toml::Table) {
 
 /// Whether a value of a scene is a whole number.
 fn is_whole(path: &str) -> bool {
-    path == "radar.looks"
+    ["radar.looks", "grid.oversampling"].contains(&path)
 }
 
 fn toml(value: &Value, whole: bool) -> toml::Value {

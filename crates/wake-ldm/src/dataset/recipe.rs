@@ -9,13 +9,18 @@ use wake_physics::grey::GreyScale;
 use wake_physics::scene::Grid;
 use wake_physics::{Scene, sentence};
 
+/// The recipe of a detector.
+const DETECTOR: &str = include_str!("detector.toml");
+/// What keys begin with that say how images are kept, not what they show.
+const OF_A_SET: [&str; 3] = ["grid.rows", "grid.columns", "quick_look."];
+
 /// Which scenes a data set has, and how they become images and prompts.
 ///
 /// As a TOML file, keys that are absent come from the recipe that `base` names, `ranges` where it is absent too, and
 /// unknown ones are errors:
 ///
 /// ```toml
-/// base = "detector"         # paper, ranges or detector
+/// base = "detector"         # paper, ranges, detector or model
 /// speckle = true            # false: the image before speckle
 /// paraphrase = false        # true: four wordings in turn, false: the paper's
 /// [grey]                    # σ⁰ to grey, linear in decibel or in amplitude
@@ -139,10 +144,48 @@ impl Recipe {
             scene: Scene::from_toml("")?,
             ..Self::default()
         };
-        empty.merged(include_str!("detector.toml"))
+        empty.merged(DETECTOR)
     }
 
-    /// A recipe that is built in, by its name: paper, ranges or detector.
+    /// The recipe of the wake model that ships: the scenes of `ranges` and those of [`detector`](Self::detector) in turn, one as
+    /// often as the other, in one mapping to grey and without speckle.
+    ///
+    /// # Errors
+    ///
+    /// As [`detector`](Self::detector).
+    pub fn model() -> Result<Self> {
+        let mut detector = parsed(DETECTOR)?;
+        let mut draw = table_of(&mut detector, "draw");
+        let cases = match draw.remove("together") {
+            Some(toml::Value::Array(cases)) => cases,
+            _ => Vec::new(),
+        };
+        let weight = |case: &toml::Table| case.get("weight").and_then(number).unwrap_or(1.0);
+        let cases: Vec<toml::Table> = cases.into_iter().filter_map(table).collect();
+        let total: f64 = cases.iter().map(weight).sum();
+        // What the detector's scenes share is theirs alone here.
+        let mut shared = toml::Table::new();
+        flatten("", table_of(&mut detector, "scene"), &mut shared);
+        shared.extend(draw);
+        shared.retain(|key, _| !OF_A_SET.iter().any(|prefix| key.starts_with(prefix)));
+        let merged = cases.into_iter().map(|case| {
+            let mut all = shared.clone();
+            all.extend(case);
+            toml::Value::Table(all)
+        });
+        let mut ranges = toml::Table::new();
+        ranges.insert("weight".to_owned(), total.into());
+        let mut together = vec![toml::Value::Table(ranges)];
+        together.extend(merged);
+        let mut draw = toml::Table::new();
+        draw.insert("together".to_owned(), together.into());
+        let mut changes = toml::Table::new();
+        changes.insert("draw".to_owned(), draw.into());
+        changes.insert("paraphrase".to_owned(), true.into());
+        Self::default().changed(changes, "")
+    }
+
+    /// A recipe that is built in, by its name: paper, ranges, detector or model.
     ///
     /// # Errors
     ///
@@ -152,10 +195,11 @@ impl Recipe {
             "paper" => Ok(Self::paper()),
             "ranges" => Ok(Self::default()),
             "detector" => Self::detector(),
+            "model" => Self::model(),
             _ => Err(Error::InvalidOption {
                 option: "recipe".to_owned(),
                 value: sentence(name),
-                expected: "paper, ranges or detector".to_owned(),
+                expected: "paper, ranges, detector or model".to_owned(),
             }),
         }
     }
@@ -242,6 +286,38 @@ impl Recipe {
         match &self.draw {
             Draw::PaperGrid => Ok(()),
             Draw::Values(draws) => draws.validate(&self.scene),
+        }
+    }
+}
+
+/// A table out of another; empty where there is none.
+fn table_of(from: &mut toml::Table, key: &str) -> toml::Table {
+    from.remove(key).and_then(table).unwrap_or_default()
+}
+
+fn table(value: toml::Value) -> Option<toml::Table> {
+    match value {
+        toml::Value::Table(table) => Some(table),
+        _ => None,
+    }
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or(value.as_integer().map(|n| n as f64))
+}
+
+/// The values of a table of tables by their paths.
+fn flatten(name: &str, table: toml::Table, into: &mut toml::Table) {
+    for (key, value) in table {
+        let path = match name {
+            "" => key,
+            _ => format!("{name}.{key}"),
+        };
+        match value {
+            toml::Value::Table(inner) => flatten(&path, inner, into),
+            value => {
+                into.insert(path, value);
+            }
         }
     }
 }

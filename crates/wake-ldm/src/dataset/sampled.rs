@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// The scenes of a recipe, drawn by the wake model; a batch is sampled at once.
 ///
-/// The model draws what it was trained for alone: pixels, radar and ship must be its own.
+/// The model draws what it was trained for alone: the one in the crate all scenes of the recipes `ranges`, `detector` and `model`.
 #[derive(Debug, Clone)]
 pub struct Sampled {
     sampler: WakeSampler,
@@ -110,9 +110,35 @@ mod tests {
             message.contains("128") && message.contains("256"),
             "{message}"
         );
-        let message = sampled(&["scene.radar.polarization = HH"])
+        let message = sampled(&["scene.grid.spacing = 40"])
             .unwrap_err()
             .to_string();
-        assert!(message.contains("radar.polarization"), "{message}");
+        assert!(message.contains("grid.spacing"), "{message}");
+    }
+
+    /// All that the recipe of a detector draws: sensors, ships, gusts; every image is near its scene's mean, as it is simulated.
+    #[test]
+    fn the_recipe_of_a_detector_is_drawn() {
+        let sampler = WakeSampler::pretrained(&Device::flex()).unwrap();
+        let recipe = Recipe::detector().unwrap();
+        let recipe = recipe
+            .with_assignments(&["draw.quick_look.gain=0.2", "draw.quick_look.offset=0.0"])
+            .unwrap();
+        let scenes = Simulated::new(recipe, 5).unwrap();
+        let source = Sampled::new(sampler, scenes.clone()).unwrap();
+        let drawn = source.items(0..4).unwrap();
+        for (pair, simulated) in drawn.iter().zip(scenes.items(0..4).unwrap()) {
+            assert_eq!(
+                (&pair.scene, &pair.labels),
+                (&simulated.scene, &simulated.labels)
+            );
+            // Amplitude of grey 0.2, the median, of both.
+            let [a, b] = [pair, &simulated].map(|p| p.amplitudes.unwrap()[1]);
+            assert!(
+                (a / b - 1.0).abs() < 0.1,
+                "{:?}: {a} {b}",
+                pair.scene.radar.sensor
+            );
+        }
     }
 }

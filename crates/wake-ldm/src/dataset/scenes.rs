@@ -455,8 +455,8 @@ mod tests {
         for (text, word) in [
             ("speckles = true", "speckles"),
             ("draw = \"papers\"", "papers"),
-            ("base = \"papers\"", "paper, ranges or detector"),
-            ("base = 3", "paper, ranges or detector"),
+            ("base = \"papers\"", "paper, ranges, detector or model"),
+            ("base = 3", "paper, ranges, detector or model"),
             ("[draw.ship]\nsped = [1, 2]", "sped"),
             ("[draw]\nseed = [1, 2]", "seed of its own"),
             ("[draw.grid]\nrows = [16, 32]", "one size"),
@@ -504,6 +504,40 @@ mod tests {
     }
 
     /// The recipe for a detector has what it promises: every sensor of its list, no ship and several, look-alikes.
+    /// Half of the scenes are those of `ranges`, half those of the detector, key by key.
+    #[test]
+    fn the_recipe_of_the_model_has_the_scenes_of_both() {
+        let source = Simulated::new(Recipe::model().unwrap(), 3).unwrap();
+        assert!(!source.recipe().speckle && source.quick_look(0).is_none());
+        let scenes: Vec<Scene> = (0..400).map(|n| source.scene(n).unwrap()).collect();
+        let (narrow, wide): (Vec<_>, Vec<_>) = scenes
+            .into_iter()
+            .partition(|scene| scene.radar.sensor.is_none());
+        // 400 draws: 0.025 of chance, four times.
+        assert!((narrow.len() as f64 / 400.0 - 0.5).abs() < 0.1);
+        let ranges = Recipe::default().scene;
+        for scene in narrow {
+            let told = (&scene.grid, &scene.radar.polarization, &scene.model);
+            assert_eq!(
+                told,
+                (&ranges.grid, &ranges.radar.polarization, &ranges.model)
+            );
+            assert!(!scene.sea.breaking && scene.sea.gust_strength == 0.0 && scene.ships.len() < 2);
+            assert!((3.0..=7.0).contains(&scene.sea.wind_speed));
+            assert_eq!(scene.radar.noise_floor, None);
+        }
+        let detector = Recipe::detector().unwrap().scene;
+        let mut sensors = BTreeSet::new();
+        for scene in wide {
+            assert_eq!((scene.grid.rows, scene.grid.oversampling), (256, Some(2)));
+            assert_eq!(scene.model, detector.model);
+            assert!(scene.sea.breaking && scene.ships.iter().all(|ship| ship.echo && ship.edge));
+            assert!(scene.radar.noise_floor.is_some());
+            sensors.insert(format!("{:?}", scene.radar.sensor));
+        }
+        assert_eq!(sensors.len(), 7);
+    }
+
     #[test]
     fn the_recipe_of_a_detector_covers_what_satellites_deliver() {
         let source = Simulated::new(Recipe::detector().unwrap(), 9).unwrap();

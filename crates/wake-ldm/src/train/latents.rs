@@ -6,9 +6,8 @@ use half::f16;
 use rayon::prelude::*;
 use wake_physics::Scene;
 
-use crate::conditioning::{Conditions, MapGrid};
 use crate::error::{Error, Result};
-use crate::network::{Known, PatchTransform, Prior};
+use crate::network::{Foreseen, Known, PatchTransform, Prior};
 
 /// Examples whose residuals are computed at once.
 const RESIDUALS: usize = 8;
@@ -18,8 +17,10 @@ const RESIDUALS: usize = 8;
 pub struct Example {
     /// The scene that made the image.
     pub scene: Scene,
-    /// Mean grey of the image.
+    /// Mean grey of the image less that of the expected one.
     pub grey: f32,
+    /// Of the sea in the channels, see [`Foreseen`].
+    pub log_deviations: Vec<f32>,
 }
 
 /// Latents of many images and of the images expected of their scenes, 16 bits a number.
@@ -32,73 +33,81 @@ pub struct LatentSet {
 }
 
 impl LatentSet {
-    /// Encodes an image and adds it.
+    /// Encodes images on all cores and adds them in order.
     ///
-    /// - `images`: the image and the one expected of its scene, [`expected_grey`](crate::network::expected_grey), each
-    ///   with the pixels of the scene's grid in rows
+    /// - `pairs`: grey of a scene's pixels in rows, what physics says of the scene, and the scene
     ///
     /// # Errors
     ///
     /// [`Error::InvalidOption`] for an image that is not square, or of another size than its grid or those before.
-    pub fn push(
+    pub fn extend(
         &mut self,
         transform: &PatchTransform,
-        images: [Vec<f32>; 2],
-        scene: Scene,
+        pairs: Vec<(Vec<f32>, Foreseen, Scene)>,
     ) -> Result<()> {
-        let (size, columns) = (scene.grid.rows, scene.grid.columns);
-        if size != columns || images.iter().any(|image| image.len() != size * size) {
-            return Err(Error::InvalidOption {
-                option: "grid".to_owned(),
-                value: format!("{size} x {columns} pixels"),
-                expected: format!("a square of {} pixels", images[0].len()),
-            });
-        }
-        let data = TensorData::new(images.concat(), [2, 1, size, size]);
         let device = transform.devices().into_iter().next().unwrap_or_default();
-        let (latents, grey) = transform.encode(Tensor::from_data(data, &device));
-        let [_, channels, rows, columns] = latents.dims();
-        let shape = [channels, rows, columns];
-        if !self.examples.is_empty() && shape != self.shape {
-            return Err(Error::InvalidOption {
-                option: "image size".to_owned(),
-                value: size.to_string(),
-                expected: format!("{} as before", 8 * self.shape[1]),
-            });
+        let encoded = pairs.into_par_iter().map(|(image, foreseen, scene)| {
+            let images = [image, foreseen.grey];
+            let (size, columns) = (scene.grid.rows, scene.grid.columns);
+            if size != columns || images.iter().any(|image| image.len() != size * size) {
+                return Err(Error::InvalidOption {
+                    option: "grid".to_owned(),
+                    value: format!("{size} x {columns} pixels"),
+                    expected: format!("a square of {} pixels", images[0].len()),
+                });
+            }
+            let data = TensorData::new(images.concat(), [2, 1, size, size]);
+            let (latents, grey) = transform.encode(Tensor::from_data(data, &device));
+            let [_, channels, rows, columns] = latents.dims();
+            let grey = grey.clone().narrow(0, 0, 1) - grey.narrow(0, 1, 1);
+            let example = Example {
+                scene,
+                grey: grey.into_scalar::<f32>(),
+                log_deviations: foreseen.log_deviations,
+            };
+            Ok(([channels, rows, columns], halves(latents), example))
+        });
+        for encoded in encoded.collect::<Vec<_>>() {
+            let (shape, latents, example) = encoded?;
+            if !self.examples.is_empty() && shape != self.shape {
+                return Err(Error::InvalidOption {
+                    option: "image size".to_owned(),
+                    value: (8 * shape[1]).to_string(),
+                    expected: format!("{} as before", 8 * self.shape[1]),
+                });
+            }
+            self.shape = shape;
+            let (image, expected) = latents.split_at(latents.len() / 2);
+            self.latents.extend(image);
+            self.expected.extend(expected);
+            self.examples.push(example);
         }
-        self.shape = shape;
-        let grey = grey.narrow(0, 0, 1).into_scalar::<f32>();
-        let latents = halves(latents);
-        let (image, expected) = latents.split_at(latents.len() / 2);
-        self.latents.extend(image);
-        self.expected.extend(expected);
-        self.examples.push(Example { scene, grey });
         Ok(())
     }
 
     /// The residuals of the latents about the mean and spread that a prior expects; computed on all cores.
     ///
     /// - `done`: called with a number of examples when they are done, from several threads
-    pub fn residuals(self, prior: &Prior, grid: MapGrid, done: impl Fn(usize) + Sync) -> Self {
+    pub fn residuals(&self, prior: &Prior, done: impl Fn(usize) + Sync) -> Self {
         let all: Vec<usize> = (0..self.len()).collect();
         let chunks: Vec<&[usize]> = all.chunks(RESIDUALS).collect();
         let residuals = chunks.par_iter().map(|indices| {
-            let residuals = self.residual(indices, prior, grid);
+            let residuals = self.residual(indices, prior);
             done(indices.len());
             residuals
         });
         let residuals: Vec<Vec<f16>> = residuals.collect();
         Self {
+            shape: self.shape,
             latents: residuals.concat(),
-            ..self
+            expected: self.expected.clone(),
+            examples: self.examples.clone(),
         }
     }
 
-    fn residual(&self, indices: &[usize], prior: &Prior, grid: MapGrid) -> Vec<f16> {
+    fn residual(&self, indices: &[usize], prior: &Prior) -> Vec<f16> {
         let device = prior.devices().into_iter().next().unwrap_or_default();
-        let conditions = self.conditions(indices);
-        let wake = self.expected(indices, &device);
-        let expected = prior.forward(&Known::new(&conditions, grid, wake));
+        let expected = prior.forward(&self.known(indices, &device));
         halves(expected.residual(self.latents(indices, &device)))
     }
 
@@ -122,10 +131,25 @@ impl LatentSet {
         &self.examples[index]
     }
 
-    /// What the model is told of some examples.
-    pub(super) fn conditions(&self, indices: &[usize]) -> Vec<Conditions> {
+    /// Some of the scenes.
+    pub(super) fn scenes(&self, indices: &[usize]) -> Vec<Scene> {
         let scenes = indices.iter().map(|&i| &self.examples[i].scene);
-        scenes.map(Conditions::of_scene).collect()
+        scenes.cloned().collect()
+    }
+
+    /// Deviations in the channels of some examples, one after the other.
+    pub(super) fn log_deviations(&self, indices: &[usize]) -> Vec<f32> {
+        let examples = indices.iter().map(|&i| &self.examples[i]);
+        examples
+            .flat_map(|example| &example.log_deviations)
+            .copied()
+            .collect()
+    }
+
+    /// What is known of some examples.
+    pub fn known(&self, indices: &[usize], device: &Device) -> Known {
+        let wake = self.expected(indices, device);
+        Known::new(&self.scenes(indices), wake, &self.log_deviations(indices))
     }
 
     /// Some latent pixels of one example, `[channels, cells]`.

@@ -9,13 +9,10 @@ use wake_physics::Scene;
 
 use super::latents::LatentSet;
 use super::run::{Task, Terms, number};
-use crate::conditioning::{
-    Conditions, MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens,
-};
+use crate::conditioning::{MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens};
 use crate::dataset::{Prompts, shuffled};
 use crate::network::{
-    ChannelWindows, Flow, Known, PatchTransform, Prior, PromptParser, SeaFields, WakeModelConfig,
-    windows,
+    ChannelWindows, Flow, Known, PatchTransform, Prior, PromptParser, SeaFields, windows,
 };
 use crate::noise::{NoiseSource, uniform};
 
@@ -105,18 +102,16 @@ const CELLS: usize = 64;
 pub struct PriorTask<'a> {
     /// The latents.
     pub set: &'a LatentSet,
-    /// Pixels of the images.
-    pub grid: MapGrid,
     /// Seed of the order.
     pub seed: u64,
 }
 
 impl PriorTask<'_> {
     /// Latent pixels to learn from: half of them anywhere, half inside the wedge, if there is one.
-    fn cells(&self, conditions: &Conditions, position: u64) -> Vec<usize> {
+    fn cells(&self, scene: &Scene, position: u64) -> Vec<usize> {
         let random = NoiseSource::new(self.seed);
-        let all = self.grid.cells();
-        let places = places(conditions, self.grid, &all);
+        let all = MapGrid::of(&scene.grid).cells();
+        let places = places(scene, &all);
         let inside = &places[WEDGE * all.len()..][..all.len()];
         let wedge: Vec<usize> = all.iter().copied().filter(|&c| inside[c] > 0.5).collect();
         let draw = |i: usize| {
@@ -135,11 +130,11 @@ impl PriorTask<'_> {
 impl Task<Prior> for PriorTask<'_> {
     fn loss(&self, model: &Prior, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
         let indices = examples(self.seed, positions.clone(), self.set.len());
-        let conditions = self.set.conditions(&indices);
-        let cells: Vec<Vec<usize>> = conditions
+        let scenes = self.set.scenes(&indices);
+        let cells: Vec<Vec<usize>> = scenes
             .iter()
             .zip(positions)
-            .map(|(conditions, position)| self.cells(conditions, position))
+            .map(|(scene, position)| self.cells(scene, position))
             .collect();
         let tensor = |pixels: fn(&LatentSet, usize, &[usize]) -> Vec<f32>| -> Tensor<4> {
             let pairs = indices.iter().zip(&cells);
@@ -148,7 +143,8 @@ impl Task<Prior> for PriorTask<'_> {
             Tensor::from_data(TensorData::new(numbers.collect(), shape), device)
         };
         let wake = tensor(LatentSet::expected_pixels);
-        let expected = model.forward(&Known::of_cells(&conditions, self.grid, &cells, wake));
+        let deviations = self.set.log_deviations(&indices);
+        let expected = model.forward(&Known::of_cells(&scenes, &cells, wake, &deviations));
         let latents = tensor(LatentSet::pixels);
         let off = latents - expected.mean;
         let error = number(&off.clone().square().mean());
@@ -202,8 +198,6 @@ pub struct FlowTask<'a> {
     pub set: &'a LatentSet,
     /// What they were encoded with, outside autodiff.
     pub patches: &'a PatchTransform,
-    /// The model.
-    pub config: &'a WakeModelConfig,
     /// Seed of order, noise and noise levels.
     pub seed: u64,
 }
@@ -231,7 +225,6 @@ impl Task<Flow> for FlowTask<'_> {
     fn loss(&self, model: &Flow, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
         let random = NoiseSource::new(self.seed);
         let indices = examples(self.seed, positions.clone(), self.set.len());
-        let conditions = self.set.conditions(&indices);
         let levels: Vec<f32> = positions
             .clone()
             .map(|p| noise_level(random, p) as f32)
@@ -240,8 +233,7 @@ impl Task<Flow> for FlowTask<'_> {
         let noise = Tensor::from_inner(noise.to_device(&device.clone().inner()));
         let residual = self.set.latents(&indices, device);
         let (x, target, levels) = on_the_way(residual, noise, &levels);
-        let wake = self.set.expected(&indices, device);
-        let known = model.prepared(&Known::new(&conditions, self.config.grid(), wake));
+        let known = model.prepared(&self.set.known(&indices, device));
         let error = model.velocity(x, levels, &known) - target;
         let loss = error.square().mean();
         let terms = vec![("flow", number(&loss))];

@@ -13,7 +13,7 @@ use super::trainer::Trainer;
 use super::*;
 use crate::conditioning::Vocabulary;
 use crate::dataset::{Prompts, Recipe, Simulated};
-use crate::network::{Flow, PatchTransform, WakeModelConfig};
+use crate::network::{Flow, Foreseen, PatchTransform, WakeModelConfig};
 
 const SIZE: usize = 32;
 
@@ -48,8 +48,12 @@ fn set() -> (LatentSet, PatchTransform) {
         let ship = &mut scene.ships[0];
         (ship.speed, ship.heading) = (8.0, (i as f64).to_degrees());
         // What is expected shows half of the wave.
-        let expected = image.iter().map(|g| 0.5 + 0.5 * (g - 0.5)).collect();
-        set.push(&transform, [image, expected], scene).unwrap();
+        let foreseen = Foreseen {
+            grey: image.iter().map(|g| 0.5 + 0.5 * (g - 0.5)).collect(),
+            log_deviations: vec![0.0; 4],
+        };
+        set.extend(&transform, vec![(image, foreseen, scene)])
+            .unwrap();
     }
     (set, transform)
 }
@@ -98,7 +102,6 @@ fn advance(
     let task = FlowTask {
         set,
         patches,
-        config: &config(),
         seed: 5,
     };
     (0..steps)
@@ -223,11 +226,7 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
         vec![device.autodiff()],
     )
     .unwrap();
-    let task = PriorTask {
-        set: &set,
-        grid: config().grid(),
-        seed: 5,
-    };
+    let task = PriorTask { set: &set, seed: 5 };
     let steps: Vec<(StepReport, Terms)> = (0..300).map(|_| run.step(&task).unwrap()).collect();
     let losses: Vec<f64> = steps.iter().map(|(report, _)| report.loss).collect();
     let [_, late] = early_and_late(&losses);
@@ -235,7 +234,7 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     assert!(late < 0.9, "{late}");
     let count = set.len();
     let done = AtomicUsize::new(0);
-    let residuals = set.residuals(&run.averaged(), config().grid(), |n| {
+    let residuals = set.residuals(&run.averaged(), |n| {
         done.fetch_add(n, Relaxed);
     });
     assert_eq!(done.into_inner(), count);

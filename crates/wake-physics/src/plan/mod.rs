@@ -177,7 +177,7 @@ impl Plan {
         let bunching = self.uses(Term::Bunching);
         for t in &mut self.terms {
             t.used = match t.term {
-                Term::Sea | Term::Swell | Term::Gusts | Term::Slicks => false,
+                Term::Sea | Term::Swell => false,
                 Term::TiltAverage | Term::Specular => true,
                 Term::Coherence => t.used || bunching,
                 _ => t.used,
@@ -288,10 +288,11 @@ mod tests {
         assert!(one.uses(Term::Sea) && one.sizes.sea_lattice != [0, 0]);
         assert!(one.uses(Term::Swell) && one.uses(Term::Gusts));
         let mean = one.over_all_seas();
-        for term in [Term::Sea, Term::Swell, Term::Gusts, Term::Slicks] {
+        for term in [Term::Sea, Term::Swell] {
             assert!(!mean.uses(term), "{term:?}");
         }
         for term in [
+            Term::Gusts,
             Term::TiltAverage,
             Term::Specular,
             Term::Coherence,

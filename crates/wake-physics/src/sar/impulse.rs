@@ -17,6 +17,7 @@ use crate::vectorize::vectorized;
 use crate::window::Window;
 use num_complex::Complex32;
 use rand::Rng;
+use std::f64::consts::TAU;
 
 /// Resolutions between the image and the edge of the sources: sidelobes that come around lie beyond (chosen).
 const GUARD: f64 = 8.0;
@@ -38,6 +39,11 @@ impl Axis {
     #[must_use]
     pub fn bandwidth(&self) -> f64 {
         self.window.width() / self.resolution
+    }
+
+    /// What is left of a wave of the mean intensity, by its wavenumber [rad/m] along this axis \[1\].
+    pub(crate) fn intensity_transfer(&self, k: f64) -> f64 {
+        self.window.intensity_transfer(k / (TAU * self.bandwidth()))
     }
 
     /// W at the frequencies of an FFT of `size` values, with Σ W² = `size`: white noise keeps its power.

@@ -8,9 +8,12 @@ use crate::memory;
 use crate::models::Models;
 use crate::modulation::smear;
 use crate::raster::Field;
+use crate::sar::ImpulseResponse;
+use crate::sar::impulse::Axis;
 use crate::scene::Scene;
 use crate::surface::wave_variances;
 use crate::survey::Survey;
+use crate::swell::Swell;
 use num_complex::Complex32;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -24,11 +27,17 @@ const LEAST_SHARE: f64 = 1e-6;
 /// The relative intensity (I − E I)/E I of open sea, linear in the waves.
 ///
 /// ```text
-/// P(k) = |M(k)|² exp(−2 (ky ρ'/2π)²) Ψ(k),     M = tilt + hydrodynamic + range bunching + velocity bunching
+/// P(k) = (q |M(k)| T(kx) T(ky))² exp(−2 (ky ρ'/2π)²) Ψ(k)
+/// M = tilt + hydrodynamic + range bunching + velocity bunching
 /// ```
 ///
-/// with ρ' and the derivative of ln σ⁰ that the whole sea has: the quasi-linear spectrum of the image, here even in k. The
-/// image itself is steeper and not Gaussian.
+/// - Ψ: wind waves and swell
+/// - ρ' and the derivative of ln σ⁰ are those that the whole sea has
+/// - T: what an impulse response leaves of a wave of the mean intensity, 1 without one
+/// - q: share of the mean intensity that waves modulate; breaking waves and noise are the rest
+///
+/// This is the quasi-linear spectrum of the image, here even in k. The image itself is steeper and not Gaussian; gusts and
+/// slicks are in [`expected_intensity`](super::expected_intensity).
 ///
 /// # References
 ///
@@ -67,18 +76,32 @@ impl LinearSea {
         let spacing = scene.grid.spacing;
         let step = TAU / (period as f64 * spacing);
         let resolution = models.resolution().at(0.0);
+        let modulated = survey.modulated_share();
+        let wavenumber = |index: usize| signed_index(index, period) as f64 * step;
+        let left = |axis: fn(&ImpulseResponse) -> &Axis| -> Vec<f64> {
+            let of = |n| {
+                let response = models.response.as_ref();
+                response.map_or(1.0, |r| axis(r).intensity_transfer(wavenumber(n)))
+            };
+            (0..period).map(of).collect()
+        };
+        let (range, azimuth) = (left(|r| &r.range), left(|r| &r.azimuth));
+        let along: Vec<f64> = (0..period)
+            .map(|row| azimuth[row] * smear(wavenumber(row), resolution))
+            .collect();
         let mut amplitudes = wave_variances(&models.sea, period, spacing);
+        add_swell(models.swell.as_ref(), &mut amplitudes, (period, step));
         let line = |(column, line): (usize, &mut [f32])| {
-            let kx = signed_index(column, period) as f64 * step;
+            let kx = wavenumber(column);
             for (row, amplitude) in line.iter_mut().enumerate().filter(|(_, v)| **v > 0.0) {
-                let ky = signed_index(row, period) as f64 * step;
-                let share = smear(ky, resolution).powi(2);
+                let share = (range[column] * along[row]).powi(2);
                 if share < LEAST_SHARE {
                     *amplitude = 0.0;
                     continue;
                 }
-                let omega = angular_frequency(kx.hypot(ky), models.sea.depth());
-                let modulation = transfer.at([kx, ky], omega).total();
+                let k = [kx, wavenumber(row)];
+                let omega = angular_frequency(k[0].hypot(k[1]), models.sea.depth());
+                let modulation = transfer.at(k, omega).total() * modulated;
                 let variance = f64::from(*amplitude) * share * modulation.norm_sqr();
                 *amplitude = variance.sqrt() as f32;
             }
@@ -121,5 +144,26 @@ impl LinearSea {
     /// The real part of a sum of waves.
     fn sum(&self, waves: Vec<Complex32>, size: [usize; 2]) -> Field {
         real_sum(waves, [self.period; 2], size)
+    }
+}
+
+/// Adds the waves of a swell to variances along +k, all of its variance however few of them are near its peak.
+///
+/// - `lattice`: waves along each axis and their step [rad/m]
+fn add_swell(swell: Option<&Swell>, variances: &mut [f32], (period, step): (usize, f64)) {
+    let Some(swell) = swell else {
+        return;
+    };
+    let place = |n: usize| {
+        let at = |index| signed_index(index, period) as f64 * step;
+        [at(n / period), at(n % period)]
+    };
+    let waves: Vec<(usize, f64)> = (1..variances.len())
+        .map(|n| (n, swell.density(place(n))))
+        .filter(|(_, density)| *density > 0.0)
+        .collect();
+    let total: f64 = waves.iter().map(|(_, density)| density).sum();
+    for (n, density) in waves {
+        variances[n] += (swell.variance() * density / total) as f32;
     }
 }

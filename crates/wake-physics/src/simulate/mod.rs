@@ -24,6 +24,7 @@ pub use clock::Seconds;
 pub use direct::{DirectPixels, direct_intensity};
 pub use linear_sea::LinearSea;
 pub use simulation::{Method, SarImage, Simulation};
+pub use speckling::unit_speckle;
 
 use crate::error::Result;
 use crate::labels::labels_of;
@@ -239,7 +240,8 @@ pub fn simulate_with(scene: &Scene, method: Method) -> Result<Simulation> {
 /// same place, which a tilt and a velocity of different phase are to first order. Neglected: the sea's displacement in
 /// range, its defocus, and how it and the wake modulate each other.
 ///
-/// It needs no random numbers: the scene's seed does not matter.
+/// Gusts, slicks and the points of a ship that echo are those that the scene's seed draws; without them the seed does not
+/// matter.
 ///
 /// # Errors
 ///

@@ -1,6 +1,7 @@
 //! From the mean intensity to the image with speckle.
 
 use crate::constants::SEA_WATER_DENSITY;
+use crate::error::Result;
 use crate::labels::echo_displacement;
 use crate::models::Models;
 use crate::raster::{Field, Raster};
@@ -153,6 +154,27 @@ impl Speckling {
             Self::Without | Self::Pixels(..) => None,
         }
     }
+}
+
+/// Speckle of mean 1 as a scene's radar makes it on a sea that is the same everywhere, `[rows, columns]` of the image: correlated
+/// where the image has an impulse response.
+///
+/// # Errors
+///
+/// As [`simulate`](super::simulate).
+pub fn unit_speckle(scene: &Scene) -> Result<Field> {
+    scene.validate()?;
+    let open = Scene {
+        ships: Vec::new(),
+        ..scene.clone()
+    };
+    let models = Models::new(&open);
+    let sources = Field::constant(&models.image, 1.0);
+    let response = models.response;
+    let exposure = response.map(|response| Exposure::of(&open, &models, response, sources));
+    let mut image = Field::constant(&models.delivered, 1.0);
+    Speckling::of(&open, &models, exposure).apply(&mut image);
+    Ok(image)
 }
 
 /// The ships' own echoes where no impulse response images them, as far as they are asked for.

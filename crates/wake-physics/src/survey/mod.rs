@@ -185,6 +185,11 @@ impl Survey {
         doppler::mean_velocity(scene, models, &self.modulation)
     }
 
+    /// Share of the mean intensity of open sea that its waves modulate: neither breaking waves' nor noise \[1\].
+    pub(crate) fn modulated_share(&self) -> f64 {
+        1.0 / (1.0 + self.added[0] + self.added[1])
+    }
+
     /// The modulation where models may average over more waves than those this was made of.
     pub(crate) fn modulation_of(&self, models: &Models) -> ModulationTransfer {
         ModulationTransfer {

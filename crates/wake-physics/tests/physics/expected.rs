@@ -3,7 +3,7 @@
 use crate::open_sea;
 use wake_physics::measure::{ShipPlace, kelvin_wedge};
 use wake_physics::scene::{Term, Terms};
-use wake_physics::{Field, LinearSea, Scene, expected_intensity, simulate};
+use wake_physics::{Field, LinearSea, Scene, expected_intensity, simulate, unit_speckle};
 
 /// Seas of each half.
 const SEAS: u64 = 16;
@@ -120,6 +120,126 @@ fn without_a_sea_it_is_the_simulated_image() {
     ]);
     let simulated = simulate(&scene).unwrap().intensity;
     assert_eq!(expected_intensity(&scene).unwrap(), simulated);
+}
+
+/// Gusts and slicks are no waves: the mean over the seas of one field of them is the expected image of its seed.
+#[test]
+fn gusts_and_slicks_are_those_of_the_seed() {
+    let scene = open_sea(scene(&[
+        "sea.wind_speed=3",
+        "sea.gust_strength=0.2",
+        "sea.gust_scale=600",
+        "sea.slick_damping=0.7",
+        "sea.slick_scale=400",
+        // The sea's velocity does not smear what it carries.
+        "radar.range_to_velocity=0",
+    ]));
+    let expected = expected_intensity(&scene).unwrap();
+    let mut still = scene.clone();
+    still.model.terms = Terms::List(vec![Term::Gusts, Term::Slicks, Term::TiltAverage]);
+    let alone = simulate(&still).unwrap().intensity;
+    let all = vec![true; alone.values.len()];
+    let same = Moments::new(&numbers(&expected), &numbers(&alone), &all);
+    // The mean σ⁰ differs by what waves add; gusts and slicks are the same factors.
+    assert!(same.correlation() > 0.999, "{}", same.correlation());
+    let other = expected_intensity(&Scene {
+        seed: scene.seed + 1,
+        ..scene
+    });
+    let other = Moments::new(&numbers(&expected), &numbers(&other.unwrap()), &all);
+    assert!(other.correlation() < 0.8, "{}", other.correlation());
+}
+
+/// Deviation of the relative intensity of a sea to first order, and of the simulated ones.
+fn deviations(scene: &Scene) -> [f64; 2] {
+    let linear = LinearSea::new(scene).unwrap().covariance().values[0].sqrt();
+    let relative = |seed: u64| {
+        let image = simulate(&Scene {
+            seed,
+            ..scene.clone()
+        });
+        let image = image.unwrap().intensity;
+        let mean = image.mean();
+        let squares = image
+            .values
+            .iter()
+            .map(|&v| (f64::from(v) / mean - 1.0).powi(2));
+        squares.sum::<f64>() / image.values.len() as f64
+    };
+    let simulated = (0..SEAS).map(relative).sum::<f64>() / SEAS as f64;
+    [f64::from(linear), simulated.sqrt()]
+}
+
+/// A low swell along range is seen to first order: through pixels alone, through a response and under noise.
+#[test]
+fn a_low_swell_is_seen_as_the_linear_sea_says() {
+    let swell = [
+        "sea.wind_speed=2",
+        "sea.swell_height=0.4",
+        "sea.swell_length=120",
+        "sea.swell_toward=90",
+        "sea.breaking=true",
+        // Velocity bunching is not linear where R/V is that of a satellite.
+        "radar.range_to_velocity=0",
+    ];
+    let seen = |more: &[&str]| deviations(&open_sea(scene(&[&swell[..], more].concat())));
+    let [plain, ..] = seen(&[]);
+    let response = ["radar.range_resolution=40", "radar.resolution=40"];
+    for more in [&[][..], &response, &["radar.noise_floor=-10"]] {
+        let [linear, simulated] = seen(more);
+        println!("{more:?} {linear:.4} {simulated:.4}");
+        assert!(
+            (linear / simulated - 1.0).abs() < 0.15,
+            "{more:?} {linear} {simulated}"
+        );
+    }
+    let [smeared, noisy] = [&response[..], &["radar.noise_floor=-10"]].map(|more| seen(more)[0]);
+    assert!(
+        smeared < 0.9 * plain && noisy < 0.8 * plain,
+        "{plain} {smeared} {noisy}"
+    );
+}
+
+/// Speckle of mean 1 has the looks and the correlation of a simulated image's.
+#[test]
+fn unit_speckle_is_that_of_the_image() {
+    for more in [
+        &["radar.looks=4"][..],
+        &[
+            "radar.looks=3",
+            "radar.range_resolution=9",
+            "radar.resolution=12",
+        ],
+    ] {
+        let mut scene = open_sea(scene(more));
+        scene.sea.wind_speed = 5.0;
+        scene.model.terms = Terms::List(vec![Term::TiltAverage, Term::Response, Term::Speckle]);
+        let image = simulate(&scene).unwrap();
+        let shape = |field: &Field| {
+            let (mean, n) = (field.mean(), field.columns);
+            let at = |i: usize| f64::from(field.values[i]) / mean - 1.0;
+            let sum = |lag: usize| -> f64 {
+                (0..field.values.len() - lag)
+                    .map(|i| at(i) * at(i + lag))
+                    .sum()
+            };
+            [
+                sum(0) / field.values.len() as f64,
+                sum(1) / sum(0),
+                sum(n) / sum(0),
+            ]
+        };
+        let (unit, drawn) = (unit_speckle(&scene).unwrap(), shape(&image.speckled));
+        // 25,600 pixels, a tenth of them independent: 2 % of the mean, 3 % of variance and correlations, 4 times.
+        assert!((unit.mean() - 1.0).abs() < 0.08, "{}", unit.mean());
+        for (unit, drawn) in shape(&unit).into_iter().zip(drawn) {
+            assert!(
+                (unit - drawn).abs() < 0.12 * drawn.abs().max(0.2),
+                "{more:?}: {unit} {drawn}"
+            );
+        }
+        assert_eq!((unit.rows, unit.columns), (160, 160));
+    }
 }
 
 #[test]

@@ -94,13 +94,6 @@ impl Conditions {
         scene.radar.incidence = self.incidence.unwrap_or(scene.radar.incidence);
         scene
     }
-
-    /// Speed, heading and place of the ship, where all are known.
-    pub fn track(&self) -> Option<(f64, f64, [f64; 2])> {
-        let known = self.ship != Some(false);
-        let (speed, heading) = self.ship_speed.zip(self.ship_heading).filter(|_| known)?;
-        Some((speed, heading, self.ship_position?))
-    }
 }
 
 #[cfg(test)]

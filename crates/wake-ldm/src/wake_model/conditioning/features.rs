@@ -1,6 +1,7 @@
 //! Numbers as waves of several lengths, which a network tells apart more easily than one value.
 
-use super::conditions::Conditions;
+use wake_physics::Scene;
+use wake_physics::scene::Polarization;
 
 /// An open range of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,45 +37,91 @@ pub(super) const LOG_FETCH: Range = Range::new(3.0, 6.0);
 /// Incidence angle \[deg\].
 pub(super) const INCIDENCE: Range = Range::new(10.0, 40.0);
 
+/// log₁₀ of the ship's length \[m\].
+const LOG_LENGTH: Range = Range::new(0.5, 3.0);
+/// log₁₀ of the water depth \[m\], as far as waves feel it.
+const LOG_DEPTH: Range = Range::new(0.0, 3.0);
+/// Significant height of the swell \[m\].
+const SWELL_HEIGHT: Range = Range::new(0.0, 6.0);
+/// log₁₀ of the swell's length \[m\].
+const LOG_SWELL: Range = Range::new(1.5, 3.0);
+/// Incidence angle of all radars \[deg\].
+const ANY_INCIDENCE: Range = Range::new(5.0, 65.0);
+/// log₁₀ of the frequency \[Hz\].
+const LOG_FREQUENCY: Range = Range::new(9.0, 10.3);
+/// Range over platform speed \[s\].
+const RANGE_TO_VELOCITY: Range = Range::new(0.0, 150.0);
+/// log₁₀ of a resolution or a pixel's side \[m\].
+const LOG_SIZE: Range = Range::new(-0.5, 2.0);
+/// Noise floor \[dB\].
+const NOISE: Range = Range::new(-40.0, 0.0);
+/// A depth beyond which no wave that matters feels the bottom \[m\].
+const DEEP: f64 = 1000.0;
+/// Side of the pixels that places are told in \[m\]: those of other sides are told as if they were of this one.
+pub(super) const TOLD_SPACING: f64 = 4.0;
+
 /// Waves per number on an open range: each has a sine and a cosine.
 const WAVES_PER_NUMBER: usize = 4;
 /// Harmonics per direction.
 const HARMONICS: usize = 3;
-/// Numbers on an open range: speed, x and y of the ship, wind speed, fetch, incidence.
-const NUMBERS: usize = 6;
-/// Directions: of the ship and of the wind.
-const DIRECTIONS: usize = 2;
+/// Flags: any ship, horizontal polarization, breaking waves.
+const FLAGS: usize = 3;
+/// Numbers on an open range: four of the ship, five of the sea, seven of radar and pixels.
+const NUMBERS: usize = 16;
+/// Directions: of the ship, of the wind and of the swell.
+const DIRECTIONS: usize = 3;
 
 /// Length of [`features`].
 pub(crate) const FEATURES: usize =
-    2 + NUMBERS * (2 + 2 * WAVES_PER_NUMBER) + DIRECTIONS * (1 + 2 * HARMONICS);
+    FLAGS + NUMBERS * (2 + 2 * WAVES_PER_NUMBER) + DIRECTIONS * (1 + 2 * HARMONICS);
 
-/// What is known of a scene as a vector; unknown values are 0.
+/// The numbers of a scene as a vector; what the scene has not is 0.
 ///
 /// ```text
 /// number v in [a, b]:  u = 2 (v − a)/(b − a) − 1,   [1, u, sin(2^i π u/2), cos(2^i π u/2)],  i = 0…3
 /// direction φ:         [1, sin(iφ), cos(iφ)],  i = 1…3
 /// ```
 ///
-/// Ranges: speed 0 to 16 m/s, place ±512 m, wind 0 to 12 m/s, log₁₀ fetch 3 to 6, incidence 10 to 40°. Values
-/// beyond a range repeat those within for the shorter waves.
-pub(crate) fn features(conditions: &Conditions) -> Vec<f32> {
+/// Of the ship, if it is the only one: speed, place, log₁₀ of its length, heading; of the sea: wind, log₁₀ of fetch and
+/// depth, swell; of the radar: incidence, frequency, R/V, resolutions, noise floor; the pixel. Values beyond a range repeat
+/// those within for the shorter waves. Gusts, slicks and echoes are in the expected image.
+pub(crate) fn features(scene: &Scene) -> Vec<f32> {
+    let (sea, radar, spacing) = (&scene.sea, &scene.radar, scene.grid.spacing);
     let mut out = Vec::with_capacity(FEATURES);
-    out.push(if conditions.ship.is_some() { 1.0 } else { 0.0 });
-    out.push(if conditions.ship == Some(true) {
-        1.0
-    } else {
-        0.0
-    });
-    push_number(&mut out, conditions.ship_speed, SHIP_SPEED);
-    let place = conditions.ship_position;
-    push_number(&mut out, place.map(|p| p[0]), PLACE);
-    push_number(&mut out, place.map(|p| p[1]), PLACE);
-    push_number(&mut out, conditions.wind_speed, WIND_SPEED);
-    push_number(&mut out, conditions.fetch.map(f64::log10), LOG_FETCH);
-    push_number(&mut out, conditions.incidence, INCIDENCE);
-    push_direction(&mut out, conditions.ship_heading);
-    push_direction(&mut out, conditions.wind_toward);
+    let hh = radar.polarization == Polarization::HH;
+    out.extend(
+        [!scene.ships.is_empty(), hh, sea.breaking].map(|flag| if flag { 1.0 } else { 0.0 }),
+    );
+    let ship = match scene.ships.as_slice() {
+        [ship] => Some(ship),
+        _ => None,
+    };
+    let place = |axis: usize| ship.map(|s| s.position[axis] * TOLD_SPACING / spacing);
+    let swell = (sea.swell_height > 0.0).then_some(sea);
+    let log = f64::log10;
+    for (value, range) in [
+        (ship.map(|s| s.speed), SHIP_SPEED),
+        (place(0), PLACE),
+        (place(1), PLACE),
+        (ship.map(|s| log(s.length)), LOG_LENGTH),
+        (Some(sea.wind_speed), WIND_SPEED),
+        (Some(log(sea.fetch)), LOG_FETCH),
+        (Some(log(sea.depth.min(DEEP))), LOG_DEPTH),
+        (swell.map(|s| s.swell_height), SWELL_HEIGHT),
+        (swell.map(|s| log(s.swell_length)), LOG_SWELL),
+        (Some(radar.incidence), ANY_INCIDENCE),
+        (Some(log(radar.frequency)), LOG_FREQUENCY),
+        (Some(radar.range_to_velocity), RANGE_TO_VELOCITY),
+        (Some(log(radar.resolution)), LOG_SIZE),
+        (radar.range_resolution.map(log), LOG_SIZE),
+        (radar.noise_floor, NOISE),
+        (Some(log(spacing)), LOG_SIZE),
+    ] {
+        push_number(&mut out, value, range);
+    }
+    push_direction(&mut out, ship.map(|s| s.heading));
+    push_direction(&mut out, (sea.wind_speed > 0.0).then_some(sea.wind_toward));
+    push_direction(&mut out, swell.map(|s| s.swell_toward));
     out
 }
 
@@ -104,55 +151,111 @@ fn push_direction(out: &mut Vec<f32>, degrees: Option<f64>) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
 
-    fn full() -> Conditions {
-        Conditions {
-            ship: Some(true),
-            ship_speed: Some(10.0),
-            ship_heading: Some(45.0),
-            ship_position: Some([0.0, 100.0]),
-            wind_speed: Some(5.0),
-            wind_toward: Some(90.0),
-            fetch: Some(4e4),
-            incidence: Some(32.0),
-            ..Conditions::default()
-        }
+    fn full() -> Scene {
+        let assignments = [
+            "ship.position=[0.0, 100.0]",
+            "sea.swell_height=1.5",
+            "radar.range_resolution=5.0",
+            "radar.noise_floor=-22.0",
+        ];
+        Scene::default().with_assignments(&assignments).unwrap()
+    }
+
+    /// Which features differ.
+    fn changed(a: &Scene, b: &Scene) -> Vec<usize> {
+        let (a, b) = (features(a), features(b));
+        (0..FEATURES)
+            .filter(|&i| (a[i] - b[i]).abs() > 1e-6)
+            .collect()
     }
 
     #[test]
-    fn nothing_known_is_zero_and_lengths_agree() {
-        assert_eq!(features(&Conditions::default()), vec![0.0; FEATURES]);
+    fn lengths_agree_and_what_is_not_there_is_zero() {
         assert_eq!(features(&full()).len(), FEATURES);
+        let mut open = full();
+        open.ships.clear();
+        let number = 2 + 2 * WAVES_PER_NUMBER;
+        let of_open = features(&open);
+        assert!(of_open[FLAGS..FLAGS + 4 * number].iter().all(|&x| x == 0.0));
+        assert_eq!(of_open.len(), FEATURES);
+        // Of several ships none is told alone.
+        let mut two = full();
+        two.ships.push(two.ships[0].clone());
+        assert_eq!(features(&two)[1..], of_open[1..]);
     }
 
     #[test]
     fn directions_close_the_circle() {
-        let turned = Conditions {
-            ship_heading: Some(45.0 + 360.0),
-            ..full()
-        };
-        let (a, b) = (features(&full()), features(&turned));
-        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-6));
+        let mut turned = full();
+        turned.ships[0].heading += 360.0;
+        assert!(changed(&full(), &turned).is_empty());
     }
 
+    /// Each number of the scene has a place of its own, and no other number moves it.
     #[test]
     fn each_number_changes_only_its_own_features() {
-        let louder = Conditions {
-            wind_speed: Some(6.0),
-            ..full()
-        };
-        let (a, b) = (features(&full()), features(&louder));
-        let changed: Vec<usize> = (0..FEATURES)
-            .filter(|&i| (a[i] - b[i]).abs() > 1e-6)
-            .collect();
-        let start = 2 + 3 * (2 + 2 * WAVES_PER_NUMBER);
+        let number = 2 + 2 * WAVES_PER_NUMBER;
+        let numbers = FLAGS..FLAGS + NUMBERS * number;
+        let assignments = [
+            "ship.speed=9.0",
+            "ship.position=[30.0, 100.0]",
+            "ship.position=[0.0, 130.0]",
+            "ship.length=100.0",
+            "sea.wind_speed=6.0",
+            "sea.fetch=2e4",
+            "sea.depth=40.0",
+            "sea.swell_height=2.0",
+            "sea.swell_length=150.0",
+            "radar.incidence=35.0",
+            "radar.frequency=5.4e9",
+            "radar.range_to_velocity=110.0",
+            "radar.resolution=7.0",
+            "radar.range_resolution=8.0",
+            "radar.noise_floor=-25.0",
+        ];
+        for (n, assignment) in assignments.iter().enumerate() {
+            let other = full().with_assignments(&[assignment]).unwrap();
+            let (first, found) = (numbers.start + n * number, changed(&full(), &other));
+            assert!(
+                found.len() >= 5 && found.iter().all(|i| (first..first + number).contains(i)),
+                "{assignment}: {found:?}"
+            );
+        }
+        // A coarser pixel is told, and the same ship lies fewer pixels away.
+        let coarse = full().with_assignments(&["grid.spacing=10.0"]).unwrap();
+        let found = changed(&full(), &coarse);
+        let last = numbers.end - number..numbers.end;
         assert!(
-            changed.iter().all(|&i| (start..start + 10).contains(&i)),
-            "{changed:?}"
+            found.iter().any(|i| last.contains(i)) && found.iter().any(|i| *i < FLAGS + 3 * number)
         );
-        assert!(changed.len() >= 8);
+        for (n, assignment) in ["radar.polarization=HH", "sea.breaking=true"]
+            .iter()
+            .enumerate()
+        {
+            let other = full().with_assignments(&[assignment]).unwrap();
+            assert_eq!(changed(&full(), &other), [n + 1], "{assignment}");
+        }
+        for (n, assignment) in [
+            "ship.heading=50.0",
+            "sea.wind_toward=80.0",
+            "sea.swell_toward=9.0",
+        ]
+        .iter()
+        .enumerate()
+        {
+            let other = full().with_assignments(&[assignment]).unwrap();
+            let first = numbers.end + n * (1 + 2 * HARMONICS);
+            let found = changed(&full(), &other);
+            let own = first..first + 1 + 2 * HARMONICS;
+            assert!(
+                !found.is_empty() && found.iter().all(|i| own.contains(i)),
+                "{assignment}"
+            );
+        }
     }
 
     #[test]

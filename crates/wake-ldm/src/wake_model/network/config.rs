@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use wake_physics::Scene;
 use wake_physics::grey::GreyScale;
-use wake_physics::scene::Ship;
 
+use super::domain::Domain;
 use crate::error::{Error, Result, check_range};
 use crate::unet::UNetConfig;
-use crate::wake_model::conditioning::{FEATURES, MapGrid, Vocabulary};
+use crate::wake_model::conditioning::{FEATURES, Vocabulary};
 
 /// Widths of a [`WakeModel`](super::WakeModel), its image, and the tokens it knows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,7 +17,7 @@ use crate::wake_model::conditioning::{FEATURES, MapGrid, Vocabulary};
 pub struct WakeModelConfig {
     /// Rows and columns of an image, a multiple of 32.
     pub image_size: usize,
-    /// Side of a pixel \[m\].
+    /// Side of a pixel of [`base_scene`](Self::base_scene) \[m\].
     pub spacing: f64,
     /// Channels of the latent image, at an eighth of the size.
     pub latent_channels: usize,
@@ -38,10 +37,12 @@ pub struct WakeModelConfig {
     pub norm_groups: usize,
     /// CLIP's ids that the parser knows.
     pub vocabulary: Vec<u32>,
-    /// The scene of all training images but for what the model is told: radar, hull, depth, spectrum. Its grid is not
-    /// looked at.
+    /// What a prompt leaves open. Its grid is not looked at.
     #[serde(default)]
     pub scene: Scene,
+    /// The scenes of all training images.
+    #[serde(default)]
+    pub domain: Domain,
     /// The mapping from σ⁰ to the grey of all training images.
     #[serde(default)]
     pub grey: GreyScale,
@@ -63,6 +64,7 @@ impl WakeModelConfig {
             norm_groups: 16,
             vocabulary: vocabulary.known().to_vec(),
             scene: Scene::default(),
+            domain: Domain::default(),
             grey: GreyScale::default(),
         }
     }
@@ -125,7 +127,7 @@ impl WakeModelConfig {
         self.unet().validate()
     }
 
-    /// The training scene on the pixels of the model: what the model knows nothing of has its values.
+    /// What a prompt leaves open, on the pixels of the model.
     pub fn base_scene(&self) -> Scene {
         let mut scene = self.scene.clone();
         (scene.grid.rows, scene.grid.columns) = (self.image_size, self.image_size);
@@ -133,67 +135,25 @@ impl WakeModelConfig {
         scene
     }
 
-    /// Checks that a scene is one that the model was trained for: all that the model is not told is as in training.
+    /// Checks that a scene is one that the model was trained for.
     ///
-    /// It is told of the ship, its speed, heading and place, of wind, fetch and incidence; seed, time, number of looks and
-    /// the simulation's own accuracy may be any.
+    /// Seed, time, directions, number of looks and the simulation's own accuracy may be any.
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] with the first value that differs, named as in a scene file.
+    /// [`Error::InvalidOption`] for other numbers of pixels, or with the first value that no training image had, named as in
+    /// a scene file.
     pub fn check_scene(&self, scene: &Scene) -> Result<()> {
-        let (grid, size, spacing) = (&scene.grid, self.image_size, self.spacing);
-        if [grid.rows, grid.columns] != [size, size] || (grid.spacing - spacing).abs() > 1e-9 {
+        let (grid, size) = (&scene.grid, self.image_size);
+        if [grid.rows, grid.columns] != [size, size] {
             let [rows, columns] = [grid.rows, grid.columns];
             return Err(Error::InvalidOption {
                 option: "grid".to_owned(),
                 value: format!("{rows} × {columns} pixels of {} m", grid.spacing),
-                expected: format!("{size} × {size} pixels of {spacing} m, as the model draws them"),
+                expected: format!("{size} × {size} pixels, as the model draws them"),
             });
         }
-        if scene.ships.len() > 1 {
-            return Err(Error::InvalidOption {
-                option: "ship".to_owned(),
-                value: format!("a list of {} ships", scene.ships.len()),
-                expected: "one ship or none, as in all images that the model was trained with"
-                    .to_owned(),
-            });
-        }
-        let expected = as_json(&self.as_trained(scene))?;
-        match first_difference("", &as_json(scene)?, &expected) {
-            None => Ok(()),
-            Some((option, value, trained)) => Err(Error::InvalidOption {
-                option,
-                value,
-                expected: format!("{trained}, as in all images that the model was trained with"),
-            }),
-        }
-    }
-
-    /// The training scene with what the model is told of a scene, or need not know.
-    fn as_trained(&self, scene: &Scene) -> Scene {
-        let mut same = self.base_scene();
-        let ship = same.ships.first().cloned().unwrap_or_default();
-        let told = |told: &Ship| Ship {
-            speed: told.speed,
-            heading: told.heading,
-            position: told.position,
-            ..ship.clone()
-        };
-        same.ships = scene.ships.iter().map(told).collect();
-        (same.seed, same.grid, same.model) = (scene.seed, scene.grid.clone(), scene.model.clone());
-        (same.sea.wind_speed, same.sea.wind_toward) = (scene.sea.wind_speed, scene.sea.wind_toward);
-        (same.sea.fetch, same.sea.time) = (scene.sea.fetch, scene.sea.time);
-        (same.radar.incidence, same.radar.looks) = (scene.radar.incidence, scene.radar.looks);
-        same
-    }
-
-    /// The pixels of an image.
-    pub fn grid(&self) -> MapGrid {
-        MapGrid {
-            size: self.image_size,
-            spacing: self.spacing,
-        }
+        self.domain.check(scene)
     }
 
     /// Rows and columns of the latent image.
@@ -205,7 +165,7 @@ impl WakeModelConfig {
     pub(super) fn unet(&self) -> UNetConfig {
         let folded = self.latent_channels * self.fold * self.fold;
         let upward = self.attention.iter().rev().copied().collect();
-        UNetConfig::small(folded, None, Some(FEATURES))
+        UNetConfig::small(folded, None, Some(FEATURES + self.latent_channels))
             .with_in_channels(folded + self.map_channels)
             .with_block_out_channels(self.widths.clone())
             .with_down_attention(self.attention.clone())
@@ -221,71 +181,41 @@ impl WakeModelConfig {
     }
 }
 
-fn as_json(scene: &Scene) -> Result<Value> {
-    serde_json::to_value(scene).map_err(|source| Error::Json {
-        path: "scene".into(),
-        source,
-    })
-}
-
-/// Where two scenes differ first, and what each has there.
-fn first_difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
-    let (Value::Object(entries), Value::Object(others)) = (a, b) else {
-        return (a != b).then(|| (name.to_owned(), a.to_string(), b.to_string()));
-    };
-    let keys = entries.keys().chain(others.keys());
-    keys.into_iter().find_map(|key| {
-        let name = match name {
-            "" => key.clone(),
-            _ => format!("{name}.{key}"),
-        };
-        let at = |map: &serde_json::Map<String, Value>| map.get(key).cloned().unwrap_or_default();
-        first_difference(&name, &at(entries), &at(others))
-    })
-}
-
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
-    use wake_physics::scene::Polarization;
-
     use super::*;
 
     #[test]
     fn what_the_model_was_not_trained_for_is_refused_by_name() {
-        let config = WakeModelConfig::standard(&Vocabulary::new([1]));
-        let base = config.base_scene();
-        let refused = |change: &dyn Fn(&mut Scene)| {
-            let mut scene = base.clone();
-            change(&mut scene);
+        let standard = WakeModelConfig::standard(&Vocabulary::new([1]));
+        let base = standard.base_scene();
+        let faster = base.with_assignments(&["ship.speed=14.0"]).unwrap();
+        let config = WakeModelConfig {
+            domain: Domain::of([&base, &faster]).unwrap(),
+            ..standard
+        };
+        let refused = |assignment: &str| {
+            let scene = base.with_assignments(&[assignment]).unwrap();
             config.check_scene(&scene).err().map(|e| e.to_string())
         };
-        let told = refused(&|scene| {
-            let ship = &mut scene.ships[0];
-            (ship.speed, ship.heading, ship.position) = (7.0, 200.0, [50.0, -20.0]);
-            (scene.sea.wind_speed, scene.sea.fetch) = (7.0, 2e4);
-            (scene.radar.incidence, scene.radar.looks, scene.seed) = (25.0, 9, 77);
-            scene.model.tolerance = 1e-2;
-        });
-        assert_eq!(told, None);
-        assert_eq!(refused(&|scene| scene.ships.clear()), None);
-        let named = |name: &str, change: &dyn Fn(&mut Scene)| {
-            let message = refused(change).unwrap_or_default();
-            let start = format!("{name} is ");
-            assert!(message.starts_with(&start), "{name}: {message}");
-        };
-        named("grid", &|scene| scene.grid.rows = 128);
-        named("radar.polarization", &|scene| {
-            scene.radar.polarization = match scene.radar.polarization {
-                Polarization::VV => Polarization::HH,
-                _ => Polarization::VV,
-            };
-        });
-        named("radar.frequency", &|scene| scene.radar.frequency = 1.27e9);
-        named("sea.depth", &|scene| scene.sea.depth = 10.0);
-        named("ship", &|scene| scene.ships.push(Ship::default()));
-        named("ship.length", &|scene| {
-            scene.ships[0].length = 80.0;
-        });
+        for held in [
+            "ship.speed=12.0",
+            "ship.heading=200.0",
+            "radar.looks=9",
+            "seed=77",
+        ] {
+            assert_eq!(refused(held), None, "{held}");
+        }
+        for (assignment, name) in [
+            ("grid.rows=128", "grid is 128 × 256"),
+            ("grid.spacing=5.0", "grid.spacing is 5.0"),
+            ("radar.polarization=HH", "radar.polarization is "),
+            ("ship.speed=15.0", "ship.speed is 15.0, expected 10 to 14"),
+        ] {
+            let message = refused(assignment).unwrap_or_default();
+            assert!(message.contains(name), "{assignment}: {message}");
+        }
     }
 
     #[test]

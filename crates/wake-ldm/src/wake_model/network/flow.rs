@@ -64,7 +64,7 @@ impl Flow {
         let maps = Tensor::cat(vec![known.places.clone(), known.wake.clone()], 1);
         let maps = space_to_depth(cast_to(maps, dtype), self.fold);
         Prepared {
-            numbers: cast_to(known.numbers.clone(), dtype),
+            numbers: cast_to(known.told(), dtype),
             maps: silu(convolve(&self.maps, maps)),
         }
     }

@@ -3,11 +3,12 @@
 use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use wake_physics::grey::GreyScale;
-use wake_physics::{Scene, expected_intensity};
+use wake_physics::{LinearSea, Scene, expected_intensity};
 
 use super::patches::PatchTransform;
+use super::windows::ChannelWindows;
 use crate::error::Result;
-use crate::wake_model::conditioning::{Conditions, FEATURES, MapGrid, PLACES, features, places};
+use crate::wake_model::conditioning::{FEATURES, MapGrid, PLACES, features, places};
 
 /// What is known of the scenes of a batch.
 #[derive(Debug, Clone)]
@@ -18,15 +19,21 @@ pub struct Known {
     pub places: Tensor<4>,
     /// Latents of the images expected of them, `[batch, channels, rows, columns]`.
     pub wake: Tensor<4>,
+    /// Logarithms of the deviations that the linear sea has in the channels, `[batch, channels]`.
+    pub log_deviations: Tensor<2>,
 }
 
 impl Known {
     /// What is known of some scenes at all their latent pixels.
     ///
-    /// - `wake`: see [`expected_latents`]; its device is that of the result
-    pub fn new(conditions: &[Conditions], grid: MapGrid, wake: Tensor<4>) -> Self {
-        let cells = vec![grid.cells(); conditions.len()];
-        Self::of_cells(conditions, grid, &cells, wake)
+    /// - `wake`: see [`Foreseen`]; its device is that of the result
+    /// - `log_deviations`: of the channels, see [`Foreseen`], one scene after the other
+    pub fn new(scenes: &[Scene], wake: Tensor<4>, log_deviations: &[f32]) -> Self {
+        let cells: Vec<Vec<usize>> = scenes
+            .iter()
+            .map(|s| MapGrid::of(&s.grid).cells())
+            .collect();
+        Self::of_cells(scenes, &cells, wake, log_deviations)
     }
 
     /// What is known of some scenes at some of their latent pixels.
@@ -34,41 +41,98 @@ impl Known {
     /// - `cells`: which, for each scene
     /// - `wake`: at these pixels, `[batch, channels, rows, columns]`
     pub(crate) fn of_cells(
-        conditions: &[Conditions],
-        grid: MapGrid,
+        scenes: &[Scene],
         cells: &[Vec<usize>],
         wake: Tensor<4>,
+        log_deviations: &[f32],
     ) -> Self {
-        let ([batch, _, rows, columns], device) = (wake.dims(), wake.device());
-        let numbers: Vec<f32> = conditions.iter().flat_map(features).collect();
-        let scenes: Vec<_> = conditions.iter().zip(cells).collect();
-        let maps = scenes.par_iter().map(|(c, cells)| places(c, grid, cells));
+        let ([batch, channels, rows, columns], device) = (wake.dims(), wake.device());
+        let numbers: Vec<f32> = scenes.iter().flat_map(features).collect();
+        let pairs: Vec<_> = scenes.iter().zip(cells).collect();
+        let maps = pairs.par_iter().map(|(scene, cells)| places(scene, cells));
         let places = maps.collect::<Vec<_>>().concat();
         let shape = [batch, PLACES, rows, columns];
+        let deviations = TensorData::new(log_deviations.to_vec(), [batch, channels]);
         Self {
             numbers: Tensor::from_data(TensorData::new(numbers, [batch, FEATURES]), &device),
             places: Tensor::from_data(TensorData::new(places, shape), &device),
             wake,
+            log_deviations: Tensor::from_data(deviations, &device),
         }
+    }
+
+    /// All that does not depend on the pixel, `[batch, FEATURES + channels]`.
+    pub(super) fn told(&self) -> Tensor<2> {
+        let deviations = self.log_deviations.clone() / LOG_DEVIATION;
+        Tensor::cat(vec![self.numbers.clone(), deviations], 1)
     }
 }
 
-/// Grey of the image expected of a scene over all its seas, [`expected_intensity`]; one grey if there is no ship.
+/// Logarithms of deviations are told in this unit.
+const LOG_DEVIATION: f64 = 3.0;
+
+/// Side of the image that stands for the mean of an open sea that is the same everywhere [pixels].
+const EVEN: usize = 32;
+
+/// What physics foresees of a scene's image.
+#[derive(Debug, Clone)]
+pub struct Foreseen {
+    /// Grey of [`expected_intensity`], `[rows, columns]` of the scene.
+    pub grey: Vec<f32>,
+    /// Logarithm of the deviation that the [`LinearSea`] has in each channel of the latents.
+    pub log_deviations: Vec<f32>,
+}
+
+impl Foreseen {
+    /// That of a scene in the latents of a transform.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
+    pub fn new(scene: &Scene, scale: &GreyScale, patches: &PatchTransform) -> Result<Self> {
+        let grey = expected_grey(scene, scale)?;
+        let (sea, windows) = (LinearSea::new(scene)?, ChannelWindows::new(patches));
+        let log_deviations = windows.log_deviations(&sea, slope_of(&grey, scale));
+        Ok(Self {
+            grey,
+            log_deviations,
+        })
+    }
+}
+
+/// Change of the grey by the relative intensity where an image has its mean grey.
+pub(crate) fn slope_of(grey: &[f32], scale: &GreyScale) -> f64 {
+    let mean = grey.iter().map(|&g| f64::from(g)).sum::<f64>() / grey.len().max(1) as f64;
+    scale.slope(scale.sigma0(mean))
+}
+
+/// Grey of the image expected of a scene over all its seas, [`expected_intensity`].
 ///
 /// # Errors
 ///
 /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
 pub fn expected_grey(scene: &Scene, scale: &GreyScale) -> Result<Vec<f32>> {
     scene.validate()?;
-    if scene.ships.is_empty() {
-        return Ok(vec![0.5; scene.grid.rows * scene.grid.columns]);
+    let grey = |power: &f32| scale.grey(f64::from(*power)) as f32;
+    let pixels = scene.grid.rows * scene.grid.columns;
+    if is_even(scene) && pixels > EVEN * EVEN {
+        let mut small = scene.clone();
+        (small.grid.rows, small.grid.columns) = (EVEN, EVEN);
+        let mean = expected_intensity(&small)?.mean() as f32;
+        return Ok(vec![grey(&mean); pixels]);
     }
-    let intensity = expected_intensity(scene)?;
-    Ok(intensity
-        .values
-        .iter()
-        .map(|&power| scale.grey(f64::from(power)) as f32)
-        .collect())
+    Ok(expected_intensity(scene)?.values.iter().map(grey).collect())
+}
+
+/// Whether the image expected of a scene is the same everywhere.
+fn is_even(scene: &Scene) -> bool {
+    scene.ships.is_empty() && !is_drawn(scene)
+}
+
+/// Whether the image expected of a scene depends on its seed: gusts, slicks and the points that echo are drawn.
+fn is_drawn(scene: &Scene) -> bool {
+    let echoes = scene.ships.iter().any(|ship| ship.echo);
+    echoes || scene.sea.gust_strength > 0.0 || scene.sea.slick_damping > 0.0
 }
 
 /// [`expected_grey`] of some scenes, on all cores; scenes that follow on their equal are imaged once.
@@ -80,45 +144,27 @@ pub(crate) fn expected_greys(scenes: &[Scene], scale: &GreyScale) -> Result<Vec<
     runs_of_equals(scenes, |scene| expected_grey(scene, scale))
 }
 
-/// Latents of the images expected of some scenes of one size, see [`expected_grey`].
-///
-/// # Shapes
-///
-/// `[scenes, channels, rows / 8, columns / 8]`, on the device of `patches`
-///
-/// # Errors
-///
-/// As [`expected_grey`].
-pub fn expected_latents(
+/// An image of each scene, all of one size, `[scenes, 1, rows, columns]` on the device of `patches`.
+pub(crate) fn images_of(
     scenes: &[Scene],
-    scale: &GreyScale,
-    patches: &PatchTransform,
-) -> Result<Tensor<4>> {
-    let images = expected_greys(scenes, scale)?;
-    Ok(latents_of(scenes, images, patches))
-}
-
-/// Latents of an image of each scene.
-pub(crate) fn latents_of(
-    scenes: &[Scene],
-    images: Vec<Vec<f32>>,
+    images: &[Vec<f32>],
     patches: &PatchTransform,
 ) -> Tensor<4> {
     let [rows, columns] = scenes
         .first()
         .map_or([0, 0], |scene| [scene.grid.rows, scene.grid.columns]);
     let data = TensorData::new(images.concat(), [scenes.len(), 1, rows, columns]);
-    patches.encode(Tensor::from_data(data, &patches.device())).0
+    Tensor::from_data(data, &patches.device())
 }
 
-/// A function of every scene, which does not depend on its seed: found once for scenes that follow on their equal, for
-/// several at once on all cores.
+/// A function of every scene, which depends on the seed for the sake of what is drawn in the expected image alone: found once
+/// for scenes that follow on their equal, for several at once on all cores.
 pub(super) fn runs_of_equals<T: Clone + Send>(
     scenes: &[Scene],
     find: impl Fn(&Scene) -> Result<T> + Sync,
 ) -> Result<Vec<T>> {
     let seedless = |scene: &Scene| Scene {
-        seed: 0,
+        seed: if is_drawn(scene) { scene.seed } else { 0 },
         ..scene.clone()
     };
     let scenes: Vec<Scene> = scenes.iter().map(seedless).collect();
@@ -136,33 +182,65 @@ pub(super) fn runs_of_equals<T: Clone + Send>(
 mod tests {
     use super::*;
 
+    fn scene(assignments: &[&str]) -> Scene {
+        let small = ["grid.rows=64", "grid.columns=64", "grid.spacing=4"];
+        Scene::default()
+            .with_assignments(&[&small[..], assignments].concat())
+            .unwrap()
+    }
+
+    /// Each wake has its own image; that of an open sea is one grey, of the mean of all its pixels.
     #[test]
-    fn open_sea_has_no_latents_and_each_wake_its_own() {
-        let device = burn::tensor::Device::flex();
-        let mut scene = Scene::default();
-        (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (64, 64, 4.0);
-        let mut other = scene.clone();
-        other.ships[0].heading += 90.0;
-        let calm = Scene {
-            ships: Vec::new(),
-            ..scene.clone()
-        };
+    fn open_sea_is_even_and_each_wake_its_own() {
         let scale = GreyScale::default();
-        let images = [&scene, &other].map(|scene| expected_grey(scene, &scale).unwrap());
-        let pixels = images.iter().map(Vec::as_slice);
-        let (patches, _) = PatchTransform::fit(pixels, 64, 4, &device);
-        let same = Scene {
-            seed: scene.seed + 1,
-            ..scene.clone()
+        let (one, other) = (scene(&[]), scene(&["ship.heading=130"]));
+        let mut calm = one.clone();
+        calm.ships.clear();
+        let images = [&one, &other, &calm].map(|scene| expected_grey(scene, &scale).unwrap());
+        let distance = |a: &[f32], b: &[f32]| {
+            let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+            differences.fold(0f32, f32::max)
         };
-        let all = [scene.clone(), same, other, calm, scene];
-        let latents = expected_latents(&all, &scale, &patches).unwrap();
-        assert_eq!(latents.dims(), [5, 4, 8, 8]);
-        let of = |k: usize| latents.clone().narrow(0, k, 1);
-        let distance = |a, b| (of(a) - of(b)).abs().max().into_scalar::<f32>();
-        assert!(distance(0, 1) == 0.0 && distance(0, 4) == 0.0);
-        assert!(distance(0, 2) > 0.1);
-        // 0.5 less its mean, by f32.
-        assert!(of(3).abs().max().into_scalar::<f32>() < 1e-4);
+        assert!(distance(&images[0], &images[1]) > 0.02);
+        let whole = expected_intensity(&calm).unwrap();
+        for power in whole.values {
+            // The waves that are averaged over are sampled by the image's own cells: 0.02 dB of brightness, 40 dB of grey.
+            let (grey, even) = (scale.grey(f64::from(power)) as f32, images[2][0]);
+            assert!((grey - even).abs() < 5e-4, "{grey} {even}");
+        }
+        assert!(
+            images[2]
+                .iter()
+                .all(|grey| grey.to_bits() == images[2][0].to_bits())
+        );
+    }
+
+    /// Scenes that differ by their seeds alone are imaged once, but not where gusts, slicks or echoes are drawn.
+    #[test]
+    fn the_seed_counts_where_something_is_drawn() {
+        let scale = GreyScale::default();
+        for (assignments, drawn) in [
+            (vec![], false),
+            (vec!["sea.gust_strength=0.1"], true),
+            (
+                vec![
+                    "sea.slick_damping=0.5",
+                    "sea.slick_scale=150",
+                    "sea.slick_width=80",
+                    "sea.wind_speed=3",
+                ],
+                true,
+            ),
+            (vec!["ship.echo=true", "radar.range_resolution=6"], true),
+        ] {
+            let one = scene(&assignments);
+            let other = Scene {
+                seed: one.seed + 1,
+                ..one.clone()
+            };
+            let images = expected_greys(&[one.clone(), other, one], &scale).unwrap();
+            assert_eq!(images[0] != images[1], drawn, "{assignments:?}");
+            assert_eq!(images[0], images[2]);
+        }
     }
 }

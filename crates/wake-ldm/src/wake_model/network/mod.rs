@@ -1,6 +1,7 @@
 //! The small wake model: a linear patch transform, a reader of prompts, mean and spread of the latents, and a flow.
 
 mod config;
+mod domain;
 mod flow;
 mod known;
 mod model;
@@ -9,14 +10,17 @@ mod patches;
 mod prior;
 mod prompt_parser;
 mod sea;
+mod windows;
 
 pub use config::WakeModelConfig;
+pub use domain::Domain;
 pub use flow::{Flow, Prepared};
-pub use known::{Known, expected_grey, expected_latents};
-pub(crate) use known::{expected_greys, latents_of};
+pub use known::{Foreseen, Known, expected_grey};
+pub(crate) use known::{expected_greys, images_of, slope_of};
 pub use model::WakeModel;
 pub use patches::{PatchTransform, Shares};
 pub use prior::{Expected, Prior};
 pub use prompt_parser::PromptParser;
 pub(crate) use prompt_parser::windows;
-pub(crate) use sea::{ChannelWindows, SeaFields};
+pub(crate) use sea::SeaFields;
+pub(crate) use windows::ChannelWindows;

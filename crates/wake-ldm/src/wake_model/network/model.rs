@@ -5,6 +5,7 @@ use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::flow::Flow;
+use super::known::Known;
 use super::patches::PatchTransform;
 use super::prior::{Expected, Prior};
 use super::prompt_parser::{PromptParser, windows};
@@ -14,9 +15,9 @@ use crate::wake_model::conditioning::{Conditions, QUANTITIES, Vocabulary, tokens
 ///
 /// ```text
 /// words ─► parser ─► numbers ─► physics: expected image ─► patches: w ─┐
-///                       ├───────► prior ─► mean μ, spread s, mean grey ◄┤
+///                       ├───────► prior ─► mean μ, spread s ────────────┤
 ///                       └───────► flow: noise ─► residual r ◄───────────┘
-///                                 z = μ + s r ─► patches ─► image
+///                    z = μ + s r;  z − w ─► patches ─► added to the expected image
 /// ```
 #[derive(Module, Debug)]
 pub struct WakeModel {
@@ -101,9 +102,18 @@ impl WakeModel {
     }
 
     /// The image of latents, grey 0…1, `[batch, 1, rows, columns]`.
-    pub fn decode(&self, latents: Tensor<4>, expected: &Expected) -> Tensor<4> {
-        self.patches
-            .decode(latents, expected.grey.clone())
-            .clamp(0.0, 1.0)
+    ///
+    /// What the latents have beyond those of the image that is expected is added to that image, so that its finest details,
+    /// which no latents hold, stay.
+    ///
+    /// - `image`: the expected one, of the result's shape, and `known` what was made of it
+    pub fn decode(
+        &self,
+        latents: Tensor<4>,
+        (expected, known): (&Expected, &Known),
+        image: Tensor<4>,
+    ) -> Tensor<4> {
+        let added = latents - known.wake.clone();
+        (image + self.patches.decode(added, expected.grey.clone())).clamp(0.0, 1.0)
     }
 }

@@ -12,7 +12,7 @@ use crate::nn::cast_to;
 use crate::nn::conv::{conv1x1, convolve};
 use crate::wake_model::conditioning::{FEATURES, PLACES};
 
-/// Largest |ln s|.
+/// Largest |c|.
 const LARGEST_LOG_SPREAD: f64 = 3.0;
 /// Layers after the first.
 const LAYERS: usize = 3;
@@ -22,12 +22,13 @@ const GREY_WIDTH: usize = 128;
 /// Mean and spread of the latents of a scene, over all seas that it can have.
 ///
 /// ```text
-/// mean μ = (1 + a) w + m,    spread s
+/// mean μ = (1 + a) w + d m,    spread s = d e^c
 /// ```
 ///
-/// - w: latents of the image that physics expects, [`expected_latents`](super::expected_latents)
-/// - a, m, ln s: of a network that sees one latent pixel, its place in the ship's frame and the numbers: what the
-///   formula of w neglects, and the roughness of the sea
+/// - w: latents of the image that physics expects; d: deviation of the linear sea in the channel, see
+///   [`Foreseen`](super::Foreseen)
+/// - a, m, c: of a network that sees one latent pixel, its place in the ship's frame and the numbers: what the formulas of
+///   w and d neglect
 ///
 /// What is left, (z − μ)/s, has mean 0 and variance 1 at every pixel; the flow draws it.
 ///
@@ -56,7 +57,7 @@ pub struct Expected {
     pub mean: Tensor<4>,
     /// ln s, `[batch, channels, rows, columns]`.
     pub log_spread: Tensor<4>,
-    /// Mean grey of each image, `[batch, 1]`.
+    /// Mean grey of each image less that of the expected one, `[batch, 1]`.
     pub grey: Tensor<2>,
 }
 
@@ -68,11 +69,13 @@ impl Prior {
             places: conv1x1(PLACES, width, device),
             wake: conv1x1(channels, width, device),
             layers: (0..LAYERS).map(|_| conv1x1(width, width, device)).collect(),
-            numbers: (0..=LAYERS).map(|_| linear(FEATURES, width)).collect(),
+            numbers: (0..=LAYERS)
+                .map(|_| linear(FEATURES + channels, width))
+                .collect(),
             gain: conv1x1(width, channels, device),
             mean: conv1x1(width, channels, device),
             spread: conv1x1(width, channels, device),
-            grey_in: linear(FEATURES, GREY_WIDTH),
+            grey_in: linear(FEATURES + channels, GREY_WIDTH),
             grey_out: linear(GREY_WIDTH, 1),
         }
     }
@@ -80,7 +83,7 @@ impl Prior {
     /// Mean, spread and brightness at the latent pixels of `known`, of its type.
     pub fn forward(&self, known: &Known) -> Expected {
         let (dtype, wide) = (self.mean.weight.val().dtype(), known.wake.dtype());
-        let numbers = cast_to(known.numbers.clone(), dtype);
+        let numbers = cast_to(known.told(), dtype);
         let told = |layer: &Linear| {
             let told = layer.forward(numbers.clone());
             let [batch, width] = told.dims();
@@ -94,9 +97,16 @@ impl Prior {
         }
         let out = |layer: &Conv2d| cast_to(convolve(layer, x.clone()), wide);
         let hidden = silu(self.grey_in.forward(numbers.clone()));
+        let [batch, channels, ..] = known.wake.dims();
+        let deviations = known
+            .log_deviations
+            .clone()
+            .reshape([batch, channels, 1, 1]);
+        let change = (out(&self.spread) / LARGEST_LOG_SPREAD).tanh() * LARGEST_LOG_SPREAD;
         Expected {
-            mean: known.wake.clone() * (out(&self.gain) + 1.0) + out(&self.mean),
-            log_spread: (out(&self.spread) / LARGEST_LOG_SPREAD).tanh() * LARGEST_LOG_SPREAD,
+            mean: known.wake.clone() * (out(&self.gain) + 1.0)
+                + out(&self.mean) * deviations.clone().exp(),
+            log_spread: change + deviations,
             grey: cast_to(self.grey_out.forward(hidden), wide),
         }
     }

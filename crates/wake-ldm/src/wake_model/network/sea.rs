@@ -4,15 +4,14 @@ use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use wake_physics::{LinearSea, Scene};
 
-use super::known::{latents_of, runs_of_equals};
-use super::patches::{PatchTransform, WINDOW};
+use super::known::{images_of, runs_of_equals};
+use super::patches::PatchTransform;
+use super::windows::ChannelWindows;
 use crate::error::Result;
 use crate::noise::{INITIAL_STREAM, NoiseSource, WHITE_STREAM, normal_batch};
 
 /// Share of the noise that is white in every channel: what the image has beyond the first order needs some to start from.
 const WHITE: f64 = 0.05;
-/// A channel has at least this share of the variance that it would have of a white field.
-const LEAST_SHARE: f64 = 1e-5;
 
 /// Gaussian noise in the latents of a scene, of variance 1 in every channel, correlated as its sea is.
 ///
@@ -30,6 +29,8 @@ const LEAST_SHARE: f64 = 1e-5;
 #[derive(Debug, Clone)]
 struct SeaNoise {
     sea: LinearSea,
+    /// Variances of the relative intensity in the channels.
+    variances: Vec<f64>,
     /// Factors of f, and of g, in each channel.
     shares: Vec<[f32; 2]>,
 }
@@ -46,8 +47,10 @@ impl SeaNoise {
             0.0 => [0.0, 1.0],
             _ => [((1.0 - WHITE) / variance).sqrt(), WHITE.sqrt()].map(|x| x as f32),
         };
+        let variances = channels.variances(&sea);
         Ok(Self {
-            shares: channels.variances(&sea).into_iter().map(share).collect(),
+            shares: variances.iter().copied().map(share).collect(),
+            variances,
             sea,
         })
     }
@@ -82,6 +85,16 @@ impl SeaFields {
         Ok(Self { seas, fields })
     }
 
+    /// What [`Foreseen::log_deviations`](super::Foreseen::log_deviations) is of each scene, one after the other.
+    ///
+    /// - `slopes`: change of the grey by the relative intensity, of each scene
+    pub(crate) fn log_deviations(&self, channels: &ChannelWindows, slopes: &[f64]) -> Vec<f32> {
+        let scenes = self.seas.iter().zip(slopes);
+        scenes
+            .flat_map(|(sea, &slope)| channels.of_variances(&sea.variances, slope))
+            .collect()
+    }
+
     /// The noise in latents.
     ///
     /// # Shapes
@@ -94,7 +107,7 @@ impl SeaFields {
         patches: &PatchTransform,
     ) -> Tensor<4> {
         let device = patches.device();
-        let waves = latents_of(scenes, self.fields, patches);
+        let waves = patches.encode(images_of(scenes, &self.fields, patches)).0;
         let [batch, channels, rows, columns] = waves.dims();
         let white = normal_batch(sources, WHITE_STREAM, [channels, rows, columns], &device);
         let factor = |which: usize| -> Tensor<4> {
@@ -103,54 +116,6 @@ impl SeaFields {
             Tensor::from_data(TensorData::new(factors, [batch, channels, 1, 1]), &device)
         };
         waves * factor(0) + white * factor(1)
-    }
-}
-
-/// What the channels of latents weigh pixels with, as far as their variance asks for it.
-#[derive(Debug, Clone)]
-pub(crate) struct ChannelWindows {
-    /// Sums of w(p) w(p + d) over all pixels p of a window, by the distance d in rows and columns; of each channel.
-    correlations: Vec<Vec<f64>>,
-}
-
-/// Distances of two pixels of a window along rows or columns.
-const LAGS: usize = 2 * WINDOW - 1;
-
-impl ChannelWindows {
-    /// Those of a transform.
-    pub(crate) fn new(patches: &PatchTransform) -> Self {
-        let windows = patches.windows();
-        let correlation = |window: &[f32]| {
-            let mut sums = vec![0.0; LAGS * LAGS];
-            for (p, &a) in window.iter().enumerate() {
-                for (q, &b) in window.iter().enumerate() {
-                    let [down, right] = [(p / WINDOW, q / WINDOW), (p % WINDOW, q % WINDOW)]
-                        .map(|(p, q)| WINDOW - 1 + q - p);
-                    sums[down * LAGS + right] += f64::from(a) * f64::from(b);
-                }
-            }
-            sums
-        };
-        let windows = windows.par_chunks_exact(WINDOW * WINDOW);
-        Self {
-            correlations: windows.map(correlation).collect(),
-        }
-    }
-
-    /// Variance of each channel on a sea: Σ C(d) Σ w(p) w(p + d) with C the covariance of two pixels; 0 where there are no waves.
-    fn variances(&self, sea: &LinearSea) -> Vec<f64> {
-        let covariance = sea.covariance();
-        let wrapped = |lag: usize, n: usize| (lag + WINDOW * n - (WINDOW - 1)) % n;
-        let [rows, columns] = [covariance.rows, covariance.columns];
-        let lags = (0..LAGS * LAGS)
-            .map(|lag| covariance.at(wrapped(lag / LAGS, rows), wrapped(lag % LAGS, columns)));
-        let lags: Vec<f64> = lags.map(f64::from).collect();
-        let of_channel = |sums: &Vec<f64>| {
-            let sum: f64 = sums.iter().zip(&lags).map(|(w, c)| w * c).sum();
-            let none = LAGS * LAGS / 2;
-            sum.max(LEAST_SHARE * lags[none] * sums[none])
-        };
-        self.correlations.iter().map(of_channel).collect()
     }
 }
 

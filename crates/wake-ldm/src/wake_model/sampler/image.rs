@@ -2,8 +2,9 @@
 
 use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
-use wake_physics::sar::speckle::speckle;
-use wake_physics::{Field, Scene, labels_of};
+use wake_physics::{Field, Scene, labels_of, unit_speckle};
+
+use crate::error::Result;
 
 /// Seconds of the stages of one call, for all images of its batch together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -27,7 +28,7 @@ pub struct WakeImage {
     pub grey: Field,
     /// Intensity of the same, linear, in the unit of σ⁰.
     pub intensity: Field,
-    /// Intensity with speckle: of the scene's number of looks, or of the learnt sea, which gets no second one.
+    /// Intensity with speckle: times [`unit_speckle`], or of the learnt sea, which gets no second one.
     pub speckled: Field,
     /// Where ship and wake are in [`scene`](Self::scene).
     pub labels: Labels,
@@ -40,7 +41,12 @@ pub struct WakeImage {
 }
 
 impl WakeImage {
-    pub(super) fn new(grey: Field, scale: GreyScale, scene: Scene, seconds: SampleSeconds) -> Self {
+    pub(super) fn new(
+        grey: Field,
+        scale: GreyScale,
+        scene: Scene,
+        seconds: SampleSeconds,
+    ) -> Result<Self> {
         let intensity = Field {
             values: grey
                 .values
@@ -49,9 +55,10 @@ impl WakeImage {
                 .collect(),
             ..grey.clone()
         };
-        let mut speckled = intensity.clone();
-        speckle(&mut speckled, scene.radar.looks, scene.seed);
-        Self {
+        let mut speckled = unit_speckle(&scene)?;
+        let pixels = speckled.values.iter_mut().zip(&intensity.values);
+        pixels.for_each(|(speckle, value)| *speckle *= value);
+        Ok(Self {
             grey,
             intensity,
             speckled,
@@ -59,7 +66,7 @@ impl WakeImage {
             scene,
             scale,
             seconds,
-        }
+        })
     }
 
     /// An image whose intensity has its speckle already.

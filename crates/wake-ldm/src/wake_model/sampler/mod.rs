@@ -22,7 +22,7 @@ use crate::self_check::check_once;
 use crate::wake_model::conditioning::{Conditions, Vocabulary};
 use crate::wake_model::network::{
     ChannelWindows, Expected, Known, SeaFields, WakeModel, WakeModelConfig, expected_greys,
-    latents_of,
+    images_of, slope_of,
 };
 use crate::wake_model::sea_texture::SeaTexture;
 pub use image::{SampleSeconds, WakeImage};
@@ -188,7 +188,7 @@ impl WakeSampler {
         };
         let inputs = (0..).zip(prompts).map(input);
         let inputs: Vec<Input> = inputs.collect::<Result<_>>()?;
-        Ok(self.run(&inputs, begin)?.images())
+        self.run(&inputs, begin)?.images()
     }
 
     /// An image of each scene.
@@ -199,7 +199,7 @@ impl WakeSampler {
     pub fn sample_scenes(&self, scenes: &[Scene]) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
         let inputs = self.inputs(scenes)?;
-        Ok(self.run(&inputs, begin)?.images())
+        self.run(&inputs, begin)?.images()
     }
 
     /// An image of each scene, in one batch on the device, without speckle but that of a learnt sea, and the labels of what
@@ -265,11 +265,6 @@ impl WakeSampler {
                 seconds,
             });
         }
-        let base = Conditions::of_scene(&self.base_scene());
-        let conditions: Vec<Conditions> = scenes
-            .iter()
-            .map(|scene| Conditions::of_scene(scene).or(base))
-            .collect();
         let sources: Vec<NoiseSource> = scenes
             .iter()
             .map(|scene| NoiseSource::new(scene.seed))
@@ -280,16 +275,21 @@ impl WakeSampler {
             || SeaFields::new(&scenes, &sources, &self.windows),
         );
         let (expected, seas) = (expected?, seas?);
-        let wake = latents_of(&scenes, expected, &self.model.patches);
-        let known = Known::new(&conditions, self.config.grid(), wake);
+        let slopes = expected
+            .iter()
+            .map(|grey| slope_of(grey, &self.config.grey));
+        let deviations = seas.log_deviations(&self.windows, &slopes.collect::<Vec<_>>());
+        let patches = &self.model.patches;
+        let image = images_of(&scenes, &expected, patches);
+        let known = Known::new(&scenes, patches.encode(image.clone()).0, &deviations);
         let expected = self.model.prior.forward(&known);
         check_finite("the mean of the image", &expected.mean)?;
         seconds.expect = lap();
-        let noise = seas.noise(&scenes, &sources, &self.model.patches);
+        let noise = seas.noise(&scenes, &sources, patches);
         let latents = self.denoise(&known, &expected, noise);
         check_finite("the latents of the image", &latents)?;
         seconds.denoise = lap();
-        let grey = self.model.decode(latents, &expected);
+        let grey = self.model.decode(latents, (&expected, &known), image);
         check_finite("the image", &grey)?;
         let pixels: Vec<f32> = grey.to_data().iter::<f32>().collect();
         seconds.decode = lap();
@@ -395,17 +395,17 @@ fn grey_of(intensities: &[Field], scale: &GreyScale, device: &Device) -> Tensor<
 
 impl Drawn {
     /// The images with their speckle and labels.
-    fn images(self) -> Vec<WakeImage> {
+    fn images(self) -> Result<Vec<WakeImage>> {
         let [_, _, rows, columns] = self.grey.dims();
         let pixels = match self.pixels {
             Pixels::Grey(pixels) => pixels,
             Pixels::WithSpeckle(intensities) => {
                 let images = intensities.into_par_iter().zip(self.scenes);
-                return images
+                return Ok(images
                     .map(|(image, scene)| {
                         WakeImage::with_speckle(image, self.scale, scene, self.seconds)
                     })
-                    .collect();
+                    .collect());
             }
         };
         let images = pixels.par_chunks(rows * columns);

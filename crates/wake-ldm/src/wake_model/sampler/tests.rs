@@ -7,6 +7,7 @@ use burn::tensor::Device;
 use wake_physics::grey::GreyScale;
 
 use super::*;
+use crate::network::Foreseen;
 use crate::sea_texture::{SeaFlow, SeaStyle};
 
 const PROMPT: &str = "Simulated SAR image of wakes from a ship moving at 10 mps toward 135 degrees. Ocean waves are \
@@ -111,11 +112,11 @@ fn steps_follow_the_velocity_from_noise_to_latents() {
     let mut sampler = sampler();
     sampler.model.flow = sampler.model.flow.clone().map(&mut Constant);
     let scene = sampler.base_scene();
-    let conditions = [Conditions::of_scene(&scene)];
-    let wake =
-        crate::network::expected_latents(&[scene], &sampler.config.grey, &sampler.model.patches)
-            .unwrap();
-    let known = Known::new(&conditions, sampler.config.grid(), wake);
+    let patches = &sampler.model.patches;
+    let foreseen = Foreseen::new(&scene, &sampler.config.grey, patches).unwrap();
+    let scenes = [scene];
+    let image = images_of(&scenes, &[foreseen.grey], patches);
+    let known = Known::new(&scenes, patches.encode(image).0, &foreseen.log_deviations);
     let expected = sampler.model.prior.forward(&known);
     let noise = expected.mean.zeros_like() + 0.5;
     let there = expected.latents(noise.clone() - 0.1 * FRAC_PI_2);
@@ -276,6 +277,7 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
         .run(&[told], Instant::now())
         .unwrap()
         .images()
+        .unwrap()
         .remove(0);
     assert!(open.scene.ships.is_empty());
     assert_eq!(open.labels, labels_of(&open.scene));
@@ -289,6 +291,7 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
         .run(&[told], Instant::now())
         .unwrap()
         .images()
+        .unwrap()
         .remove(0);
     assert!(!with_ship.scene.ships.is_empty());
     assert_eq!(with_ship.labels, labels_of(&with_ship.scene));

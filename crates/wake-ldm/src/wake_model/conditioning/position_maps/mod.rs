@@ -1,7 +1,9 @@
 //! Where the pixels of the latents lie in the ship's frame.
 
-use super::conditions::Conditions;
+use super::features::TOLD_SPACING;
+use wake_physics::Scene;
 use wake_physics::kelvin::half_angle;
+use wake_physics::scene::{Grid, Ship};
 
 /// Side of the squares of pixels that become one latent pixel.
 pub(crate) const PATCH: usize = 8;
@@ -10,7 +12,7 @@ pub(crate) const PLACES: usize = 8;
 /// Which of them says whether a place is in the wedge.
 #[cfg(any(test, feature = "train"))]
 pub(crate) const WEDGE: usize = 5;
-/// Half-width of the band behind the stern \[m\].
+/// Half-width of the band behind the stern \[m\], on pixels of 4 m as all lengths here.
 const BAND: f64 = 40.0;
 
 /// Size of an image in pixels, and of a pixel.
@@ -30,10 +32,11 @@ struct Frame {
     half_length: f64,
     /// How far the wedge reaches astern where it is 1 m wide on one side \[m\].
     slope: f64,
+    /// What lengths are divided by: pixels are told as if they were of 4 m.
+    scale: f64,
 }
 
-/// Where some latent pixels lie in the ship's frame; all zero where the track of the ship is not known, or there is no
-/// ship that moves.
+/// Where some latent pixels lie in the frame of the ship in whose wedge they lie deepest; all zero where no ship moves.
 ///
 /// Distances along and across the track, in the image's axes and from the ship, in the wedge of the bow's waves or not, how
 /// far from its edge, and a band behind the stern. The wedge opens as the wake does at this speed and depth.
@@ -47,13 +50,20 @@ struct Frame {
 /// # References
 ///
 /// Kelvin (1887), "On Ship Waves": the wedge.
-pub(crate) fn places(conditions: &Conditions, grid: MapGrid, cells: &[usize]) -> Vec<f32> {
+pub(crate) fn places(scene: &Scene, cells: &[usize]) -> Vec<f32> {
     let mut maps = vec![0.0; PLACES * cells.len()];
-    let Some(frame) = Frame::of(conditions) else {
-        return maps;
-    };
+    let grid = MapGrid::of(&scene.grid);
+    let frames = scene.ships.iter().filter_map(|ship| Frame::of(ship, scene));
+    let frames: Vec<Frame> = frames.collect();
     for (n, &cell) in cells.iter().enumerate() {
-        let place = frame.seen_from_ship(grid.middle(cell));
+        let middle = grid.middle(cell);
+        let seen = frames
+            .iter()
+            .map(|frame| (frame, frame.seen_from_ship(middle)));
+        let nearest = seen.min_by(|(a, p), (b, q)| a.outside(*p).total_cmp(&b.outside(*q)));
+        let Some((frame, place)) = nearest else {
+            return maps;
+        };
         for (map, value) in frame.places(place).into_iter().enumerate() {
             maps[map * cells.len() + n] = value as f32;
         }
@@ -62,6 +72,14 @@ pub(crate) fn places(conditions: &Conditions, grid: MapGrid, cells: &[usize]) ->
 }
 
 impl MapGrid {
+    /// The pixels of a scene, which are as many in rows as in columns.
+    pub fn of(grid: &Grid) -> Self {
+        Self {
+            size: grid.rows,
+            spacing: grid.spacing,
+        }
+    }
+
     /// All squares of pixels, in rows.
     pub fn cells(self) -> Vec<usize> {
         let coarse = self.size / PATCH;
@@ -81,17 +99,15 @@ impl MapGrid {
 }
 
 impl Frame {
-    /// The frame of a ship whose track is known and that moves.
-    fn of(conditions: &Conditions) -> Option<Self> {
-        let (speed, heading, position) = conditions.track()?;
-        let (sin, cos) = heading.to_radians().sin_cos();
-        let depth = conditions.depth.unwrap_or(f64::INFINITY);
-        let length = conditions.ship_length?;
-        (speed > 0.0).then(|| Self {
+    /// The frame of a ship that moves.
+    fn of(ship: &Ship, scene: &Scene) -> Option<Self> {
+        let (sin, cos) = ship.heading.to_radians().sin_cos();
+        (ship.speed > 0.0).then(|| Self {
             forward: [sin, cos],
-            position,
-            half_length: 0.5 * length,
-            slope: half_angle(speed, depth).tan().recip(),
+            position: ship.position,
+            half_length: 0.5 * ship.length,
+            slope: half_angle(ship.speed, scene.sea.depth).tan().recip(),
+            scale: scene.grid.spacing / TOLD_SPACING,
         })
     }
 
@@ -102,12 +118,18 @@ impl Frame {
         [dx * fx + dy * fy, dy * fx - dx * fy]
     }
 
+    /// How far forward of the wedge's edge a place lies \[m\]: negative inside.
+    fn outside(&self, [along, across]: [f64; 2]) -> f64 {
+        self.slope * across.abs() + along - self.half_length
+    }
+
     /// What the maps show of a place.
-    fn places(&self, [along, across]: [f64; 2]) -> [f64; PLACES] {
+    fn places(&self, place: [f64; 2]) -> [f64; PLACES] {
         let [fx, fy] = self.forward;
-        // Negative inside the wedge.
-        let outside = self.slope * across.abs() + along - self.half_length;
-        let astern = along < -self.half_length;
+        let inside = self.outside(place) < 0.0 && place[0] < 0.0;
+        let astern = place[0] < -self.half_length;
+        let outside = self.outside(place) / self.scale;
+        let [along, across] = place.map(|x| x / self.scale);
         let band = (-0.5 * (across / BAND).powi(2)).exp();
         [
             (along / 200.0).tanh(),
@@ -115,11 +137,7 @@ impl Frame {
             (along * fx - across * fy) / 512.0,
             (along * fy + across * fx) / 512.0,
             (-along.hypot(across) / 150.0).exp(),
-            if outside < 0.0 && along < 0.0 {
-                1.0
-            } else {
-                0.0
-            },
+            if inside { 1.0 } else { 0.0 },
             (outside / 100.0).tanh(),
             if astern { band } else { 0.0 },
         ]

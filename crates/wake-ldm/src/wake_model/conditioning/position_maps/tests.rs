@@ -11,35 +11,68 @@ const GRID: MapGrid = MapGrid {
 /// The ship of the paper's grid.
 const SHIP_LENGTH: f64 = 195.0;
 
-fn known(speed: f64, heading: f64, position: [f64; 2]) -> Conditions {
-    Conditions {
-        ship: Some(true),
-        ship_speed: Some(speed),
-        ship_heading: Some(heading),
-        ship_position: Some(position),
-        ship_length: Some(SHIP_LENGTH),
-        ..Conditions::default()
-    }
+fn known(speed: f64, heading: f64, position: [f64; 2]) -> Scene {
+    let mut scene = Scene::default();
+    (scene.grid.rows, scene.grid.columns, scene.grid.spacing) =
+        (GRID.size, GRID.size, GRID.spacing);
+    scene.ships = vec![Ship {
+        speed,
+        heading,
+        position,
+        length: SHIP_LENGTH,
+        ..Ship::default()
+    }];
+    scene
 }
 
 #[test]
 fn no_track_no_maps() {
-    let unknown = [
-        Conditions::default(),
-        known(0.0, 10.0, [0.0, 0.0]),
-        Conditions {
-            ship_heading: None,
-            ..known(8.0, 0.0, [0.0, 0.0])
-        },
-        Conditions {
-            ship: Some(false),
-            ..known(8.0, 0.0, [0.0, 0.0])
-        },
-    ];
-    for conditions in unknown {
-        let maps = places(&conditions, GRID, &GRID.cells());
+    let mut open = known(8.0, 0.0, [0.0, 0.0]);
+    open.ships.clear();
+    for scene in [known(0.0, 10.0, [0.0, 0.0]), open] {
+        let maps = places(&scene, &GRID.cells());
+        assert_eq!(maps.len(), PLACES * GRID.cells().len());
         assert!(maps.iter().all(|x| x.abs() < f32::MIN_POSITIVE));
     }
+}
+
+/// Twice the distances on pixels of twice the side are the same maps; each wedge has the frame of its own ship.
+#[test]
+fn maps_count_pixels_and_know_every_ship() {
+    let near = known(9.0, 70.0, [40.0, -30.0]);
+    let mut far = near.clone();
+    far.grid.spacing *= 2.0;
+    let ship = &mut far.ships[0];
+    (ship.position, ship.length) = ([80.0, -60.0], 2.0 * SHIP_LENGTH);
+    let [a, b] = [&near, &far].map(|scene| places(scene, &GRID.cells()));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-5));
+    let [one, other] = [(30.0, [100.0, 150.0]), (30.0, [-150.0, 150.0])]
+        .map(|(heading, position)| known(8.0, heading, position));
+    let mut both = one.clone();
+    both.ships.extend(other.ships.clone());
+    let cells = GRID.cells();
+    let [one, other, both] = [&one, &other, &both].map(|scene| places(scene, &cells));
+    let inside = |maps: &[f32], cell: usize| maps[WEDGE * cells.len() + cell] > 0.5;
+    let mut seen = [0, 0];
+    for &cell in &cells {
+        let of = |maps: &[f32]| -> Vec<f32> {
+            (0..PLACES)
+                .map(|map| maps[map * cells.len() + cell])
+                .collect()
+        };
+        match [inside(&one, cell), inside(&other, cell)] {
+            [true, false] => {
+                assert_eq!(of(&both), of(&one));
+                seen[0] += 1;
+            }
+            [false, true] => {
+                assert_eq!(of(&both), of(&other));
+                seen[1] += 1;
+            }
+            _ => {}
+        }
+    }
+    assert!(seen.iter().all(|&count| count > 10), "{seen:?}");
 }
 
 #[test]
@@ -47,8 +80,8 @@ fn maps_are_bounded_and_move_with_the_ship() {
     // Three latent pixels to the right in range and two toward smaller azimuth, so down.
     let shift = [3.0, -2.0].map(|n| n * PATCH as f64 * GRID.spacing);
     let coarse = GRID.size / PATCH;
-    let [a, b] = [[0.0, 0.0], shift]
-        .map(|position| places(&known(9.0, 70.0, position), GRID, &GRID.cells()));
+    let [a, b] =
+        [[0.0, 0.0], shift].map(|position| places(&known(9.0, 70.0, position), &GRID.cells()));
     assert!(a.iter().chain(&b).all(|x| x.abs() <= 1.5));
     for map in 0..PLACES {
         for (row, column) in [(8, 5), (9, 7), (7, 2), (11, 1)] {
@@ -66,7 +99,7 @@ fn the_wedge_is_that_of_the_simulators_measurements() {
     let raster = Raster::image(GRID.size, GRID.size, GRID.spacing);
     let coarse = GRID.size / PATCH;
     for (heading, position) in [(30.0, [100.0, 150.0]), (250.0, [120.0, 10.0])] {
-        let maps = places(&known(8.0, heading, position), GRID, &GRID.cells());
+        let maps = places(&known(8.0, heading, position), &GRID.cells());
         let ship = ShipPlace {
             position,
             length: SHIP_LENGTH,
@@ -90,11 +123,9 @@ fn the_wedge_is_that_of_the_simulators_measurements() {
 #[test]
 fn the_wedge_begins_at_the_bow_of_the_ship() {
     let middle = |length: f64| {
-        let short = Conditions {
-            ship_length: Some(length),
-            ..known(9.0, 0.0, [0.0, 0.0])
-        };
-        let frame = Frame::of(&short).unwrap();
+        let mut short = known(9.0, 0.0, [0.0, 0.0]);
+        short.ships[0].length = length;
+        let frame = Frame::of(&short.ships[0], &short).unwrap();
         let edge = |across: f64, astern: f64| frame.places([-astern, across])[WEDGE];
         // On the edge of the wedge |η| = tan(ψ)(L/2 − ξ), a little inside and outside.
         let at = |astern: f64| (astern + 0.5 * length) / 8f64.sqrt();

@@ -1,0 +1,244 @@
+//! Which scenes a model was trained for.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use wake_physics::Scene;
+
+use crate::error::{Error, Result};
+
+/// Keys that may have any value: chance, time, directions, speckle, accuracy, and the name of what the other keys say.
+const ANY: [&str; 9] = [
+    "seed",
+    "sea.time",
+    "sea.wind_toward",
+    "sea.swell_toward",
+    "ship.heading",
+    "radar.looks",
+    "radar.look_overlap",
+    "radar.sensor",
+    "grid.oversampling",
+];
+/// A table of such keys.
+const ANY_OF: &str = "model.";
+/// Ships of a scene.
+const SHIPS: &str = "ships";
+/// Share of a range that a number may lie beyond it: the ends of what was drawn were not all drawn.
+const BEYOND: f64 = 0.02;
+
+/// The values that the scenes of a training set have, key by key: numbers from the smallest to the largest, of all else each.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Domain(BTreeMap<String, Seen>);
+
+/// The values of one key.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Seen {
+    /// The smallest number and the largest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    range: Option<[f64; 2]>,
+    /// Words, flags, and `null` for a key that some scenes lack.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    values: Vec<Value>,
+}
+
+impl Domain {
+    /// That of some scenes.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Json`] for a scene that cannot be written.
+    pub fn of<'a>(scenes: impl IntoIterator<Item = &'a Scene>) -> Result<Self> {
+        let mut domain = Self::default();
+        for scene in scenes {
+            for (key, value) in leaves(scene)? {
+                domain.0.entry(key).or_default().add(&value);
+            }
+        }
+        Ok(domain)
+    }
+
+    /// Checks that a scene has only values that were seen; a domain of no scene holds every scene.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidOption`] with the first one that was not, named as in a scene file.
+    pub fn check(&self, scene: &Scene) -> Result<()> {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        for (option, value) in leaves(scene)? {
+            let seen = self.0.get(&option).cloned().unwrap_or_default();
+            if !seen.holds(&value) {
+                return Err(Error::InvalidOption {
+                    option,
+                    value: value.to_string(),
+                    expected: format!("{seen}, as in the images that the model was trained with"),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Seen {
+    fn add(&mut self, value: &Value) {
+        match value.as_f64() {
+            Some(number) => {
+                let [low, high] = self.range.unwrap_or([number; 2]);
+                self.range = Some([low.min(number), high.max(number)]);
+            }
+            None if !self.values.contains(value) => self.values.push(value.clone()),
+            None => {}
+        }
+    }
+
+    fn holds(&self, value: &Value) -> bool {
+        match (value.as_f64(), self.range) {
+            (Some(number), Some([low, high])) => {
+                let beyond = BEYOND * (high - low) + 1e-9 * high.abs();
+                (low - beyond..=high + beyond).contains(&number)
+            }
+            (Some(_), None) => false,
+            (None, _) => self.values.contains(value),
+        }
+    }
+}
+
+impl std::fmt::Display for Seen {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut parts = Vec::new();
+        if let Some([low, high]) = self.range {
+            parts.push(match high > low {
+                true => format!("{low} to {high}"),
+                false => low.to_string(),
+            });
+        }
+        parts.extend(self.values.iter().map(|value| match value {
+            Value::Null => "absent".to_owned(),
+            value => value.to_string(),
+        }));
+        match parts.is_empty() {
+            true => write!(f, "absent"),
+            false => write!(f, "{}", parts.join(" or ")),
+        }
+    }
+}
+
+/// All values of a scene by their keys; those of every ship under the same ones. An infinite depth is a word.
+fn leaves(scene: &Scene) -> Result<Vec<(String, Value)>> {
+    let json = |source| Error::Json {
+        path: "scene".into(),
+        source,
+    };
+    let mut shared = scene.clone();
+    let ships = std::mem::take(&mut shared.ships);
+    let mut found = vec![(SHIPS.to_owned(), Value::from(ships.len()))];
+    walk(
+        "",
+        &serde_json::to_value(&shared).map_err(json)?,
+        &mut found,
+    );
+    for ship in &ships {
+        walk(
+            "ship",
+            &serde_json::to_value(ship).map_err(json)?,
+            &mut found,
+        );
+    }
+    found.retain(|(key, _)| !ANY.contains(&key.as_str()) && !key.starts_with(ANY_OF));
+    Ok(found)
+}
+
+fn walk(name: &str, value: &Value, found: &mut Vec<(String, Value)>) {
+    match value {
+        Value::Object(entries) => {
+            for (key, value) in entries {
+                let name = match name {
+                    "" => key.clone(),
+                    _ => format!("{name}.{key}"),
+                };
+                walk(&name, value, found);
+            }
+        }
+        // Places are looked at axis by axis; no two of a scene's lists are of other things.
+        Value::Array(list) => list.iter().for_each(|value| walk(name, value, found)),
+        value => found.push((name.to_owned(), value.clone())),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    fn scene(assignments: &[&str]) -> Scene {
+        Scene::default().with_assignments(assignments).unwrap()
+    }
+
+    #[test]
+    fn what_lies_between_scenes_that_were_seen_is_held_and_nothing_else() {
+        let mut open = scene(&[
+            "sea.wind_speed=3.0",
+            "sea.depth=12.0",
+            "radar.range_resolution=8.0",
+        ]);
+        open.ships.clear();
+        let domain =
+            Domain::of(&[scene(&["sea.wind_speed=9.0", "ship.length=80.0"]), open]).unwrap();
+        let check = |assignments: &[&str]| domain.check(&scene(assignments));
+        assert!(check(&["sea.wind_speed=6.0", "ship.length=80.0"]).is_ok());
+        assert!(
+            check(&[
+                "ship.length=80.0",
+                "radar.range_resolution=8.0",
+                "seed=4",
+                "radar.looks=20"
+            ])
+            .is_ok()
+        );
+        assert!(check(&["ship.length=80.0", "model.tolerance=0.05", "sea.depth=12.0"]).is_ok());
+        for (assignment, told) in [
+            (
+                "sea.wind_speed=9.5",
+                "sea.wind_speed is 9.5, expected 3 to 9,",
+            ),
+            ("ship.length=81.0", "ship.length is 81.0, expected 80,"),
+            (
+                "radar.polarization=HH",
+                "radar.polarization is \"HH\", expected \"VV\",",
+            ),
+            ("sea.depth=40.0", "sea.depth is 40.0, expected 12 or"),
+            (
+                "radar.noise_floor=-20.0",
+                "radar.noise_floor is -20.0, expected absent,",
+            ),
+            (
+                "radar.range_resolution=20.0",
+                "radar.range_resolution is 20.0, expected 8,",
+            ),
+        ] {
+            let refused = check(&["ship.length=80.0", assignment])
+                .unwrap_err()
+                .to_string();
+            assert!(refused.contains(told), "{refused}");
+        }
+        let mut two = scene(&["ship.length=80.0"]);
+        two.ships.push(two.ships[0].clone());
+        let refused = domain.check(&two).unwrap_err().to_string();
+        assert!(refused.contains("ships is 2, expected 0 to 1"), "{refused}");
+    }
+
+    #[test]
+    fn it_is_read_as_it_was_written() {
+        let domain = Domain::of(&[
+            scene(&[]),
+            scene(&["ship.echo=true", "radar.noise_floor=-20.0"]),
+        ]);
+        let domain = domain.unwrap();
+        let text = serde_json::to_string(&domain).unwrap();
+        assert_eq!(serde_json::from_str::<Domain>(&text).unwrap(), domain);
+    }
+}
