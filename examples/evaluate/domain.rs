@@ -1,6 +1,6 @@
 //! How like simulated images those of the model are over all scenes of a recipe, before speckle and with it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
 use clap::Args;
@@ -115,9 +115,11 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         Some(steps) => sampler.with_steps(steps)?,
         None => sampler,
     };
-    let recipe = match std::path::Path::new(&options.recipe) {
-        path if path.is_file() => Recipe::read(path)?,
-        _ => Recipe::named(&options.recipe)?,
+    // What is built in is hidden by no file of its name.
+    let file = Path::new(&options.recipe);
+    let recipe = match Recipe::named(&options.recipe) {
+        Err(_) if file.is_file() => Recipe::read(file)?,
+        named => named?,
     };
     let set = Simulated::new(recipe, SEED)?;
     let scenes = (0..u64::from(options.count)).map(|index| set.scene(index));
