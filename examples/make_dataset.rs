@@ -116,24 +116,14 @@ fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
         _ => 100,
     };
     let count = arguments.count.unwrap_or(default_count);
-    let recipe = recipe(&arguments.grid)?.with_assignments(&arguments.set)?;
+    let recipe = Recipe::named_or_read(&arguments.grid);
+    let recipe = recipe.map_err(|error| format!("--grid: {error}"))?;
+    let recipe = recipe.with_assignments(&arguments.set)?;
     Ok(Manifest {
         shard: arguments.shard,
         sea: arguments.sea.as_deref().map(fingerprint).transpose()?,
         ..Manifest::new(recipe, arguments.seed, count)?.with_val_share(arguments.val_share)?
     })
-}
-
-/// A recipe that is built in, which no file of its name hides; else that of a file.
-fn recipe(grid: &str) -> Result<Recipe, Box<dyn Error>> {
-    let file = Path::new(grid);
-    match Recipe::named(grid) {
-        Ok(recipe) => Ok(recipe),
-        Err(_) if file.is_file() => Ok(Recipe::read(file)?),
-        Err(_) => {
-            Err(format!("--grid is {grid}, expected paper, ranges, detector or a TOML file").into())
-        }
-    }
 }
 
 /// The pairs of a set, on the learnt sea that is asked for.

@@ -1,6 +1,6 @@
 //! How like simulated images those of the model are over all scenes of a recipe, before speckle and with it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use burn::tensor::Device;
 use clap::Args;
@@ -115,12 +115,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         Some(steps) => sampler.with_steps(steps)?,
         None => sampler,
     };
-    // What is built in is hidden by no file of its name.
-    let file = Path::new(&options.recipe);
-    let recipe = match Recipe::named(&options.recipe) {
-        Err(_) if file.is_file() => Recipe::read(file)?,
-        named => named?,
-    };
+    let recipe = Recipe::named_or_read(&options.recipe)?;
     let set = Simulated::new(recipe, SEED)?;
     let scenes = (0..u64::from(options.count)).map(|index| set.scene(index));
     let scenes: Vec<Scene> = scenes.collect::<wake_ldm::Result<_>>()?;

@@ -1,7 +1,7 @@
 //! What a stage is told on the command line.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use burn::tensor::{DType, Device};
 use clap::Args;
@@ -104,12 +104,9 @@ impl Options {
         }
     }
 
-    /// The recipe of simulated pairs: one that is built in, else that of a file.
+    /// The recipe of simulated pairs.
     pub(crate) fn recipe(&self) -> wake_ldm::Result<Recipe> {
-        match Recipe::named(&self.recipe) {
-            Err(_) if Path::new(&self.recipe).is_file() => Recipe::read(Path::new(&self.recipe)),
-            named => named,
-        }
+        Recipe::named_or_read(&self.recipe)
     }
 
     /// The devices, outside autodiff.

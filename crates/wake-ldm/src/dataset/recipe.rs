@@ -204,6 +204,19 @@ impl Recipe {
         }
     }
 
+    /// A recipe that is built in, which no file of its name hides; else that of a file.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recipe::named`] where there is no such file, else as [`Recipe::read`].
+    pub fn named_or_read(name: &str) -> Result<Self> {
+        let file = Path::new(name);
+        match Self::named(name) {
+            Err(_) if file.is_file() => Self::read(file),
+            named => named,
+        }
+    }
+
     /// Reads a recipe from the text of a TOML file and checks it.
     ///
     /// # Errors
