@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use wake_ldm::sea_texture::SeaImage;
 use wake_physics::Field;
 
-use super::grey::Grey;
+use wake_detector::GreyImage;
 
 /// Endings of files that are read.
 const ENDINGS: [&str; 5] = ["png", "tif", "tiff", "jpg", "jpeg"];
@@ -77,11 +77,11 @@ impl SeaFile {
 }
 
 fn field(path: &Path, half: Option<Half>) -> Result<Field, Box<dyn Error>> {
-    let grey = Grey::read(path)?;
-    let columns = Half::columns(half, grey.columns);
+    let grey = GreyImage::read(path)?;
+    let columns = Half::columns(half, grey.columns());
     Ok(Field {
-        rows: grey.rows,
+        rows: grey.rows(),
         columns: columns.len(),
-        values: grey.window(0, columns.start, grey.rows, columns.len()),
+        values: grey.window(0, columns.start, grey.rows(), columns.len()),
     })
 }

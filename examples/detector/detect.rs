@@ -4,14 +4,11 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
+use wake_detector::drawing::Drawing;
+use wake_detector::{Detection, Detector, GreyImage, radon};
 use wake_ldm::device_named;
 
-use super::decode::Detection;
-use super::drawing::Drawing;
-use super::find::{Search, find};
-use super::grey::Grey;
-use super::model::Model;
-use super::{exit, progress, radon};
+use super::{exit, progress};
 
 /// How wakes are looked for.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,9 +47,6 @@ pub(crate) struct Options {
     out: PathBuf,
 }
 
-/// The operating point: wakes with a score from here on are drawn and printed. Half a false alarm an image on real tiles.
-pub(crate) const OPERATING_POINT: f32 = 0.25;
-
 fn bounded(text: &str, low: f32, high: f32, unit: &str) -> Result<f32, String> {
     let number: f32 = text
         .parse()
@@ -73,14 +67,33 @@ fn score(text: &str) -> Result<f32, String> {
 
 /// Something that finds wakes.
 pub(crate) enum Finder {
-    Network(Box<Model>, Search),
+    Network(Box<Detector>),
     Radon,
 }
 
 impl Finder {
-    pub(crate) fn find(&self, image: &Grey) -> Vec<Detection> {
+    /// The network of a file, or the one that ships, which tells wakes from a score on.
+    pub(crate) fn network(
+        weights: Option<&Path>,
+        device: &str,
+        least_score: f32,
+        spacing: Option<f32>,
+    ) -> Result<Self, Box<dyn Error>> {
+        let device = device_named(device)?;
+        let detector = match weights {
+            Some(file) => Detector::load(file, &device)?,
+            None => Detector::pretrained(&device)?,
+        };
+        let detector = detector.with_least_score(least_score)?;
+        Ok(Self::Network(Box::new(match spacing {
+            Some(metres) => detector.with_spacing(metres)?,
+            None => detector,
+        })))
+    }
+
+    pub(crate) fn find(&self, image: &GreyImage) -> Vec<Detection> {
         match self {
-            Self::Network(model, search) => find(image, model.as_ref(), *search),
+            Self::Network(detector) => detector.find(image),
             Self::Radon => radon::find(image),
         }
     }
@@ -91,16 +104,17 @@ pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
     let finder = match options.method {
         Method::Radon => Finder::Radon,
         Method::Network => {
-            let model = Model::load(options.weights.as_deref(), device_named(&options.device)?)?;
-            let search = Search {
-                spacing: options.spacing,
-                least_score: options.least_score,
-            };
-            Finder::Network(Box::new(model), search)
+            let weights = options.weights.as_deref();
+            Finder::network(
+                weights,
+                &options.device,
+                options.least_score,
+                options.spacing,
+            )?
         }
     };
     // What cannot be read leaves no folder behind.
-    let first = Grey::read(&files[0])?;
+    let first = GreyImage::read(&files[0])?;
     std::fs::create_dir_all(&options.out)
         .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
     let bar = progress::bar(files.len() as u64, "images");
@@ -109,7 +123,7 @@ pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
     for file in &files {
         let image = match next.take() {
             Some(image) => image,
-            None => Grey::read(file)?,
+            None => GreyImage::read(file)?,
         };
         let found = finder.find(&image);
         draw(&image, &found, options, file)?;
@@ -174,21 +188,17 @@ fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
 }
 
 fn draw(
-    image: &Grey,
+    image: &GreyImage,
     found: &[Detection],
     options: &Options,
     file: &Path,
 ) -> Result<(), Box<dyn Error>> {
     let mut drawing = Drawing::new(image);
-    for one in found.iter().rev() {
-        // Radon's score has no upper end; all that it tells is above its threshold.
-        if options.method == Method::Radon || one.score >= OPERATING_POINT {
-            drawing.ray(
-                &one.wake,
-                [255, (255.0 * (1.0 - one.score.min(1.0))) as u8, 0],
-            );
-        }
-    }
+    // Radon's score has no upper end; all that it tells is above its threshold.
+    let sure = |one: &&Detection| {
+        options.method == Method::Radon || one.score >= Detector::OPERATING_POINT
+    };
+    drawing.found(found.iter().filter(sure));
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let path = options.out.join(format!("{name}.wakes.png"));
     drawing
@@ -203,10 +213,13 @@ fn print(name: &str, found: &[Detection]) {
         "{name}: {} wakes",
         found
             .iter()
-            .filter(|one| one.score >= OPERATING_POINT)
+            .filter(|one| one.score >= Detector::OPERATING_POINT)
             .count()
     );
-    for one in found.iter().filter(|one| one.score >= OPERATING_POINT) {
+    for one in found
+        .iter()
+        .filter(|one| one.score >= Detector::OPERATING_POINT)
+    {
         let (wake, [column, row]) = (&one.wake, one.wake.tip);
         println!(
             "  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
@@ -223,6 +236,6 @@ pub(crate) fn as_json(one: &Detection) -> Value {
         "axis_deg": one.wake.axis_deg,
         "half_angle_deg": one.wake.half_angle_deg,
         "length_px": one.wake.length,
-        "oriented_box": one.oriented_box(),
+        "oriented_box": one.wake.oriented_box(),
     })
 }

@@ -7,19 +7,13 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use serde_json::json;
-use wake_ldm::device_named;
+use wake_detector::drawing::{Drawing, sheet};
+use wake_detector::score::{Curve, Found, Judged, Label, Ray, Rule, verdicts};
+use wake_detector::train::{FOUND, Recipe, Sample};
+use wake_detector::{Detection, Detector, GreyImage, Wake};
 
-use super::decode::{Detection, oriented_box};
-use super::detect::{Finder, OPERATING_POINT};
-use super::drawing::{Drawing, sheet};
-use super::find::Search;
-use super::grey::Grey;
-use super::model::Model;
-use super::recipes::Recipe;
+use super::detect::Finder;
 use super::report::{FALSE_ALARMS, Report};
-use super::sample::{Sample, Wake};
-use super::score::{Curve, Found, Judged, Label, Ray, Rule, verdicts};
-use super::targets::FOUND;
 use super::{exit, labels, progress, real_sea};
 
 #[derive(clap::Args, Debug, Clone)]
@@ -58,6 +52,8 @@ fn rung(text: &str) -> Result<(String, PathBuf), String> {
 pub(crate) const HELD_OUT: u64 = 900_001;
 /// Rows and columns of a simulated image.
 pub(crate) const SIZE: usize = 512;
+/// Scores below this are no part of any curve.
+const LEAST_SCORE: f32 = 0.01;
 /// Images searched at a time.
 const AT_ONCE: u64 = 16;
 /// Contrast from which on a simulated wake is clear \[dB\].
@@ -69,18 +65,14 @@ const SIGNALS: [f64; 7] = [15.0, 18.0, 21.0, 24.0, 28.0, 32.0, 40.0];
 
 /// Searches, and writes `report.md`, `report.json` and pictures into the folder.
 pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
-    let model = Model::load(options.weights.as_deref(), device_named(&options.device)?)?;
-    let search = Search {
-        spacing: None,
-        least_score: 0.01,
-    };
+    let network =
+        |weights: Option<&Path>| Finder::network(weights, &options.device, LEAST_SCORE, None);
     let mut finders = vec![
-        ("network", Finder::Network(Box::new(model), search)),
+        ("network", network(options.weights.as_deref())?),
         ("Radon", Finder::Radon),
     ];
     for (name, file) in &options.rung {
-        let model = Model::load(Some(file), device_named(&options.device)?)?;
-        finders.push((name, Finder::Network(Box::new(model), search)));
+        finders.push((name, network(Some(file))?));
     }
     let mut real = Vec::new();
     let mut sea = Vec::new();
@@ -90,7 +82,7 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
         let names: Vec<String> = clear.iter().map(|(name, _)| name.clone()).collect();
         sea = real_sea::windows(folder, &names)?;
         for ((name, clear), (_, both)) in clear.into_iter().zip(both) {
-            real.push((Grey::read(&folder.join(&name))?, [clear, both]));
+            real.push((GreyImage::read(&folder.join(&name))?, [clear, both]));
         }
     }
     std::fs::create_dir_all(&options.out)
@@ -131,27 +123,11 @@ fn label(wake: &Wake) -> Label {
         .iter()
         .all(|x| (-0.5..SIZE as f32 - 0.5).contains(x));
     Label {
-        ray: ray(wake),
+        ray: Ray::from(wake),
         length: f64::from(wake.length),
         counts: wake.snr >= FOUND && inside,
         ambiguous: !inside,
     }
-}
-
-fn ray(wake: &Wake) -> Ray {
-    Ray {
-        tip: wake.tip.map(f64::from),
-        axis_deg: f64::from(wake.axis_deg),
-        oriented_box: Some(oriented_box(wake).map(|corner| corner.map(f64::from))),
-    }
-}
-
-fn found(detections: &[Detection]) -> Vec<Found> {
-    let one = |d: &Detection| Found {
-        score: f64::from(d.score),
-        ray: ray(&d.wake),
-    };
-    detections.iter().map(one).collect()
 }
 
 fn simulated(
@@ -170,8 +146,7 @@ fn simulated(
     for first in (0..count).step_by(AT_ONCE as usize) {
         let pairs = source.items(first..count.min(first + AT_ONCE))?;
         let samples: Vec<Sample> = pairs.iter().map(Sample::of_pair).collect();
-        let image = |sample: &Sample| Grey::from_levels(SIZE, SIZE, &sample.pixels);
-        let images: Vec<Grey> = samples.iter().map(image).collect();
+        let images: Vec<GreyImage> = samples.iter().map(Sample::image).collect();
         if first == 0 {
             // Alone, for its time.
             let begin = Instant::now();
@@ -180,7 +155,7 @@ fn simulated(
             }
             seconds = begin.elapsed().as_secs_f64() / images.len() as f64;
         }
-        let find = |image: &Grey| -> Vec<Vec<Detection>> {
+        let find = |image: &GreyImage| -> Vec<Vec<Detection>> {
             let all = finders.par_iter().map(|(_, finder)| finder.find(image));
             all.collect()
         };
@@ -194,7 +169,7 @@ fn simulated(
                     columns: SIZE as f64,
                     rows: SIZE as f64,
                     labels: sample.wakes.iter().map(label).collect(),
-                    found: found(detections),
+                    found: detections.iter().map(Found::from).collect(),
                 });
             }
             wakes.push(sample.wakes);
@@ -295,28 +270,20 @@ fn by_visibility(recipe: Recipe, judged: &[(&str, Vec<Judged>)], wakes: &[Vec<Wa
 }
 
 /// An image with its wakes in green and what was found in red and yellow.
-pub(crate) fn picture(image: &Grey, wakes: &[Wake], found: &[Detection]) -> image::RgbImage {
+pub(crate) fn picture(image: &GreyImage, wakes: &[Wake], found: &[Detection]) -> image::RgbImage {
     let mut drawing = Drawing::new(image);
     for wake in wakes.iter().filter(|wake| wake.snr >= FOUND) {
         drawing.ray(wake, [0, 200, 0]);
     }
-    for one in found
-        .iter()
-        .filter(|one| one.score >= OPERATING_POINT)
-        .rev()
-    {
-        drawing.ray(
-            &one.wake,
-            [255, (255.0 * (1.0 - one.score.min(1.0))) as u8, 0],
-        );
-    }
+    let sure = |one: &&Detection| one.score >= Detector::OPERATING_POINT;
+    drawing.found(found.iter().filter(sure));
     drawing.into_picture()
 }
 
 fn judge_real(
     name: &str,
     finder: &Finder,
-    tiles: &[(Grey, [Judged; 2])],
+    tiles: &[(GreyImage, [Judged; 2])],
     out: &Path,
     report: &mut Report,
 ) -> Result<(), Box<dyn Error>> {
@@ -327,7 +294,7 @@ fn judge_real(
     for ((image, known), detections) in tiles.iter().zip(found_in) {
         for (judged, known) in judged.iter_mut().zip(known) {
             judged.push(Judged {
-                found: found(&detections),
+                found: detections.iter().map(Found::from).collect(),
                 ..known.clone()
             });
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::score::{Judged, Label, Point, Ray};
+use wake_detector::score::{Judged, Label, Point, Ray};
 
 #[derive(Deserialize)]
 struct File {

@@ -12,34 +12,17 @@
 //! tiles with labels, and writes `report.md`. Without a command, wakes are found in a few simulated images and drawn
 //! into `out/detector/simulated.png`.
 
-mod cluttered;
-mod decode;
 mod detect;
-mod drawing;
 mod evaluate;
 #[path = "../common/exit.rs"]
 mod exit;
-mod find;
-mod grey;
-#[path = "../common/grey.rs"]
-mod grey_file;
 mod labels;
-mod model;
-mod network;
-mod normalize;
-mod paint;
+mod named;
 #[path = "../common/progress.rs"]
 mod progress;
-mod radon;
 mod real_sea;
-mod recipes;
-mod repeated;
 mod report;
-mod sample;
-mod score;
-mod sea;
 mod show;
-mod targets;
 mod train;
 
 use std::path::Path;
@@ -67,7 +50,7 @@ enum Command {
 
 fn main() -> ExitCode {
     exit::code(|| match Arguments::parse().command {
-        Some(Command::Train(options)) => train::train(&options),
+        Some(Command::Train(options)) => train::run(&options),
         Some(Command::Detect(options)) => detect::detect(&options),
         Some(Command::Evaluate(options)) => evaluate::evaluate(&options),
         None => show::show(Path::new("out/detector")),

@@ -5,14 +5,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use wake_detector::GreyImage;
+use wake_detector::train::Recipe;
 use wake_ldm::dataset::Source;
 use wake_ldm::device_named;
 use wake_ldm::train::{TwoSampleOptions, two_sample};
 use wake_physics::Field;
 
 use super::evaluate::HELD_OUT;
-use super::grey::Grey;
-use super::recipes::Recipe;
 
 /// Rows and columns of a window of open sea.
 const WINDOW: usize = 128;
@@ -26,16 +26,16 @@ const BRIGHTEST: f32 = 4.0;
 pub(crate) fn windows(folder: &Path, names: &[String]) -> Result<Vec<Field>, Box<dyn Error>> {
     let mut windows = Vec::new();
     for name in names {
-        let image = Grey::read(&folder.join(name))?;
+        let image = GreyImage::read(&folder.join(name))?;
         let mask = folder.join(name.replace(".png", "_mask.png"));
         let mask = match mask.is_file() {
-            true => Some(Grey::read(&mask)?),
+            true => Some(GreyImage::read(&mask)?),
             false => None,
         };
-        let middle = image.columns / 2;
-        let [left, right] = [0..middle, middle..image.columns].map(|half| {
+        let middle = image.columns() / 2;
+        let [left, right] = [0..middle, middle..image.columns()].map(|half| {
             let mut open = Vec::new();
-            for top in (0..image.rows.saturating_sub(WINDOW - 1)).step_by(WINDOW) {
+            for top in (0..image.rows().saturating_sub(WINDOW - 1)).step_by(WINDOW) {
                 let mut column = half.start;
                 while column + WINDOW <= half.end {
                     let place = (top, column);

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use super::score::{Curve, Judged, Rule};
+use wake_detector::score::{Curve, Judged, Rule};
 
 /// False alarms an image at which recall is told.
 pub(crate) const FALSE_ALARMS: f64 = 0.5;

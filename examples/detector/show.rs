@@ -3,24 +3,20 @@
 use std::error::Error;
 use std::path::Path;
 
+use wake_detector::Detector;
+use wake_detector::drawing::sheet;
+use wake_detector::train::{Recipe, Sample};
 use wake_ldm::device_named;
 
-use super::detect::OPERATING_POINT;
-use super::drawing::sheet;
 use super::evaluate::{HELD_OUT, SIZE, picture};
-use super::find::{Search, find};
-use super::grey::Grey;
-use super::model::Model;
 use super::progress;
-use super::recipes::Recipe;
-use super::sample::Sample;
 
 /// Images that are shown.
 const COUNT: u64 = 8;
 
 /// Draws simulated images with their wakes (green) and what is found (red to yellow) into `simulated.png`.
 pub(crate) fn show(out: &Path) -> Result<(), Box<dyn Error>> {
-    let model = Model::load(None, device_named("flex")?)?;
+    let detector = Detector::pretrained(&device_named("flex")?)?;
     std::fs::create_dir_all(out)
         .map_err(|error| format!("cannot make {}: {error}", out.display()))?;
     let source = Recipe::Detector.source(HELD_OUT, SIZE)?;
@@ -29,15 +25,8 @@ pub(crate) fn show(out: &Path) -> Result<(), Box<dyn Error>> {
     for index in 0..COUNT {
         let pair = &source.items(index..index + 1)?[0];
         let sample = Sample::of_pair(pair);
-        let image = Grey::from_levels(SIZE, SIZE, &sample.pixels);
-        let found = find(
-            &image,
-            &model,
-            Search {
-                spacing: None,
-                least_score: OPERATING_POINT,
-            },
-        );
+        let image = sample.image();
+        let found = detector.find(&image);
         bar.suspend(|| {
             println!(
                 "image {index}: {} wakes, {} found",

@@ -13,8 +13,6 @@
 
 #[path = "../common/exit.rs"]
 mod exit;
-#[path = "../common/grey.rs"]
-mod grey;
 mod domain;
 mod judge;
 mod measurements;

@@ -1,12 +1,10 @@
 //! The pictures of the documentation: the gallery, the stages from hull to image, and twenty seconds of a wake.
 //!
 //! ```text
-//! cargo build --release --examples
 //! cargo run --release --example gallery
 //! ```
 //!
-//! Writes `gallery.png`, `stages.png` and `wake.gif`. The last picture of the gallery is drawn by the example `detector`,
-//! which must be built beside this one.
+//! Writes `gallery.png`, `stages.png` and `wake.gif`.
 
 #[path = "../common/exit.rs"]
 mod exit;
@@ -17,8 +15,10 @@ mod stages;
 
 use clap::Parser;
 use std::error::Error;
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use wake_detector::drawing::Drawing;
+use wake_detector::{Detector, GreyImage};
 use wake_ldm::{WakeSampler, device_named};
 use wake_physics::grey::{GreyScale, Mapping};
 use wake_physics::picture::Picture;
@@ -75,7 +75,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     output::make_folder(&arguments.out)?;
     let bar = progress::bar(3, "pictures");
     let out = |name: &str| arguments.out.join(name);
-    gallery(&arguments.out)?.write(&out("gallery.png"))?;
+    gallery()?.write(&out("gallery.png"))?;
     bar.inc(1);
     stages::sheet()?.write(&out("stages.png"))?;
     bar.inc(1);
@@ -87,7 +87,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     ))?)
 }
 
-fn gallery(out: &Path) -> Result<Picture, Box<dyn Error>> {
+fn gallery() -> Result<Picture, Box<dyn Error>> {
     let size = [format!("grid.rows={SIDE}"), format!("grid.columns={SIDE}")];
     let mut pictures = Vec::new();
     for (file, changes, caption) in SCENES {
@@ -103,7 +103,7 @@ fn gallery(out: &Path) -> Result<Picture, Box<dyn Error>> {
     let mut picture = Picture::from_levels(&filling(&image.speckled), SIDE);
     picture.draw_labels(&image.labels);
     pictures.push(picture.captioned("Generated from a sentence by the diffusion model"));
-    pictures.push(found(out)?.captioned("Found by the detector in a simulated image"));
+    pictures.push(found()?.captioned("Found by the detector in a simulated image"));
     Ok(Picture::sheet(&pictures, ACROSS))
 }
 
@@ -133,8 +133,8 @@ fn filling(field: &Field) -> Vec<u8> {
     field.values.iter().map(level).collect()
 }
 
-/// What the detector finds in a simulated image, drawn by the example `detector`.
-fn found(out: &Path) -> Result<Picture, Box<dyn Error>> {
+/// What the detector finds in a simulated image.
+fn found() -> Result<Picture, Box<dyn Error>> {
     let scene = Scene::default().with_assignments(&[
         "grid.rows=256",
         "grid.columns=256",
@@ -144,26 +144,11 @@ fn found(out: &Path) -> Result<Picture, Box<dyn Error>> {
         "ship.position=[-120, -250]",
     ])?;
     let simulation = simulate(&scene)?;
-    let folder = tempfile::tempdir_in(out)?;
-    let image = folder.path().join("image.png");
     let levels = simulation.levels(&simulation.quick_look());
-    output::write_png(&image, &levels, SIDE, SIDE)?;
-    let detector = std::env::current_exe()?.with_file_name("detector");
-    let run = Command::new(&detector)
-        .arg("detect")
-        .arg(&image)
-        .arg("--out")
-        .arg(folder.path().join("found"))
-        .output()
-        .map_err(|e| {
-            format!(
-                "cannot start {}: {e}; build the examples first",
-                detector.display()
-            )
-        })?;
-    if !run.status.success() {
-        return Err(String::from_utf8_lossy(&run.stderr).into());
-    }
-    let drawn = image::open(folder.path().join("found/image.wakes.png"))?.into_rgb8();
+    let image = GreyImage::eight_bits(SIDE, SIDE, levels)?;
+    let detector = Detector::pretrained(&device_named("flex")?)?;
+    let mut drawing = Drawing::new(&image);
+    drawing.found(detector.find(&image).iter());
+    let drawn = drawing.into_picture();
     Ok(Picture::from_rgb(drawn.as_raw(), drawn.width() as usize))
 }

@@ -36,8 +36,6 @@
 #[path = "../common/exit.rs"]
 mod exit;
 mod fine_tune;
-#[path = "../common/grey.rs"]
-mod grey;
 mod options;
 #[path = "../common/progress.rs"]
 mod progress;

@@ -16,7 +16,7 @@ use imports::{Crate, Names};
 use picture::Column;
 
 /// The crates, in the order in which they import each other.
-const CRATES: [&str; 3] = ["wake-physics", "wake-text", "wake-ldm"];
+const CRATES: [&str; 4] = ["wake-physics", "wake-text", "wake-ldm", "wake-detector"];
 
 /// Longest source file [lines]: tests are not counted.
 const LONGEST_FILE: usize = 450;
@@ -224,10 +224,11 @@ fn code_of_the_front_page_is_compiled() {
         "crates/wake-physics/README.md",
         "crates/wake-ldm/README.md",
         "crates/wake-ldm/src/dataset/mod.rs",
+        "crates/wake-detector/README.md",
     ];
     let tested: Vec<Vec<String>> = tested.iter().flat_map(|name| blocks_of(name)).collect();
     let shown = blocks_of("README.md");
-    assert_eq!(shown.len(), 3, "quickstarts of the front page");
+    assert_eq!(shown.len(), 4, "quickstarts of the front page");
     for block in shown {
         let code: Vec<&String> = block.iter().filter(|line| !line.is_empty()).collect();
         let stands = tested.iter().any(|tested| {

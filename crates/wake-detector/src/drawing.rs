@@ -2,21 +2,24 @@
 
 use image::{Rgb, RgbImage};
 
-use super::grey::{Grey, rescaled};
-use super::sample::Wake;
+use crate::image::GreyImage;
+use crate::scaling::rescaled;
+use crate::wake::{Detection, Wake};
 
 /// No picture has longer sides \[pixels\].
 const LARGEST: usize = 2048;
 
 /// A grey image with rays drawn on it.
-pub(crate) struct Drawing {
+#[derive(Debug, Clone)]
+pub struct Drawing {
     picture: RgbImage,
     factor: f32,
 }
 
 impl Drawing {
     /// The image, darkest pixel black, the brightest hundredth white; large ones smaller.
-    pub(crate) fn new(image: &Grey) -> Self {
+    #[must_use]
+    pub fn new(image: &GreyImage) -> Self {
         let factor = (LARGEST as f32 / image.rows.max(image.columns) as f32).min(1.0);
         // Bands, so that a large image never lies in memory as numbers.
         let band = ((8.0 / factor).ceil() as usize).max(1).next_multiple_of(64);
@@ -43,7 +46,7 @@ impl Drawing {
     }
 
     /// Draws a ray from its tip to its end, beside the line so that it stays to be seen, and a mark at the tip.
-    pub(crate) fn ray(&mut self, wake: &Wake, colour: [u8; 3]) {
+    pub fn ray(&mut self, wake: &Wake, colour: [u8; 3]) {
         let [right, down] = wake.direction();
         let aside = 9.0;
         for side in [-aside, aside] {
@@ -59,6 +62,16 @@ impl Drawing {
             [x + aside * down, y - aside * right],
             colour,
         );
+    }
+
+    /// Draws what was found, the surest last and reddest, unsure ones toward yellow.
+    ///
+    /// - `found`: the surest first
+    pub fn found<'a>(&mut self, found: impl DoubleEndedIterator<Item = &'a Detection>) {
+        for one in found.rev() {
+            let green = (255.0 * (1.0 - one.score.min(1.0))) as u8;
+            self.ray(&one.wake, [255, green, 0]);
+        }
     }
 
     fn line(&mut self, from: [f32; 2], to: [f32; 2], colour: [u8; 3]) {
@@ -81,13 +94,16 @@ impl Drawing {
         }
     }
 
-    pub(crate) fn into_picture(self) -> RgbImage {
+    /// The picture.
+    #[must_use]
+    pub fn into_picture(self) -> RgbImage {
         self.picture
     }
 }
 
 /// Pictures of one size beside and below each other.
-pub(crate) fn sheet(pictures: &[RgbImage], columns: usize) -> RgbImage {
+#[must_use]
+pub fn sheet(pictures: &[RgbImage], columns: usize) -> RgbImage {
     let (width, height) = pictures.first().map_or((1, 1), RgbImage::dimensions);
     let rows = pictures.len().div_ceil(columns) as u32;
     let mut sheet = RgbImage::new(width * columns as u32, height * rows);
@@ -104,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_ray_is_drawn_beside_its_line_and_nothing_outside_the_picture() {
-        let mut drawing = Drawing::new(&Grey::from_levels(40, 60, &[7.0; 2400]));
+        let mut drawing = Drawing::new(&GreyImage::from_levels(40, 60, &[7.0; 2400]));
         let wake = Wake {
             tip: [30.0, 20.0],
             axis_deg: 90.0,

@@ -8,7 +8,8 @@ use wake_ldm::dataset::{Grey, Pair, Simulated, Source};
 use wake_physics::labels::WakeLabel;
 use wake_physics::labels_of;
 
-use super::sample::{Draw, wakes};
+use super::draw::Draw;
+use super::sample::wakes;
 use super::sea::{Echoes, border, clutter, front};
 
 /// Scenes of which the first with a clear wake is simulated, at every other position.

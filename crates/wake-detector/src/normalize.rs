@@ -125,10 +125,10 @@ pub(crate) fn inputs(contrast: f32) -> [f32; 2] {
     ]
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
-    use crate::sample::Draw;
+    use crate::train::draw::Draw;
 
     fn noise(rows: usize, columns: usize) -> Vec<f32> {
         let mut draw = Draw::new(2, 0);

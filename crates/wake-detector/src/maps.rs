@@ -1,45 +1,7 @@
 //! Maps of the network become wakes.
 
-use super::network::{ANGLE_UNIT, LENGTH_UNIT, Map, OUTPUTS, STRIDE};
-use super::sample::{Wake, angle_of, direction};
-
-/// A wake that was found, in pixels of the image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Detection {
-    /// Near 0: sea; near 1: a wake.
-    pub(crate) score: f32,
-    /// Tip, axis, half-angle and visible length; its signal-to-noise is unknown, so infinite.
-    pub(crate) wake: Wake,
-}
-
-/// Half the width of a box at least \[pixels\]: that of the line itself.
-const LEAST_HALF_WIDTH: f32 = 8.0;
-
-impl Detection {
-    /// Corners (column, row) of the box from the tip to the end of what is visible, as wide as the outer edges are
-    /// apart at half the length: to the left of the tip, to its right, and the end.
-    pub(crate) fn oriented_box(&self) -> [[f32; 2]; 4] {
-        oriented_box(&self.wake)
-    }
-}
-
-/// The box of [`Detection::oriented_box`].
-pub(crate) fn oriented_box(wake: &Wake) -> [[f32; 2]; 4] {
-    let opening = wake.half_angle_deg.clamp(0.0, 30.0).to_radians().tan();
-    let half = (0.5 * wake.length * opening).max(LEAST_HALF_WIDTH);
-    let [right, down] = wake.direction();
-    let corner = |along: f32, across: f32| {
-        let [x, y] = wake.at(along);
-        [x - across * down, y + across * right]
-    };
-    [
-        (0.0, -half),
-        (0.0, half),
-        (wake.length, half),
-        (wake.length, -half),
-    ]
-    .map(|(a, c)| corner(a, c))
-}
+use crate::network::{ANGLE_UNIT, LENGTH_UNIT, Map, OUTPUTS, STRIDE};
+use crate::wake::{Detection, Wake, angle_of, direction};
 
 /// Maps of one image, `[OUTPUTS, rows, columns]`; the first two hold probabilities.
 #[derive(Debug, Clone)]
@@ -341,22 +303,5 @@ mod tests {
         let order = found(tied);
         assert_eq!(order, found(turned));
         assert_eq!(order[0].wake.tip, [50.0, 10.0]);
-    }
-
-    #[test]
-    fn a_box_is_as_long_as_the_wake() {
-        let detection = Detection {
-            score: 1.0,
-            wake: wake([10.0, 20.0], 90.0),
-        };
-        let corners = detection.oriented_box();
-        let expected = [[10.0, 12.0], [10.0, 28.0], [130.0, 28.0], [130.0, 12.0]];
-        for (a, b) in corners.iter().zip(expected) {
-            // Half the opening of 4° over 60 pixels is 4.2, below the least half-width of 8.
-            assert!(
-                (a[0] - b[0]).abs() < 1e-3 && (a[1] - b[1]).abs() < 1e-3,
-                "{corners:?}"
-            );
-        }
     }
 }

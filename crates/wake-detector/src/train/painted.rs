@@ -1,8 +1,9 @@
 //! Painted images: a dark line, a bright streak beside it, a blob, correlated noise. No physics at all.
 
-use super::decode::oriented_box;
-use super::sample::{Draw, Sample, Wake, direction, pixel_snr};
+use super::draw::Draw;
+use super::sample::{Sample, pixel_snr};
 use super::sea::{Echoes, Speckle, border, clutter, mottle, quick_look};
+use crate::wake::{Wake, direction};
 use rayon::prelude::*;
 use std::ops::Range;
 use wake_ldm::dataset::{Grey, Pair, Source};
@@ -11,10 +12,11 @@ use wake_physics::labels::{LabelledShip, Labels, ShipLabel, Visibility, WakeLabe
 
 /// Images painted from a seed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Painted {
-    pub(crate) seed: u64,
+pub struct Painted {
+    /// Seed of all images.
+    pub seed: u64,
     /// Rows and columns.
-    pub(crate) size: usize,
+    pub size: usize,
 }
 
 impl Source for Painted {
@@ -50,7 +52,7 @@ impl Source for Painted {
 
 /// The label of a wake without a ship.
 fn label(wake: &Wake, size: usize) -> LabelledShip {
-    let corners = oriented_box(wake).map(|corner| corner.map(f64::from));
+    let corners = wake.oriented_box().map(|corner| corner.map(f64::from));
     let inside = wake
         .tip
         .iter()
@@ -84,7 +86,8 @@ fn label(wake: &Wake, size: usize) -> LabelledShip {
 
 impl Painted {
     /// Image number `index`, always the same one.
-    pub(crate) fn sample(&self, index: u64) -> Sample {
+    #[must_use]
+    pub fn sample(&self, index: u64) -> Sample {
         let draw = &mut Draw::new(self.seed, index);
         let size = self.size;
         let speckle = Speckle::draw(draw);

@@ -1,17 +1,17 @@
-//! What images show, by name.
+//! Images to learn from, by name.
 
 use std::sync::Arc;
 
-use burn::tensor::Device;
 use wake_ldm::WakeSampler;
 use wake_ldm::dataset::{Mixture, Recipe as SceneRecipe, Sampled, Simulated, Source};
+use wake_ldm::device_named;
 
 use super::cluttered::Cluttered;
-use super::paint::Painted;
+use super::painted::Painted;
 
 /// What the images of a training run, or of an evaluation, show.
-#[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Recipe {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recipe {
     /// Painted lines, streaks and blobs, no physics
     Painted,
     /// Simulated: X band over an open sea with at most one ship, at satellite pixels
@@ -50,8 +50,24 @@ const PLAIN: [&str; 5] = [
     "draw.radar.noise_floor = -60",
     "draw.radar.looks = [1, 8]",
 ];
+
 impl Recipe {
-    pub(crate) fn name(self) -> &'static str {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Painted,
+        Self::Plain,
+        Self::Echo,
+        Self::Edge,
+        Self::Detector,
+        Self::Cluttered,
+        Self::Sampled,
+        Self::Mixed,
+        Self::Full,
+    ];
+
+    /// Its name on the command line and in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
         match self {
             Self::Painted => "painted",
             Self::Plain => "plain",
@@ -65,12 +81,36 @@ impl Recipe {
         }
     }
 
+    /// What its images show, in a line.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Painted => "Painted lines, streaks and blobs, no physics",
+            Self::Plain => {
+                "Simulated: X band over an open sea with at most one ship, at satellite pixels"
+            }
+            Self::Echo => {
+                "Simulated: several sensors with their response and noise, and the ship's echo"
+            }
+            Self::Edge => "The same, and the edges of the turbulent wake",
+            Self::Detector => {
+                "The recipe detector: all that, gusts, swell, slicks, shallow water, several ships"
+            }
+            Self::Cluttered => {
+                "The same, clear wakes more often, under painted land, piers, streaks, fronts and borders"
+            }
+            Self::Sampled => "The recipe detector, drawn by the wake model",
+            Self::Mixed => "Painted and simulated images (detector) in turn",
+            Self::Full => "Painted and simulated images (cluttered) in turn",
+        }
+    }
+
     /// Images of `size` rows and columns.
     ///
     /// # Errors
     ///
     /// Of the recipe or the model; the wake model draws 256 rows and columns alone.
-    pub(crate) fn source(self, seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
+    pub fn source(self, seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
         let changes: [&[&str]; 3] = match self {
             Self::Plain => [&CALM, &NO_EDGE, &PLAIN],
             Self::Echo => [&CALM, &NO_EDGE, &[]],
@@ -81,7 +121,7 @@ impl Recipe {
             }
             Self::Painted => return Ok(Arc::new(Painted { seed, size })),
             Self::Sampled => {
-                let sampler = WakeSampler::pretrained(&Device::flex())?;
+                let sampler = WakeSampler::pretrained(&device_named("flex")?)?;
                 let scenes = simulated(&[], seed, size)?;
                 return Ok(Arc::new(Sampled::new(sampler, scenes)?));
             }
@@ -96,11 +136,7 @@ impl Recipe {
     /// # Errors
     ///
     /// Of the recipe.
-    pub(crate) fn open_sea(
-        plain: bool,
-        seed: u64,
-        size: usize,
-    ) -> wake_ldm::Result<Arc<dyn Source>> {
+    pub fn open_sea(plain: bool, seed: u64, size: usize) -> wake_ldm::Result<Arc<dyn Source>> {
         let changes: [&[&str]; 3] = match plain {
             true => [&CALM, &NO_EDGE, &PLAIN],
             false => [&[]; 3],

@@ -1,10 +1,11 @@
 //! The search of an image: tiles, scales, network, wakes.
 
-use super::decode::{Detection, Maps, same, without_repeats};
-use super::grey::{Grey, rescaled};
-use super::network::{MULTIPLE, STRIDE};
-use super::normalize;
-use super::sample::Wake;
+use crate::image::GreyImage;
+use crate::maps::{Maps, same, without_repeats};
+use crate::network::{MULTIPLE, STRIDE};
+use crate::normalize;
+use crate::scaling::rescaled;
+use crate::wake::{Detection, Wake};
 
 /// Something that gives maps of normalised images.
 pub(crate) trait Mapper: Sync {
@@ -36,7 +37,7 @@ pub(crate) struct Search {
 }
 
 /// The wakes of an image, the surest first; tips in pixels (column, row) from the centre of the first one.
-pub(crate) fn find(image: &Grey, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
+pub(crate) fn find(image: &GreyImage, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
     let in_tile = |tile: Tile| in_tile(image, &tile, mapper, search);
     without_repeats(
         Tile::all(image).into_iter().flat_map(in_tile).collect(),
@@ -83,7 +84,7 @@ pub(crate) struct Tile {
 
 impl Tile {
     /// The tiles of an image; a small one is one tile.
-    pub(crate) fn all(image: &Grey) -> Vec<Self> {
+    pub(crate) fn all(image: &GreyImage) -> Vec<Self> {
         let sides = [image.rows, image.columns];
         let columns = tiles(image.columns);
         let places = tiles(image.rows)
@@ -104,7 +105,7 @@ impl Tile {
     }
 
     /// Rows, columns and pixels of what is seen.
-    pub(crate) fn pixels(&self, image: &Grey) -> (usize, usize, Vec<f32>) {
+    pub(crate) fn pixels(&self, image: &GreyImage) -> (usize, usize, Vec<f32>) {
         let [begin, end] = self.seen;
         let [rows, columns] = [0, 1].map(|a| end[a] - begin[a]);
         (
@@ -144,7 +145,7 @@ fn tiles(size: usize) -> Vec<(usize, usize)> {
         .collect()
 }
 
-fn in_tile(image: &Grey, tile: &Tile, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
+fn in_tile(image: &GreyImage, tile: &Tile, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
     let (rows, columns, pixels) = tile.pixels(image);
     let at = |factor: f32| -> Vec<Detection> {
         let maps = at_scale(&pixels, rows, columns, factor, mapper);
@@ -228,14 +229,14 @@ fn at_scale(pixels: &[f32], rows: usize, columns: usize, factor: f32, mapper: &d
     maps.cut_to(rows.div_ceil(STRIDE), columns.div_ceil(STRIDE))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
-    use crate::model::Model;
+    use crate::Detector;
     use crate::network::{INPUTS, Map, OUTPUTS};
-    use crate::paint::Painted;
-    use crate::sample::Draw;
-    use crate::sea::Speckle;
+    use crate::train::Painted;
+    use crate::train::draw::Draw;
+    use crate::train::sea::Speckle;
     use burn::tensor::Device;
 
     /// Tips where a pixel is bright, each with a line toward the right.
@@ -313,7 +314,11 @@ mod tests {
             }
         }
         assert!(tiles(columns).len() > 1 && tiles(rows).len() > 1);
-        let found = find(&Grey::from_levels(rows, columns, &levels), &Bright, SEARCH);
+        let found = find(
+            &GreyImage::from_levels(rows, columns, &levels),
+            &Bright,
+            SEARCH,
+        );
         assert_eq!(found.len(), spots.len(), "{found:?}");
         for [x, y] in spots {
             let near =
@@ -337,24 +342,28 @@ mod tests {
     fn hard_images_are_searched() {
         let noise = |i: usize| ((i * 2_654_435_761) % 1009) as f32 / 4.0;
         for (rows, columns) in [(1, 1), (17, 4000), (5, 3), (64, 64)] {
-            let flat = Grey::from_levels(rows, columns, &vec![120.0; rows * columns]);
+            let flat = GreyImage::from_levels(rows, columns, &vec![120.0; rows * columns]);
             assert!(find(&flat, &Bright, SEARCH).is_empty());
             let levels: Vec<f32> = (0..rows * columns).map(noise).collect();
-            find(&Grey::from_levels(rows, columns, &levels), &Bright, SEARCH);
+            find(
+                &GreyImage::from_levels(rows, columns, &levels),
+                &Bright,
+                SEARCH,
+            );
         }
     }
 
     /// What is surely found in an image is found in the image turned by a quarter, too, by the shipped network.
     #[test]
     fn a_quarter_turn_turns_what_is_found() {
-        let model = Model::load(None, Device::flex()).expect("weights of the repository");
+        let model = Detector::pretrained(&Device::flex()).expect("weights of the repository");
         let source = Painted {
             seed: 77,
             size: 384,
         };
         let mut sure = 0;
         for index in 0..20 {
-            let image = Grey::from_levels(384, 384, &source.sample(index).pixels);
+            let image = GreyImage::from_levels(384, 384, &source.sample(index).pixels);
             let (upright, turned) = (
                 find(&image, &model, SEARCH),
                 find(&image.turned(), &model, SEARCH),

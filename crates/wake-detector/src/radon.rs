@@ -17,14 +17,15 @@
 
 use rayon::prelude::*;
 
-use super::decode::{Detection, without_repeats};
-use super::find::Tile;
-use super::grey::{Grey, rescaled};
-use super::normalize;
-use super::sample::{Wake, direction};
+use crate::image::GreyImage;
+use crate::maps::without_repeats;
+use crate::normalize;
+use crate::scaling::rescaled;
+use crate::search::Tile;
+use crate::wake::{Detection, Wake, direction};
 
 /// Expected false alarms an image, from the rays around targets and from all others each, at the threshold.
-pub(crate) const FALSE_ALARMS: f64 = 0.25;
+const FALSE_ALARMS: f64 = 0.25;
 
 /// The transform is taken of an image of half the size: speckle is nearly independent there.
 const FACTOR: f32 = 0.5;
@@ -177,7 +178,8 @@ type Sums = [Option<f32>; LENGTHS.len()];
 
 /// The wakes of an image, the surest first; the score is −log₁₀ of the expected number of such rays in an image of
 /// sea, beyond that of the threshold.
-pub(crate) fn find(image: &Grey) -> Vec<Detection> {
+#[must_use]
+pub fn find(image: &GreyImage) -> Vec<Detection> {
     let tiles = Tile::all(image);
     let found = tiles.iter().flat_map(|tile| {
         let (rows, columns, pixels) = tile.pixels(image);
@@ -308,10 +310,10 @@ fn log_tail(t: f64) -> f64 {
     ln / std::f64::consts::LN_10
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "train"))]
 mod tests {
     use super::*;
-    use crate::sample::Draw;
+    use crate::train::draw::Draw;
 
     /// Values of the two-sided normal tail: 0.3173105, 0.0455003, 5.7330e-7, 1.9732e-9 at 1, 2, 5, 6.
     #[test]
@@ -349,9 +351,9 @@ mod tests {
                     levels[r * size + c] = 255.0;
                 }
             };
-            alarms += find(&Grey::from_levels(size, size, &levels)).len();
+            alarms += find(&GreyImage::from_levels(size, size, &levels)).len();
             dark(&mut levels);
-            let found = find(&Grey::from_levels(size, size, &levels));
+            let found = find(&GreyImage::from_levels(size, size, &levels));
             let first = found.first().expect("the line").wake;
             // A line can be followed both ways; where it lies is what a sum along it tells.
             let [right, down] = first.direction();

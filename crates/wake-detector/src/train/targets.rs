@@ -3,12 +3,13 @@
 use burn::tensor::activation::{log_sigmoid, sigmoid};
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::network::{ANGLE_UNIT, INPUTS, LENGTH_UNIT, Map, STRIDE};
-use super::normalize;
-use super::sample::{Sample, Wake};
+use super::sample::Sample;
+use crate::network::{ANGLE_UNIT, INPUTS, LENGTH_UNIT, Map, STRIDE};
+use crate::normalize;
+use crate::wake::Wake;
 
 /// Wakes above this signal-to-noise are to be found; those below neither are, nor are they mistakes.
-pub(crate) const FOUND: f32 = 5.5;
+pub const FOUND: f32 = 5.5;
 /// Nobody can see wakes below this: they are sea.
 const UNSEEN: f32 = 2.0;
 /// Standard deviation of the hill around a tip \[cells\].

@@ -5,69 +5,108 @@
 //! share at least half of what they cover together. Detections are taken the surest first, one for a label; a second one
 //! on a label is a false alarm. One that fits an ignored label best is neither right nor wrong.
 
+use crate::wake::{Detection, Wake};
+
 /// Bounds of the rules: degrees, pixels, pixels, share.
 const TURN: f64 = 10.0;
 const TIP: f64 = 60.0;
 const LINE: f64 = 25.0;
 const SHARE: f64 = 0.5;
 
-pub(crate) type Point = [f64; 2];
+/// A place in an image: (column, row), whole numbers at the centres of pixels.
+pub type Point = [f64; 2];
 
 /// A ray and a box as the rules see them.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Ray {
-    pub(crate) tip: Point,
-    pub(crate) axis_deg: f64,
-    pub(crate) oriented_box: Option<[Point; 4]>,
+pub struct Ray {
+    /// Where the wake begins.
+    pub tip: Point,
+    /// From the tip along the wake [deg clockwise from the image's up].
+    pub axis_deg: f64,
+    /// Corners in order around it; the box rule passes over a ray without one.
+    pub oriented_box: Option<[Point; 4]>,
 }
 
 /// A wake that is known.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Label {
-    pub(crate) ray: Ray,
-    pub(crate) length: f64,
+pub struct Label {
+    /// Where it is.
+    pub ray: Ray,
+    /// How far it can be seen \[pixels\].
+    pub length: f64,
     /// Whether it counts; one that does not is ignored.
-    pub(crate) counts: bool,
+    pub counts: bool,
     /// Whether either end may be its tip.
-    pub(crate) ambiguous: bool,
+    pub ambiguous: bool,
 }
 
 /// Something that was found.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Found {
-    pub(crate) score: f64,
-    pub(crate) ray: Ray,
+pub struct Found {
+    /// The surer, the higher.
+    pub score: f64,
+    /// Where it is.
+    pub ray: Ray,
+}
+
+impl From<&Wake> for Ray {
+    fn from(wake: &Wake) -> Self {
+        let corners = wake.oriented_box();
+        Self {
+            tip: wake.tip.map(f64::from),
+            axis_deg: f64::from(wake.axis_deg),
+            oriented_box: Some(corners.map(|corner| corner.map(f64::from))),
+        }
+    }
+}
+
+impl From<&Detection> for Found {
+    fn from(one: &Detection) -> Self {
+        Self {
+            score: f64::from(one.score),
+            ray: Ray::from(&one.wake),
+        }
+    }
 }
 
 /// An image with what is known and what was found.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Judged {
-    pub(crate) columns: f64,
-    pub(crate) rows: f64,
-    pub(crate) labels: Vec<Label>,
-    pub(crate) found: Vec<Found>,
+pub struct Judged {
+    /// Number of columns.
+    pub columns: f64,
+    /// Number of rows.
+    pub rows: f64,
+    /// What is known.
+    pub labels: Vec<Label>,
+    /// What was found.
+    pub found: Vec<Found>,
 }
 
 /// By which rule detections are right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Rule {
+pub enum Rule {
+    /// Axes and tips.
     Ray,
+    /// What boxes share.
     Box,
 }
 
 /// Verdict on one detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Verdict {
-    /// Number of the image and of the detection in it.
-    pub(crate) image: usize,
-    pub(crate) detection: usize,
-    pub(crate) score: f64,
+pub struct Verdict {
+    /// Number of the image.
+    pub image: usize,
+    /// Number of the detection in it.
+    pub detection: usize,
+    /// Score of the detection.
+    pub score: f64,
     /// The label it found, if it is right.
-    pub(crate) label: Option<usize>,
+    pub label: Option<usize>,
 }
 
 /// The verdicts on all detections that are right or wrong, the surest first.
-pub(crate) fn verdicts(images: &[Judged], rule: Rule) -> Vec<Verdict> {
+#[must_use]
+pub fn verdicts(images: &[Judged], rule: Rule) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
     for (image, judged) in images.iter().enumerate() {
         let mut order: Vec<usize> = (0..judged.found.len()).collect();
@@ -115,16 +154,19 @@ pub(crate) fn verdicts(images: &[Judged], rule: Rule) -> Vec<Verdict> {
 
 /// Precision and recall of all detections down to each score.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Curve {
+pub struct Curve {
     /// Labels that count.
-    pub(crate) labels: usize,
-    pub(crate) images: usize,
+    pub labels: usize,
+    /// Images judged.
+    pub images: usize,
     /// Score, right ones and false alarms down to it; falling scores.
     steps: Vec<(f64, usize, usize)>,
 }
 
 impl Curve {
-    pub(crate) fn new(images: &[Judged], rule: Rule) -> Self {
+    /// The curve of some images.
+    #[must_use]
+    pub fn new(images: &[Judged], rule: Rule) -> Self {
         let mut steps: Vec<(f64, usize, usize)> = Vec::new();
         let (mut right, mut wrong) = (0, 0);
         for verdict in verdicts(images, rule) {
@@ -155,7 +197,8 @@ impl Curve {
     ///
     /// Everingham et al. (2010), "The Pascal Visual Object Classes (VOC) Challenge", in its later form over
     /// all steps of recall.
-    pub(crate) fn average_precision(&self) -> Option<f64> {
+    #[must_use]
+    pub fn average_precision(&self) -> Option<f64> {
         let labels = self.labels as f64;
         let mut best = 0.0f64;
         let mut area = 0.0;
@@ -168,7 +211,8 @@ impl Curve {
     }
 
     /// The largest recall with no more false alarms an image, and the score it takes.
-    pub(crate) fn recall_at(&self, false_alarms: f64) -> Option<(f64, f64)> {
+    #[must_use]
+    pub fn recall_at(&self, false_alarms: f64) -> Option<(f64, f64)> {
         let allowed = |&&(_, _, wrong): &&(f64, usize, usize)| {
             wrong as f64 <= false_alarms * self.images as f64
         };
@@ -181,7 +225,8 @@ impl Curve {
     }
 
     /// Right detections and false alarms in all.
-    pub(crate) fn totals(&self) -> (usize, usize) {
+    #[must_use]
+    pub fn totals(&self) -> (usize, usize) {
         self.steps.last().map_or((0, 0), |step| (step.1, step.2))
     }
 }
@@ -327,7 +372,7 @@ mod tests {
     /// Numbers of the scorer in Python on random labels and detections, ties and ignored ones among them.
     #[test]
     fn scores_are_those_of_the_scorer_in_python() {
-        let text = include_str!("../../tests/fixtures/own/detector_scores.json");
+        let text = include_str!("../../../tests/fixtures/own/detector_scores.json");
         let cases: Value = serde_json::from_str(text).expect("JSON");
         let cases = cases["cases"].as_array().expect("cases");
         assert!(cases.len() >= 8);

@@ -7,14 +7,15 @@ use wake_ldm::dataset::{Pair, Source};
 
 /// A source whose first pairs are made once, kept in memory, and given again after the last.
 #[derive(Debug)]
-pub(crate) struct Repeated {
+pub struct Repeated {
     source: Arc<dyn Source>,
     kept: Vec<OnceLock<Pair>>,
 }
 
 impl Repeated {
     /// The first `count` pairs, at least one.
-    pub(crate) fn new(source: Arc<dyn Source>, count: usize) -> Self {
+    #[must_use]
+    pub fn new(source: Arc<dyn Source>, count: usize) -> Self {
         let kept = (0..count.max(1)).map(|_| OnceLock::new()).collect();
         Self { source, kept }
     }
@@ -54,7 +55,7 @@ impl Source for Repeated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::paint::Painted;
+    use crate::train::Painted;
 
     /// Whatever is asked for first, and across the end.
     #[test]

@@ -1,6 +1,7 @@
 //! What satellite images add to the mean of a scene: mottle, fronts, correlated speckle, ships, clutter, eight bits.
 
-use super::sample::{Draw, direction};
+use super::draw::Draw;
+use crate::wake::direction;
 
 /// Speckle of an image: relative spread, and how far it is correlated.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,84 @@
+//! The one error type of this crate.
+
+use std::path::PathBuf;
+
+/// Neither side of an image is longer \[pixels\].
+pub(crate) const LONGEST_SIDE: usize = 20_000;
+/// No file is longer \[bytes\].
+pub(crate) const LONGEST_FILE: u64 = 2_000_000_000;
+/// An image takes no more memory while it is read \[bytes\]: 20,000 × 20,000 pixels of 16 bits, and as much again.
+pub(crate) const MOST_MEMORY: u64 = 1_800_000_000;
+
+/// What a fallible function of this crate returns.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why an image could not be read, or a network not be loaded or trained.
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message names every field")]
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file that is no image.
+    #[error(
+        "{} is no image that can be read ({why}); give a PNG, JPEG or TIFF file of 8 or 16 bits",
+        path.display()
+    )]
+    Unreadable { path: PathBuf, why: String },
+
+    /// A file too long to be read.
+    #[error("{} has {bytes} bytes, above {LONGEST_FILE}; cut it into pieces", path.display())]
+    FileTooLong { path: PathBuf, bytes: u64 },
+
+    /// An image with too many pixels a side, or none.
+    #[error(
+        "{} has {columns} x {rows} pixels, outside 1 to {LONGEST_SIDE} a side; cut it into pieces",
+        path.display()
+    )]
+    TooLarge {
+        path: PathBuf,
+        columns: u32,
+        rows: u32,
+    },
+
+    /// An image that takes too much memory while it is read.
+    #[error(
+        "{} takes {bytes} bytes, above {MOST_MEMORY}; convert it to grey of 8 or 16 bits",
+        path.display()
+    )]
+    TooMuchMemory { path: PathBuf, bytes: u64 },
+
+    /// Levels that do not fill an image of the stated size.
+    #[error(
+        "an image of {rows} x {columns} pixels was given {levels} levels; give one for each pixel, and at least one"
+    )]
+    WrongSize {
+        rows: usize,
+        columns: usize,
+        levels: usize,
+    },
+
+    /// A number outside the closed range in which it means something.
+    #[error("{name} is {value}, outside [{min}, {max}]")]
+    OutOfRange {
+        name: &'static str,
+        value: f64,
+        min: f64,
+        max: f64,
+    },
+
+    /// What loading weights, making images and training find wrong.
+    #[error(transparent)]
+    Model(#[from] wake_ldm::Error),
+}
+
+/// Checks a number against a closed range; what is not a number lies outside.
+pub(crate) fn check_range(name: &'static str, value: f32, min: f32, max: f32) -> Result<()> {
+    match (min..=max).contains(&value) {
+        true => Ok(()),
+        false => Err(Error::OutOfRange {
+            name,
+            value: value.into(),
+            min: min.into(),
+            max: max.into(),
+        }),
+    }
+}

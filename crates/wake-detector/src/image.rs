@@ -1,0 +1,274 @@
+//! Grey images.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
+
+use crate::error::{Error, LONGEST_FILE, LONGEST_SIDE, MOST_MEMORY, Result};
+
+/// Levels as the file has them: a large image takes no more memory than it must.
+#[derive(Debug, Clone)]
+enum Levels {
+    Eight(Vec<u8>),
+    Sixteen(Vec<u16>),
+}
+
+/// A grey image of 8 or 16 bits.
+#[derive(Debug, Clone)]
+pub struct GreyImage {
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
+    levels: Levels,
+}
+
+impl GreyImage {
+    /// Reads a PNG, JPEG or TIFF file; colours become grey.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Unreadable`] for what is no image, [`Error::FileTooLong`], [`Error::TooLarge`] and [`Error::TooMuchMemory`] for one
+    /// that is too large; that is found out before the pixels are read.
+    pub fn read(path: &Path) -> Result<Self> {
+        let unreadable = |why: String| Error::Unreadable {
+            path: path.to_owned(),
+            why: why.replace('\n', " "),
+        };
+        let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
+        let bytes = file
+            .metadata()
+            .map_err(|error| unreadable(error.to_string()))?
+            .len();
+        if bytes > LONGEST_FILE {
+            return Err(Error::FileTooLong {
+                path: path.to_owned(),
+                bytes,
+            });
+        }
+        let wrong = |error: ImageError| unreadable(error.to_string());
+        let mut reader = ImageReader::new(BufReader::new(file))
+            .with_guessed_format()
+            .map_err(|error| unreadable(error.to_string()))?;
+        let mut limits = Limits::no_limits();
+        limits.max_alloc = Some(MOST_MEMORY);
+        reader.limits(limits);
+        let decoder = reader.into_decoder().map_err(wrong)?;
+        let (columns, rows) = decoder.dimensions();
+        let allowed = 1..=LONGEST_SIDE as u32;
+        if !allowed.contains(&columns) || !allowed.contains(&rows) {
+            return Err(Error::TooLarge {
+                path: path.to_owned(),
+                columns,
+                rows,
+            });
+        }
+        let bytes = decoder.total_bytes();
+        if bytes > MOST_MEMORY {
+            return Err(Error::TooMuchMemory {
+                path: path.to_owned(),
+                bytes,
+            });
+        }
+        let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
+        let levels = match image {
+            DynamicImage::ImageLuma16(image) => Levels::Sixteen(image.into_raw()),
+            image if image.color().bytes_per_pixel() > image.color().channel_count() => {
+                Levels::Sixteen(image.into_luma16().into_raw())
+            }
+            image => Levels::Eight(image.into_luma8().into_raw()),
+        };
+        Ok(Self {
+            rows: rows as usize,
+            columns: columns as usize,
+            levels,
+        })
+    }
+
+    /// An image of 8 bits from its levels, row by row.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::WrongSize`] when they do not fill it, or it has no pixels.
+    pub fn eight_bits(rows: usize, columns: usize, levels: Vec<u8>) -> Result<Self> {
+        Self::of(rows, columns, levels.len(), Levels::Eight(levels))
+    }
+
+    /// An image of 16 bits from its levels, row by row.
+    ///
+    /// # Errors
+    ///
+    /// As [`eight_bits`](Self::eight_bits).
+    pub fn sixteen_bits(rows: usize, columns: usize, levels: Vec<u16>) -> Result<Self> {
+        Self::of(rows, columns, levels.len(), Levels::Sixteen(levels))
+    }
+
+    fn of(rows: usize, columns: usize, count: usize, levels: Levels) -> Result<Self> {
+        match count > 0 && rows.checked_mul(columns) == Some(count) {
+            true => Ok(Self {
+                rows,
+                columns,
+                levels,
+            }),
+            false => Err(Error::WrongSize {
+                rows,
+                columns,
+                levels: count,
+            }),
+        }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// A rectangle as numbers, row by row.
+    ///
+    /// # Panics
+    ///
+    /// If it does not lie in the image.
+    #[must_use]
+    pub fn window(&self, top: usize, left: usize, rows: usize, columns: usize) -> Vec<f32> {
+        let mut window = Vec::with_capacity(rows * columns);
+        for row in top..top + rows {
+            let place = row * self.columns + left..row * self.columns + left + columns;
+            match &self.levels {
+                Levels::Eight(levels) => window.extend(levels[place].iter().map(|&x| f32::from(x))),
+                Levels::Sixteen(levels) => {
+                    window.extend(levels[place].iter().map(|&x| f32::from(x)));
+                }
+            }
+        }
+        window
+    }
+
+    /// Levels from 0 to 255, rounded to eight bits.
+    ///
+    /// # Panics
+    ///
+    /// When there are not `rows · columns` of them.
+    #[cfg(any(test, feature = "train"))]
+    pub(crate) fn from_levels(rows: usize, columns: usize, levels: &[f32]) -> Self {
+        assert_eq!(levels.len(), rows * columns, "pixels of an image");
+        let levels = levels.iter().map(|x| x.round().clamp(0.0, 255.0) as u8);
+        Self {
+            rows,
+            columns,
+            levels: Levels::Eight(levels.collect()),
+        }
+    }
+
+    /// The image rotated by a quarter clockwise.
+    #[cfg(test)]
+    pub(crate) fn turned(&self) -> Self {
+        let turn = |value: &dyn Fn(usize, usize) -> f32| -> Vec<f32> {
+            let places = (0..self.columns).flat_map(|r| (0..self.rows).map(move |c| (r, c)));
+            places.map(|(r, c)| value(self.rows - 1 - c, r)).collect()
+        };
+        let window = self.window(0, 0, self.rows, self.columns);
+        let levels = turn(&|row, column| window[row * self.columns + column]);
+        Self::from_levels(self.columns, self.rows, &levels)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixteen_bits_keep_their_levels() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        let image = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(5, 3, |x, y| {
+            image::Luma([(1000 * x + y) as u16])
+        });
+        image.save(&path).expect("a file");
+        let grey = GreyImage::read(&path).expect("an image");
+        assert_eq!((grey.rows, grey.columns), (3, 5));
+        assert_eq!(
+            grey.window(1, 2, 2, 3),
+            [2001.0, 3001.0, 4001.0, 2002.0, 3002.0, 4002.0]
+        );
+        // A quarter clockwise: the first column becomes the first row, its last pixel first.
+        let turned = GreyImage::from_levels(2, 3, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).turned();
+        assert_eq!(turned.window(0, 0, 3, 2), [4.0, 1.0, 5.0, 2.0, 6.0, 3.0]);
+    }
+
+    #[test]
+    fn levels_must_fill_the_image() {
+        assert!(GreyImage::eight_bits(2, 3, vec![7; 6]).is_ok());
+        for (rows, columns, count) in [(2, 3, 5), (0, 3, 0), (usize::MAX, 2, 4)] {
+            let refused = GreyImage::sixteen_bits(rows, columns, vec![7; count]);
+            let sentence = refused.expect_err("too few").to_string();
+            assert!(sentence.contains(&format!("{count} levels")), "{sentence}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused_in_one_sentence() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        let refusal = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).expect("a file");
+            GreyImage::read(&path).expect_err("no image").to_string()
+        };
+        let mut good = Vec::new();
+        image::GrayImage::new(40, 40)
+            .write_to(
+                &mut std::io::Cursor::new(&mut good),
+                image::ImageFormat::Png,
+            )
+            .expect("a PNG");
+        for bytes in [
+            &b""[..],
+            b"not an image",
+            &good[..good.len() / 2],
+            &good[..20],
+        ] {
+            let sentence = refusal(bytes);
+            assert!(
+                sentence.contains("a.png") && sentence.contains("PNG") && !sentence.contains('\n'),
+                "{sentence}"
+            );
+        }
+        // A header that claims 30,000 x 30,000 pixels; the sum over it is that of the claim.
+        let mut claims = good.clone();
+        claims[16..20].copy_from_slice(&30_000u32.to_be_bytes());
+        claims[20..24].copy_from_slice(&30_000u32.to_be_bytes());
+        let sum = crc(&claims[12..29]);
+        claims[29..33].copy_from_slice(&sum.to_be_bytes());
+        let sentence = refusal(&claims);
+        assert!(
+            sentence.contains("30000 x 30000") && sentence.contains("20000"),
+            "{sentence}"
+        );
+        // A file of more than two billion bytes, without a byte on the disk.
+        File::create(&path)
+            .and_then(|file| file.set_len(LONGEST_FILE + 1))
+            .expect("a file");
+        let sentence = GreyImage::read(&path).expect_err("too long").to_string();
+        assert!(sentence.contains("2000000001 bytes"), "{sentence}");
+    }
+
+    /// The cyclic redundancy check of PNG, bit by bit.
+    fn crc(bytes: &[u8]) -> u32 {
+        let step = |crc: u32, _| {
+            if crc & 1 == 1 {
+                (crc >> 1) ^ 0xEDB8_8320
+            } else {
+                crc >> 1
+            }
+        };
+        !bytes.iter().fold(u32::MAX, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), step)
+        })
+    }
+}

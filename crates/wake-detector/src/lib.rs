@@ -1,0 +1,28 @@
+#![doc = include_str!("../README.md")]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod error;
+mod image;
+mod normalize;
+mod scaling;
+mod wake;
+
+mod network;
+
+mod maps;
+mod search;
+
+mod detector;
+
+pub mod drawing;
+pub mod radon;
+pub mod score;
+
+#[cfg(feature = "train")]
+pub mod train;
+
+pub use burn;
+pub use detector::Detector;
+pub use error::{Error, Result};
+pub use image::GreyImage;
+pub use wake::{Detection, Wake};
