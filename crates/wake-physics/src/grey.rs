@@ -1,6 +1,7 @@
 //! The mappings between backscatter and grey.
 
 use serde::{Deserialize, Serialize};
+use std::f64::consts::LN_10;
 
 use crate::error::{Error, Result};
 
@@ -133,7 +134,7 @@ impl GreyScale {
         let [dark, bright] = self.ends();
         let value = dark + grey * (bright - dark);
         match self.mapping {
-            Mapping::Decibel => 10f64.powf(0.1 * value),
+            Mapping::Decibel => (0.1 * LN_10 * value).exp(),
             Mapping::Amplitude => value.max(0.0).powi(2),
         }
     }
@@ -142,7 +143,7 @@ impl GreyScale {
     #[must_use]
     pub fn slope(&self, sigma0: f64) -> f64 {
         let by_value = match self.mapping {
-            Mapping::Decibel => 10.0 / std::f64::consts::LN_10,
+            Mapping::Decibel => 10.0 / LN_10,
             Mapping::Amplitude => 0.5 * sigma0.max(0.0).sqrt(),
         };
         let [dark, bright] = self.ends();

@@ -1,7 +1,7 @@
-//! Activations that burn lacks.
+//! Activations: burn's formulas, computed by kernels of our own on burn's CPU backend.
 
 use burn::tensor::Tensor;
-use burn::tensor::activation::{gelu as fused_gelu, sigmoid};
+use burn::tensor::activation::{gelu as fused_gelu, sigmoid, silu as fused_silu};
 
 /// The activation between the two matrices of a transformer's feed-forward layer.
 #[derive(burn::config::Config, Debug, Copy, PartialEq, Eq)]
@@ -22,6 +22,23 @@ impl Activation {
     }
 }
 
+/// Sigmoid linear unit.
+///
+/// ```text
+/// y = x · σ(x)
+/// ```
+///
+/// # References
+///
+/// Hendrycks & Gimpel (2016), "Gaussian Error Linear Units", section 4.
+pub fn silu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    #[cfg(feature = "flex")]
+    if let Some(y) = native::map(&x, Curve::Swish(1.0)) {
+        return y;
+    }
+    fused_silu(x)
+}
+
 /// Sigmoid approximation of the Gaussian error linear unit.
 ///
 /// ```text
@@ -32,6 +49,10 @@ impl Activation {
 ///
 /// Hendrycks & Gimpel (2016), "Gaussian Error Linear Units", section 2.
 pub fn quick_gelu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    #[cfg(feature = "flex")]
+    if let Some(y) = native::map(&x, Curve::Swish(1.702)) {
+        return y;
+    }
     sigmoid(x.clone() * 1.702) * x
 }
 
@@ -48,8 +69,89 @@ pub fn quick_gelu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
 ///
 /// Hendrycks & Gimpel (2016), "Gaussian Error Linear Units", section 2.
 pub fn gelu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    #[cfg(feature = "flex")]
+    if let Some(y) = native::map(&x, Curve::Gelu) {
+        return y;
+    }
     if !x.is_autodiff() {
         return fused_gelu(x);
     }
     ((x.clone() * std::f64::consts::FRAC_1_SQRT_2).erf() + 1.0) * x * 0.5
+}
+
+/// The gate of a feed-forward layer.
+///
+/// ```text
+/// y = a ⊙ gelu(b),   x = (a, b)
+/// ```
+///
+/// # Shapes
+///
+/// `[batch, tokens, 2 · inner]` to `[batch, tokens, inner]`
+///
+/// # References
+///
+/// Shazeer (2020), "GLU Variants Improve Transformer", Eq. 6 (GEGLU).
+pub(super) fn geglu(x: Tensor<3>) -> Tensor<3> {
+    let inner = x.dims()[2] / 2;
+    #[cfg(feature = "flex")]
+    if let Some(y) = native::gate(&x, inner) {
+        return y;
+    }
+    let gate = gelu(x.clone().narrow(2, inner, inner));
+    x.narrow(2, 0, inner) * gate
+}
+
+#[cfg(feature = "flex")]
+use crate::nn::kernels::pointwise::Curve;
+
+#[cfg(feature = "flex")]
+mod native {
+    use super::*;
+    use crate::nn::kernels::pointwise;
+    use crate::nn::operation::{Operation, apply};
+
+    /// `None` where the tensor is elsewhere.
+    pub(super) fn map<const D: usize>(x: &Tensor<D>, curve: Curve) -> Option<Tensor<D>> {
+        apply(curve, [x.clone().into_dispatch()], x.dims())
+    }
+
+    /// `None` where the tensor is elsewhere.
+    pub(super) fn gate(x: &Tensor<3>, inner: usize) -> Option<Tensor<3>> {
+        let [batch, tokens, _] = x.dims();
+        apply(
+            Gate { inner },
+            [x.clone().into_dispatch()],
+            [batch, tokens, inner],
+        )
+    }
+
+    impl Operation<1> for Curve {
+        type Saved = ();
+
+        fn forward(&self, [x]: [&[f32]; 1]) -> (Vec<f32>, ()) {
+            (pointwise::map(x, *self), ())
+        }
+
+        fn gradients(&self, [x]: [&[f32]; 1], (): &(), dy: &[f32], _: [bool; 1]) -> [Vec<f32>; 1] {
+            [pointwise::map_gradient(x, dy, *self)]
+        }
+    }
+
+    #[derive(Debug, Clone, Copy)]
+    struct Gate {
+        inner: usize,
+    }
+
+    impl Operation<1> for Gate {
+        type Saved = ();
+
+        fn forward(&self, [x]: [&[f32]; 1]) -> (Vec<f32>, ()) {
+            (pointwise::gate(x, self.inner), ())
+        }
+
+        fn gradients(&self, [x]: [&[f32]; 1], (): &(), dy: &[f32], _: [bool; 1]) -> [Vec<f32>; 1] {
+            [pointwise::gate_gradient(x, dy, self.inner)]
+        }
+    }
 }

@@ -4,7 +4,7 @@ use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
-use super::activation::gelu;
+use super::activation::geglu;
 
 /// Widens every token to four times its channels, gates, and narrows again.
 ///
@@ -40,9 +40,6 @@ impl FeedForward {
     ///
     /// `[batch, tokens, channels]`, in and out.
     pub fn forward(&self, x: Tensor<3>) -> Tensor<3> {
-        let wide = self.proj.forward(x);
-        let inner = wide.dims()[2] / 2;
-        let gate = gelu(wide.clone().narrow(2, inner, inner));
-        self.out.forward(wide.narrow(2, 0, inner) * gate)
+        self.out.forward(geglu(self.proj.forward(x)))
     }
 }

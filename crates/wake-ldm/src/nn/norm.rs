@@ -1,9 +1,9 @@
 //! Group normalisation that stays finite in half precision.
 
 use burn::module::{Initializer, Module, Param};
-use burn::tensor::activation::silu;
 use burn::tensor::{DType, Device, Tensor};
 
+use super::activation::silu;
 use super::{cast_to, is_half};
 
 /// Normalises groups of channels to mean 0 and variance 1, then scales and shifts each channel.

@@ -2,8 +2,9 @@
 
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
-use burn::tensor::activation::silu;
 use burn::tensor::{Device, Tensor};
+
+use super::activation::silu;
 
 /// Waves of the step number, from period 2π down to 2π · 10⁴.
 ///

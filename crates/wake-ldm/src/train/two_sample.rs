@@ -308,7 +308,7 @@ impl Network {
     ///
     /// `[batch, 1, rows, columns]` to `[batch]`
     fn forward(&self, x: Tensor<4>) -> Tensor<1> {
-        let x = burn::tensor::activation::silu(convolve(&self.first, x));
+        let x = crate::nn::activation::silu(convolve(&self.first, x));
         let mut x = self.norm.forward_silu(convolve(&self.second, x));
         for halving in &self.halvings {
             x = halving

@@ -7,10 +7,10 @@ use std::path::Path;
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
-use burn::tensor::activation::silu;
 use burn::tensor::{Device, Tensor};
 
 use crate::error::Result;
+use crate::nn::activation::silu;
 use crate::nn::cast_to;
 use crate::nn::conv::{conv3x3, convolve};
 use crate::nn::norm::GroupNorm;

@@ -48,7 +48,8 @@ pub struct LinearSea {
     columns: usize,
     /// Pixels of a period along both axes.
     period: usize,
-    /// √(P dkx dky) of each wave, `[columns, rows]` of the period, in the order of [`crate::fft`].
+    /// Root of the variance of each pair of waves ±k, by its one with kx ≥ 0: `[columns / 2 + 1, rows]` of the period, in the
+    /// order of [`crate::fft`].
     amplitudes: Vec<f32>,
 }
 
@@ -89,36 +90,37 @@ impl LinearSea {
         let along: Vec<f64> = (0..period)
             .map(|row| azimuth[row] * smear(wavenumber(row), resolution))
             .collect();
-        let mut amplitudes = wave_variances(&models.sea, period, spacing);
-        add_swell(models.swell.as_ref(), &mut amplitudes, (period, step));
+        let mut variances = wave_variances(&models.sea, period, spacing);
+        add_swell(models.swell.as_ref(), &mut variances, (period, step));
         let line = |(column, line): (usize, &mut [f32])| {
             let kx = wavenumber(column);
-            for (row, amplitude) in line.iter_mut().enumerate().filter(|(_, v)| **v > 0.0) {
+            for (row, variance) in line.iter_mut().enumerate().filter(|(_, v)| **v > 0.0) {
                 let share = (range[column] * along[row]).powi(2);
                 if share < LEAST_SHARE {
-                    *amplitude = 0.0;
+                    *variance = 0.0;
                     continue;
                 }
                 let k = [kx, wavenumber(row)];
-                let omega = angular_frequency(k[0].hypot(k[1]), models.sea.depth());
+                let omega =
+                    angular_frequency((k[0] * k[0] + k[1] * k[1]).sqrt(), models.sea.depth());
                 let modulation = transfer.at(k, omega).total() * modulated;
-                let variance = f64::from(*amplitude) * share * modulation.norm_sqr();
-                *amplitude = variance.sqrt() as f32;
+                let left = f64::from(*variance) * share * modulation.norm_sqr();
+                *variance = left as f32;
             }
         };
-        amplitudes.par_chunks_mut(period).enumerate().for_each(line);
+        variances.par_chunks_mut(period).enumerate().for_each(line);
         Ok(Self {
             rows,
             columns,
             period,
-            amplitudes,
+            amplitudes: pairs(&variances, period).map(f32::sqrt).collect(),
         })
     }
 
     /// Independent standard normal numbers that [`field`](Self::field) is made of.
     #[must_use]
     pub fn normals(&self) -> usize {
-        2 * self.period * self.period
+        2 * self.amplitudes.len()
     }
 
     /// One sea, relative intensity \[1\], `[rows, columns]` of the image; its opposite edges are independent.
@@ -131,20 +133,40 @@ impl LinearSea {
         let pairs = normals[..self.normals()].as_chunks::<2>().0;
         let waves = self.amplitudes.iter().zip(pairs);
         let waves = waves.map(|(&a, &[re, im])| Complex32::new(a * re, a * im));
-        self.sum(waves.collect(), [self.rows, self.columns])
+        self.sum(waves, [self.rows, self.columns])
     }
 
     /// Covariance \[1\] of two pixels by their distance in rows and columns, `[period, period]`, negative ones from the end.
     #[must_use]
     pub fn covariance(&self) -> Field {
         let waves = self.amplitudes.iter().map(|a| Complex32::new(a * a, 0.0));
-        self.sum(waves.collect(), [self.period; 2])
+        self.sum(waves, [self.period; 2])
     }
 
-    /// The real part of a sum of waves.
-    fn sum(&self, waves: Vec<Complex32>, size: [usize; 2]) -> Field {
+    /// The real part of a sum of waves with kx ≥ 0.
+    fn sum(&self, half: impl Iterator<Item = Complex32>, size: [usize; 2]) -> Field {
+        let mut waves = Vec::with_capacity(self.period * self.period);
+        waves.extend(half);
+        // The FFT passes over lines of nothing.
+        waves.resize(self.period * self.period, Complex32::default());
         real_sum(waves, [self.period; 2], size)
     }
+}
+
+/// Variances of the waves of a square lattice, those of k and −k together where kx > 0: the real parts of waves along both are alike.
+///
+/// # Shapes
+///
+/// `[period, period]` to `[period / 2 + 1, period]`
+fn pairs(variances: &[f32], period: usize) -> impl Iterator<Item = f32> {
+    (0..(period / 2 + 1) * period).map(move |n| {
+        let [line, row] = [n / period, n % period];
+        // The first line, and the last one of an even period, hold both already.
+        match 2 * line % period {
+            0 => variances[n],
+            _ => variances[n] + variances[(period - line) * period + (period - row) % period],
+        }
+    })
 }
 
 /// Adds the waves of a swell to variances along +k, all of its variance however few of them are near its peak.

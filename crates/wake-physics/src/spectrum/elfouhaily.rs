@@ -207,7 +207,9 @@ impl Elfouhaily {
         let to_two_and_half = |ratio: f64| ratio * ratio * ratio.sqrt();
         let long = 4.0 * to_two_and_half(c / self.peak_speed);
         let wind = 0.13 * self.friction_velocity / SLOWEST_SPEED;
-        (LN_2 / 4.0 + long + wind * to_two_and_half(SLOWEST_SPEED / c)).tanh()
+        let x = LN_2 / 4.0 + long + wind * to_two_and_half(SLOWEST_SPEED / c);
+        // tanh x, by one exponential: x is far enough from 0 that nothing is lost.
+        1.0 - 2.0 / ((2.0 * x).exp() + 1.0)
     }
 
     /// Spectral density Ψ(kx, ky) \[m⁴\], two-sided and even.

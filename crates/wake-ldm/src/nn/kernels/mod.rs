@@ -6,8 +6,10 @@
 pub(super) mod attention;
 pub(super) mod conv;
 pub(super) mod group_norm;
+pub(super) mod pointwise;
 mod product;
 mod silu;
+pub(super) mod squares;
 mod sum;
 mod tile;
 

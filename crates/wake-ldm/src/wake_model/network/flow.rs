@@ -2,11 +2,11 @@
 
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
-use burn::tensor::activation::silu;
 use burn::tensor::{DType, Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::known::Known;
+use crate::nn::activation::silu;
 use crate::nn::cast_to;
 use crate::nn::conv::{conv3x3, convolve};
 use crate::nn::patch::{depth_to_space, space_to_depth};

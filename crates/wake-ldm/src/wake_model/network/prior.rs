@@ -3,11 +3,11 @@
 use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::nn::{Linear, LinearConfig};
-use burn::tensor::activation::silu;
 use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::known::Known;
+use crate::nn::activation::silu;
 use crate::nn::cast_to;
 use crate::nn::conv::{conv1x1, convolve};
 use crate::wake_model::conditioning::{FEATURES, PLACES};
