@@ -6,13 +6,15 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use wake_ldm::sea_texture::{SeaFlow, SeaTexture};
-use wake_ldm::train::{Rate, Run, RunFolder, RunOptions, SeaPatches, SeaTask, TrainerOptions};
+use wake_ldm::train::{
+    Rate, Run, RunFolder, RunOptions, SeaPatches, SeaTask, Stage, TrainerOptions,
+};
 use wake_ldm::{device_named, fingerprint};
 use wake_physics::picture::Picture;
 
 use super::options::learning;
 use super::sea_images::{Half, SeaFile, list};
-use super::stage::Stage;
+use super::stage::train;
 use super::{exit, progress};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -116,11 +118,11 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         name: STAGE,
         out: &options.out,
         resume: options.resume,
-        every: options.every,
+        every: options.every as usize,
         steps: options.steps as usize,
         results: &[WEIGHTS, SHEET],
     };
-    stage.train(&mut folder, run, &task, show)
+    train(stage, &mut folder, run, &task, show)
 }
 
 fn name(file: &SeaFile) -> String {

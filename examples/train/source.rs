@@ -84,6 +84,11 @@ impl Source {
         self.pairs.items(positions)
     }
 
+    /// Where they come from.
+    pub(crate) fn pairs(&self) -> &dyn dataset::Source {
+        self.pairs.as_ref()
+    }
+
     /// Number of pairs.
     pub(crate) fn len(&self) -> u64 {
         self.count

@@ -6,34 +6,30 @@ use std::sync::Arc;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
-use rayon::prelude::*;
 use serde_json::{Value, json};
-use wake_ldm::conditioning::{Vocabulary, tokens};
+use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::dataset::{Folder, Pair, Prompts, Recipe, Simulated};
 use wake_ldm::network::{
-    Domain, Flow, Foreseen, PatchTransform, Prior, PromptParser, Shares, WakeModel,
-    WakeModelConfig, expected_grey,
+    Domain, Flow, Foreseen, PatchTransform, Prior, PromptParser, Shares, WakeModel, WakeModelConfig,
 };
-use wake_ldm::train::{Checkpoint, FlowTask, LatentSet, PriorTask, Run, RunFolder, WordsTask};
+use wake_ldm::train::{
+    Checkpoint, FlowTask, LatentSet, PriorTask, Run, RunFolder, Stage, WordsTask, fit_patches,
+};
 use wake_ldm::weights::{Layout, Precision, load, save_as};
 use wake_ldm::{WakeSampler, fingerprint};
-use wake_physics::grey::GreyScale;
 use wake_physics::{Scene, available_memory, output};
-use wake_text::Wording;
 
 use super::exit;
 use super::options::Options;
 use super::progress;
 use super::sheet::sheet;
 use super::source::Source;
-use super::stage::Stage;
+use super::stage::train;
 
 pub(crate) type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// Images that the patch transform is fitted to.
 const FITTED: u64 = 400;
-/// Images read or simulated at the same time.
-const AT_ONCE: usize = 64;
 /// Images in a row of a sheet.
 const ACROSS: u64 = 8;
 /// Examples of a batch and the largest step of the optimizer by default.
@@ -42,10 +38,6 @@ const USUAL: [(&str, (u16, f64)); 3] = [
     ("mean", (32, 2e-3)),
     ("diffusion", (8, 1e-3)),
 ];
-/// The patch transform is fitted to what images have beyond the expected ones, each brought to this deviation of grey, if it
-/// is not below the least.
-const DEVIATION: f32 = 0.05;
-const LEAST_DEVIATION: f32 = 1e-3;
 /// Names of what the stages write.
 const PATCHES: &str = "patches.safetensors";
 const PARSER: &str = "reader.safetensors";
@@ -140,11 +132,11 @@ impl<'a> Work<'a> {
             name: "words",
             out: &options.out,
             resume: options.resume,
-            every: options.every,
+            every: options.every as usize,
             steps,
             results: &[PARSER],
         };
-        stage.train(&mut self.folder, run, &task, show)
+        train(stage, &mut self.folder, run, &task, show)
     }
 
     fn mean(&mut self, options: &Options) -> Outcome<()> {
@@ -173,11 +165,11 @@ impl<'a> Work<'a> {
             name: "mean",
             out: &options.out,
             resume: options.resume,
-            every: options.every,
+            every: options.every as usize,
             steps,
             results: &[PRIOR],
         };
-        stage.train(&mut self.folder, run, &task, show)
+        train(stage, &mut self.folder, run, &task, show)
     }
 
     fn diffusion(&mut self, options: &Options) -> Outcome<()> {
@@ -233,11 +225,11 @@ impl<'a> Work<'a> {
             name: "diffusion",
             out: &options.out,
             resume: options.resume,
-            every: options.every,
+            every: options.every as usize,
             steps,
             results: &[FLOW, SHEET],
         };
-        stage.train(&mut self.folder, run, &task, show)
+        train(stage, &mut self.folder, run, &task, show)
     }
 
     /// What an earlier stage is told if its results are missing, older than its last checkpoint, or not done.
@@ -260,17 +252,9 @@ impl<'a> Work<'a> {
         let device = options.devices()?.remove(0);
         let count = source.len().min(FITTED);
         let bar = progress::bar(count, "images for the patch transform");
-        let mut images = Vec::new();
-        for first in (0..count).step_by(AT_ONCE) {
-            let pairs = source.items(first..count.min(first + AT_ONCE as u64))?;
-            bar.inc(pairs.len() as u64);
-            let left = pairs.into_par_iter().map(|pair| beyond(pair, &config.grey));
-            images.extend(left.collect::<wake_ldm::Result<Vec<_>>>()?);
-        }
+        let fitted = fit_patches(source.pairs(), count, config, &device, |n| bar.inc(n));
         bar.finish_and_clear();
-        let pixels = images.iter().map(Vec::as_slice);
-        let (transform, shares) =
-            PatchTransform::fit(pixels, config.image_size, config.latent_channels, &device);
+        let (transform, shares) = fitted?;
         let path = options.out.join(PATCHES);
         save_as(&transform, Layout::Diffusers, &path, Precision::F32)?;
         let rows: Vec<_> = (1..=64)
@@ -296,9 +280,8 @@ impl<'a> Work<'a> {
             return Ok(latents.clone());
         }
         let source = self.source()?;
-        // Two numbers of 16 bits for each of the latents of an image.
-        let each = 4 * self.config.latent_channels * self.config.latent_size().pow(2);
-        let (needed, free) = (source.len().saturating_mul(each as u64), available_memory());
+        let needed = LatentSet::bytes(&self.config, source.len());
+        let free = available_memory();
         if let Some(free) = free.filter(|&free| free < needed) {
             let [needed, free] = [needed, free].map(|bytes| bytes as f64 / (1u64 << 30) as f64);
             let count = source.len();
@@ -309,39 +292,13 @@ impl<'a> Work<'a> {
             .into());
         }
         let bar = progress::bar(source.len(), "pairs");
-        let mut set = LatentSet::default();
-        for first in (0..source.len()).step_by(AT_ONCE) {
-            let read = |pair: Pair| -> wake_ldm::Result<_> {
-                let Pair { image, scene, .. } = pair;
-                let foreseen = Foreseen::new(&scene, &self.config.grey, patches)?;
-                Ok((image.pixels, foreseen, scene))
-            };
-            let pairs = source.items(first..source.len().min(first + AT_ONCE as u64))?;
-            let count = pairs.len() as u64;
-            let pairs = pairs.into_par_iter().map(read);
-            set.extend(patches, pairs.collect::<wake_ldm::Result<_>>()?)?;
-            bar.inc(count);
-        }
+        let (count, config) = (source.len(), &self.config);
+        let set = LatentSet::of(source.pairs(), count, config, patches, |n| bar.inc(n));
         bar.finish_and_clear();
-        let set = Arc::new(set);
+        let set = Arc::new(set?);
         self.latents = Some(set.clone());
         Ok(set)
     }
-}
-
-/// What an image has beyond the expected one, brought to one deviation.
-fn beyond(pair: Pair, scale: &GreyScale) -> wake_ldm::Result<Vec<f32>> {
-    let expected = expected_grey(&pair.scene, scale)?;
-    let mut left = pair.image.pixels;
-    left.iter_mut()
-        .zip(&expected)
-        .for_each(|(grey, expected)| *grey -= expected);
-    let count = left.len() as f32;
-    let mean = left.iter().sum::<f32>() / count;
-    let variance = left.iter().map(|grey| (grey - mean).powi(2)).sum::<f32>() / count;
-    let factor = DEVIATION / variance.sqrt().max(LEAST_DEVIATION);
-    left.iter_mut().for_each(|grey| *grey *= factor);
-    Ok(left)
 }
 
 /// Writes a part of the model as it ships.
@@ -368,7 +325,7 @@ fn config(options: &Options) -> Outcome<WakeModelConfig> {
     };
     Ok(match file {
         Some(file) => WakeModelConfig::read(file)?,
-        None => trained(options, &vocabulary()?)?,
+        None => trained(options, &Vocabulary::of_wordings()?)?,
     })
 }
 
@@ -392,20 +349,6 @@ fn trained(options: &Options, vocabulary: &Vocabulary) -> wake_ldm::Result<WakeM
     (config.scene, config.grey) = (recipe.scene, recipe.grey);
     config.spacing = config.scene.grid.spacing;
     Ok(config)
-}
-
-/// What prompts about wakes can contain: the words of every wording, and every digit.
-fn vocabulary() -> Result<Vocabulary, wake_text::Error> {
-    let (ship, mut calm) = (Scene::default(), Scene::default());
-    calm.ships.clear();
-    calm.sea.wind_speed = 0.0;
-    let mut ids = tokens("0 1 2 3 4 5 6 7 8 9 .");
-    for scene in [ship, calm] {
-        for wording in Wording::ALL {
-            ids.extend(tokens(&wording.prompt(&scene)?));
-        }
-    }
-    Ok(Vocabulary::new(ids))
 }
 
 /// The mean images of some scenes.

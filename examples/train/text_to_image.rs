@@ -11,7 +11,7 @@ use wake_ldm::pipeline::{Pipeline, PipelineParts, Request};
 use wake_ldm::scheduler::SchedulerConfig;
 use wake_ldm::text::ClipTextConfig;
 use wake_ldm::train::{
-    AutoencoderTask, PromptedImages, PromptedLatents, Rate, Run, RunFolder, RunOptions,
+    AutoencoderTask, PromptedImages, PromptedLatents, Rate, Run, RunFolder, RunOptions, Stage,
     TextToImage, TextToImageTask, TrainerOptions,
 };
 use wake_ldm::unet::UNetConfig;
@@ -23,7 +23,7 @@ use super::options::learning;
 use super::progress;
 use super::sheet::sheet;
 use super::source::Source;
-use super::stage::Stage;
+use super::stage::train;
 use super::stages::Outcome;
 
 /// What is simulated without --data: the recipe `ranges` with the ship in the middle, of whose place prompts say nothing.
@@ -173,7 +173,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     };
     if folder.unfinished(AUTOENCODER, &[VAE])?.is_some() {
         let stage = stage(options, AUTOENCODER, options.autoencoder_steps, &folder);
-        stage.train(&mut folder, run, &task, show)?;
+        train(stage, &mut folder, run, &task, show)?;
     }
 
     let identity = json!({"data": identity, "vae": fingerprint(&options.out.join(VAE))?});
@@ -206,7 +206,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         Ok(pipeline.save(&options.out, Precision::F16)?)
     };
     let stage = stage(options, MODEL, options.steps, &folder);
-    stage.train(&mut folder, run, &task, show)
+    train(stage, &mut folder, run, &task, show)
 }
 
 /// How a stage runs: on from its last checkpoint, if that is asked for and there is one.
@@ -220,7 +220,7 @@ fn stage<'a>(
         name,
         out: &options.out,
         resume: options.resume && folder.checkpoints(name).is_dir(),
-        every: options.every,
+        every: options.every as usize,
         steps: steps as usize,
         results: match name {
             AUTOENCODER => &[VAE],

@@ -6,9 +6,18 @@ use half::f16;
 use rayon::prelude::*;
 use wake_physics::Scene;
 
+use crate::dataset::{Pair, Source};
 use crate::error::{Error, Result};
-use crate::network::{Foreseen, Known, PatchTransform, Prior};
+use crate::network::{
+    Foreseen, Known, PatchTransform, Prior, Shares, WakeModelConfig, expected_grey,
+};
 
+/// Images read or simulated at the same time.
+const AT_ONCE: u64 = 64;
+/// The patch transform is fitted to what images have beyond the expected ones, each brought to this deviation of grey, if it
+/// is not below the least.
+const DEVIATION: f32 = 0.05;
+const LEAST_DEVIATION: f32 = 1e-3;
 /// Examples whose residuals are computed at once.
 const RESIDUALS: usize = 8;
 
@@ -32,7 +41,86 @@ pub struct LatentSet {
     examples: Vec<Example>,
 }
 
+/// The patch transform that keeps most of what the first images of a source have beyond the expected ones, and what it keeps.
+///
+/// - `config`: shapes the transform, and has the mapping of grey that the images have
+/// - `done`: told a number of images when they were looked at
+///
+/// # Errors
+///
+/// As [`Source::items`], and [`Error::Scene`] for a scene that is not valid.
+pub fn fit_patches(
+    source: &dyn Source,
+    count: u64,
+    config: &WakeModelConfig,
+    device: &Device,
+    mut done: impl FnMut(u64),
+) -> Result<(PatchTransform, Shares)> {
+    let mut images = Vec::new();
+    for first in (0..count).step_by(AT_ONCE as usize) {
+        let pairs = source.items(first..count.min(first + AT_ONCE))?;
+        done(pairs.len() as u64);
+        let left = pairs.into_par_iter().map(|pair| beyond(pair, config));
+        images.extend(left.collect::<Result<Vec<_>>>()?);
+    }
+    let pixels = images.iter().map(Vec::as_slice);
+    let (size, channels) = (config.image_size, config.latent_channels);
+    Ok(PatchTransform::fit(pixels, size, channels, device))
+}
+
+/// What an image has beyond the expected one, brought to one deviation.
+fn beyond(pair: Pair, config: &WakeModelConfig) -> Result<Vec<f32>> {
+    let expected = expected_grey(&pair.scene, &config.grey)?;
+    let mut left = pair.image.pixels;
+    left.iter_mut()
+        .zip(&expected)
+        .for_each(|(grey, expected)| *grey -= expected);
+    let count = left.len() as f32;
+    let mean = left.iter().sum::<f32>() / count;
+    let variance = left.iter().map(|grey| (grey - mean).powi(2)).sum::<f32>() / count;
+    let factor = DEVIATION / variance.sqrt().max(LEAST_DEVIATION);
+    left.iter_mut().for_each(|grey| *grey *= factor);
+    Ok(left)
+}
+
 impl LatentSet {
+    /// The latents of the first pairs of a source, and what physics foresees of their scenes.
+    ///
+    /// - `done`: told a number of pairs when they are in the set
+    ///
+    /// # Errors
+    ///
+    /// As [`Source::items`] and [`extend`](Self::extend), and [`Error::Scene`] for a scene that is not valid.
+    pub fn of(
+        source: &dyn Source,
+        count: u64,
+        config: &WakeModelConfig,
+        patches: &PatchTransform,
+        mut done: impl FnMut(u64),
+    ) -> Result<Self> {
+        let mut set = Self::default();
+        for first in (0..count).step_by(AT_ONCE as usize) {
+            let read = |pair: Pair| -> Result<_> {
+                let Pair { image, scene, .. } = pair;
+                let foreseen = Foreseen::new(&scene, &config.grey, patches)?;
+                Ok((image.pixels, foreseen, scene))
+            };
+            let pairs = source.items(first..count.min(first + AT_ONCE))?;
+            let count = pairs.len() as u64;
+            let pairs = pairs.into_par_iter().map(read);
+            set.extend(patches, pairs.collect::<Result<_>>()?)?;
+            done(count);
+        }
+        Ok(set)
+    }
+
+    /// Memory that the latents of so many pairs take \[bytes\].
+    pub fn bytes(config: &WakeModelConfig, pairs: u64) -> u64 {
+        // Two numbers of 16 bits for each of the latents of an image.
+        let each = 4 * config.latent_channels * config.latent_size().pow(2);
+        pairs.saturating_mul(each as u64)
+    }
+
     /// Encodes images on all cores and adds them in order.
     ///
     /// - `pairs`: grey of a scene's pixels in rows, what physics says of the scene, and the scene

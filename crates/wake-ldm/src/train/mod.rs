@@ -23,6 +23,7 @@ mod fine_tune;
 mod text_to_image;
 mod folder;
 mod metrics;
+mod stage;
 
 // What can be told apart.
 mod two_sample;
@@ -30,11 +31,12 @@ mod two_sample;
 pub use checkpoint::{Checkpoint, Tensors};
 pub use fine_tune::{FineTune, FineTuneOptions, Frozen};
 pub use folder::RunFolder;
-pub use latents::{Example, LatentSet};
+pub use latents::{Example, LatentSet, fit_patches};
 pub use metrics::Metrics;
 pub use optimizer::{AdamOptions, Rate};
 pub use run::{Run, RunOptions, Task, Terms};
 pub use sea::{SeaPatches, SeaTask};
+pub use stage::Stage;
 pub use tasks::{FlowTask, PriorTask, WordsTask};
 pub use text_to_image::{
     AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,

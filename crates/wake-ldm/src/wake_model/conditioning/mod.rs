@@ -16,8 +16,6 @@ mod position_maps;
 mod statement;
 mod vocabulary;
 
-use wake_text::Tokenizer;
-
 pub use conditions::Conditions;
 pub(crate) use features::{FEATURES, features};
 pub use position_maps::MapGrid;
@@ -27,9 +25,4 @@ pub(crate) use position_maps::{PATCH, PLACES, places};
 pub(crate) use statement::QUANTITIES;
 #[cfg(feature = "train")]
 pub(crate) use statement::statement;
-pub use vocabulary::Vocabulary;
-
-/// CLIP's ids of a prompt, with marks and padding.
-pub fn tokens(prompt: &str) -> Vec<u32> {
-    Tokenizer::clip().encode(prompt).ids.to_vec()
-}
+pub use vocabulary::{Vocabulary, tokens};

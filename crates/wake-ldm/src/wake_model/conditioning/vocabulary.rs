@@ -2,6 +2,16 @@
 
 use std::collections::BTreeSet;
 
+use wake_physics::Scene;
+use wake_text::{Tokenizer, Wording};
+
+use crate::error::Result;
+
+/// CLIP's ids of a prompt, with marks and padding.
+pub fn tokens(prompt: &str) -> Vec<u32> {
+    Tokenizer::clip().encode(prompt).ids.to_vec()
+}
+
 /// CLIP's ids that a small text transformer knows, in increasing order.
 ///
 /// Compact id 0 stands for every other token.
@@ -17,6 +27,24 @@ impl Vocabulary {
         Self {
             known: known.into_iter().collect(),
         }
+    }
+
+    /// What prompts about wakes can contain: the words of every [`Wording`], and every digit.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Text`](crate::Error::Text), for a scene that cannot be put into words: never for the default ones, which are.
+    pub fn of_wordings() -> Result<Self> {
+        let (ship, mut calm) = (Scene::default(), Scene::default());
+        calm.ships.clear();
+        calm.sea.wind_speed = 0.0;
+        let mut ids = tokens("0 1 2 3 4 5 6 7 8 9 .");
+        for scene in [ship, calm] {
+            for wording in Wording::ALL {
+                ids.extend(tokens(&wording.prompt(&scene)?));
+            }
+        }
+        Ok(Self::new(ids))
     }
 
     /// CLIP's ids, in increasing order.

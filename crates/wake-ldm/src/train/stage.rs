@@ -1,0 +1,72 @@
+//! A stage of training: a run in its folder, with checkpoints, results and a log.
+
+use burn::module::Module;
+use serde_json::{Map, Value, json};
+use std::path::Path;
+
+use super::folder::RunFolder;
+use super::metrics::Metrics;
+use super::run::{Run, Task};
+use crate::error::Error;
+
+/// How a [`Run`] is kept in a folder.
+#[derive(Debug, Clone, Copy)]
+pub struct Stage<'a> {
+    /// Name of the stage, its checkpoints and its log.
+    pub name: &'static str,
+    /// Folder of the results.
+    pub out: &'a Path,
+    /// Whether it goes on from the newest checkpoint.
+    pub resume: bool,
+    /// Steps between checkpoints, at least 1.
+    pub every: usize,
+    /// Steps in all.
+    pub steps: usize,
+    /// Files that are written after every checkpoint.
+    pub results: &'a [&'a str],
+}
+
+impl Stage<'_> {
+    /// Makes all steps.
+    ///
+    /// - `done`: told the number of steps and the loss after each
+    /// - `show`: writes the results, after every checkpoint; and at the start, where a kill has left those of an earlier one
+    ///
+    /// # Errors
+    ///
+    /// Those of `show`, of the run's steps, and of files that cannot be written.
+    pub fn train<M: Module, E: From<Error>>(
+        self,
+        folder: &mut RunFolder,
+        mut run: Run<M>,
+        task: &impl Task<M>,
+        mut done: impl FnMut(usize, f64),
+        show: impl Fn(&Run<M>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Self { name, steps, .. } = self;
+        if let Some(checkpoint) = folder.begin(name, self.resume)? {
+            run.resume(checkpoint)?;
+            if !folder.is_current(name, run.steps(), self.results) {
+                show(&run)?;
+            }
+            folder.note(name, run.steps(), steps)?;
+        }
+        let log = self.out.join(format!("{name}.jsonl"));
+        let mut metrics = Metrics::open(&log, run.steps())?;
+        while run.steps() < steps {
+            let (report, terms) = run.step(task)?;
+            let terms: Map<String, Value> = terms
+                .into_iter()
+                .map(|(term, value)| (term.to_owned(), json!(value)))
+                .collect();
+            metrics.write(run.steps(), steps, report, &Value::Object(terms))?;
+            done(run.steps(), report.loss);
+            if run.steps().is_multiple_of(self.every.max(1)) || run.steps() == steps {
+                run.checkpoint(&folder.checkpoints(name))?;
+                show(&run)?;
+                folder.note(name, run.steps(), steps)?;
+            }
+        }
+        Ok(())
+    }
+}
