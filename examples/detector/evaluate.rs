@@ -8,7 +8,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde_json::json;
 use wake_detector::drawing::{Drawing, sheet};
-use wake_detector::score::{Curve, Found, Judged, Label, Ray, Rule, verdicts};
+use wake_detector::score::{Found, Judged, Label, Ray, Rule, found_by};
 use wake_detector::train::{FOUND, Recipe, Sample};
 use wake_detector::{Detection, Detector, GreyImage, Wake};
 
@@ -224,12 +224,6 @@ fn by_visibility(recipe: Recipe, judged: &[(&str, Vec<Judged>)], wakes: &[Vec<Wa
         (Recipe::Painted, _) | (_, None) => 20.0 * f64::from(wake.snr).log10(),
         (_, Some(db)) => f64::from(db),
     };
-    let bin = |wake: &Wake| {
-        let decibel = decibel(wake);
-        bounds
-            .windows(2)
-            .position(|b| (b[0]..b[1]).contains(&decibel))
-    };
     let mut text = format!("\n| {}, {what} \\[dB\\] |", recipe.name());
     for bound in bounds.windows(2) {
         // Writing into a string cannot fail.
@@ -239,24 +233,8 @@ fn by_visibility(recipe: Recipe, judged: &[(&str, Vec<Judged>)], wakes: &[Vec<Wa
     text += &" --- |".repeat(bounds.len() - 1);
     text.push('\n');
     for (name, images) in judged {
-        let (_, least) = Curve::new(images, Rule::Ray)
-            .recall_at(FALSE_ALARMS)
-            .unwrap_or_default();
-        let mut counts = vec![[0usize; 2]; bounds.len() - 1];
-        for (image, wakes) in images.iter().zip(wakes) {
-            for (label, wake) in image.labels.iter().zip(wakes) {
-                if let Some(bin) = bin(wake).filter(|_| label.counts) {
-                    counts[bin][1] += 1;
-                }
-            }
-        }
-        let right = verdicts(images, Rule::Ray);
-        for verdict in right.iter().filter(|v| v.score >= least) {
-            let label = verdict.label.map(|label| &wakes[verdict.image][label]);
-            if let Some(bin) = label.and_then(bin) {
-                counts[bin][0] += 1;
-            }
-        }
+        let value = |image: usize, label: usize| decibel(&wakes[image][label]);
+        let counts = found_by(images, Rule::Ray, FALSE_ALARMS, &bounds, value);
         let _ = write!(text, "| {name} |");
         for [right, all] in counts {
             let _ = match all {

@@ -231,6 +231,47 @@ impl Curve {
     }
 }
 
+/// How many wakes are found by what each of them is like, at the score that allows so many false alarms an image.
+///
+/// - `value`: of a label that counts, by the numbers of its image and of the label in it
+/// - `bounds`: rising; bin k holds the values from bound k to below bound k + 1
+///
+/// # Shapes
+///
+/// A pair for each bin: wakes found, and all that count.
+#[must_use]
+pub fn found_by(
+    images: &[Judged],
+    rule: Rule,
+    false_alarms: f64,
+    bounds: &[f64],
+    value: impl Fn(usize, usize) -> f64,
+) -> Vec<[usize; 2]> {
+    let bin = |image: usize, label: usize| {
+        let value = value(image, label);
+        bounds
+            .windows(2)
+            .position(|b| (b[0]..b[1]).contains(&value))
+    };
+    let mut counts = vec![[0; 2]; bounds.len().saturating_sub(1)];
+    for (image, judged) in images.iter().enumerate() {
+        for label in (0..judged.labels.len()).filter(|&label| judged.labels[label].counts) {
+            if let Some(bin) = bin(image, label) {
+                counts[bin][1] += 1;
+            }
+        }
+    }
+    let least = Curve::new(images, rule)
+        .recall_at(false_alarms)
+        .map_or(f64::INFINITY, |(_, least)| least);
+    for verdict in verdicts(images, rule).iter().filter(|v| v.score >= least) {
+        if let Some(bin) = verdict.label.and_then(|label| bin(verdict.image, label)) {
+            counts[bin][0] += 1;
+        }
+    }
+    counts
+}
+
 /// How badly a detection fits a label; `None` where it does not.
 fn cost(rule: Rule, image: &Judged, ray: &Ray, label: &Label) -> Option<f64> {
     match rule {
@@ -443,5 +484,46 @@ mod tests {
         // Envelope of precision: 1, 2/3, 1/2 over recall ¼, ½, ¾.
         let area = 0.25 * (1.0 + 2.0 / 3.0 + 0.5);
         assert!((curve.average_precision().expect("labels") - area).abs() < 1e-12);
+    }
+
+    /// Three wakes of values 1, 2 and 5, of which those of 1 and 5 are found; the false alarm between them is one too many.
+    #[test]
+    fn wakes_are_counted_by_what_they_are_like() {
+        let ray = |x: f64| Ray {
+            tip: [x, 100.0],
+            axis_deg: 0.0,
+            oriented_box: None,
+        };
+        let label = |x: f64| Label {
+            ray: ray(x),
+            length: 90.0,
+            counts: true,
+            ambiguous: false,
+        };
+        let found = |x: f64, score: f64| Found { score, ray: ray(x) };
+        let image = Judged {
+            columns: 2000.0,
+            rows: 200.0,
+            labels: vec![label(100.0), label(600.0), label(1100.0)],
+            found: vec![
+                found(1100.0, 0.9),
+                found(100.0, 0.8),
+                found(1700.0, 0.7),
+                found(600.0, 0.6),
+            ],
+        };
+        let value = |_, label: usize| [1.0, 2.0, 5.0][label];
+        let images = [image];
+        let count = |false_alarms| {
+            found_by(
+                &images,
+                Rule::Ray,
+                false_alarms,
+                &[0.0, 2.0, 4.0, 8.0],
+                value,
+            )
+        };
+        assert_eq!(count(0.5), [[1, 1], [0, 1], [1, 1]]);
+        assert_eq!(count(1.0), [[1, 1], [1, 1], [1, 1]]);
     }
 }
