@@ -17,7 +17,7 @@ const LEAST_TIP: f32 = 0.02;
 const APART: usize = 2;
 /// No image has more tips that are looked at.
 const MOST_TIPS: usize = 300;
-/// How far the axis may turn from the direction at the tip, and by which steps [deg].
+/// How far the axis may turn from the direction at the tip, and by which steps \[deg\].
 const TURN: f32 = 24.0;
 const TURN_STEP: f32 = 1.5;
 /// The ray begins so far from the tip \[cells\]: a ship may lie on its first part.
@@ -178,7 +178,7 @@ pub(crate) fn without_repeats(mut found: Vec<Detection>, near: f32) -> Vec<Detec
     kept
 }
 
-/// Axes of one wake differ by less [deg].
+/// Axes of one wake differ by less \[deg\].
 const SAME_AXIS: f32 = 30.0;
 /// Lines of one wake lie closer \[pixels\].
 const SAME_LINE: f32 = 16.0;

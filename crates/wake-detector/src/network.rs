@@ -37,7 +37,7 @@ pub(crate) enum Map {
 
 /// Unit of the visible length \[pixels\].
 pub(crate) const LENGTH_UNIT: f32 = 150.0;
-/// Unit of the half-angle [deg].
+/// Unit of the half-angle \[deg\].
 pub(crate) const ANGLE_UNIT: f32 = 10.0;
 
 /// Channels at a quarter, an eighth and a sixteenth of the image's size.

@@ -10,7 +10,7 @@ pub struct Wake {
     pub tip: [f32; 2],
     /// From the tip along the wake [deg clockwise from the image's up].
     pub axis_deg: f32,
-    /// Half the angle between the outer edges [deg].
+    /// Half the angle between the outer edges \[deg\].
     pub half_angle_deg: f32,
     /// How far it can be seen \[pixels\].
     pub length: f32,
