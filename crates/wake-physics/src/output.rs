@@ -180,10 +180,16 @@ pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Res
     write_atomically(path, &bytes)
 }
 
-/// Writes a PNG of red, green and blue, 8 bits each: `[rows, columns, 3]`.
+/// Writes a PNG of red, green and blue, 8 bits each: `[rows, columns, 3]`; one without colours as a grey one, which is smaller
+/// and sooner packed.
 ///
 /// Mostly grey speckle: without filters the three equal bytes of a pixel compress to little more than one.
 pub(crate) fn write_rgb_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
+    let colours = pixels.as_chunks::<3>().0;
+    if colours.iter().all(|[r, g, b]| r == g && g == b) {
+        let grey: Vec<u8> = colours.iter().map(|[level, ..]| *level).collect();
+        return write_png(path, &grey, rows, columns);
+    }
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter)
         .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::Rgb8)
@@ -331,6 +337,25 @@ mod tests {
         let picture = image::open(&path).unwrap().into_luma8();
         assert_eq!((picture.width(), picture.height()), (3, 2));
         assert_eq!(picture.get_pixel(1, 1).0, [200]);
+    }
+
+    /// A picture without colours is stored in one byte a pixel, one with a colour in three; both read back as they were.
+    #[test]
+    fn pictures_keep_their_colours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        let grey = [0, 0, 0, 90, 90, 90, 255, 255, 255, 7, 7, 7];
+        let mut coloured = grey;
+        coloured[4] = 91;
+        for (pixels, kind) in [
+            (grey, image::ColorType::L8),
+            (coloured, image::ColorType::Rgb8),
+        ] {
+            write_rgb_png(&path, &pixels, 2, 2).unwrap();
+            let picture = image::open(&path).unwrap();
+            assert_eq!(picture.color(), kind);
+            assert_eq!(picture.into_rgb8().into_raw(), pixels);
+        }
     }
 
     #[test]

@@ -1,9 +1,7 @@
 //! Operations of our own on burn's CPU backend, with gradients of their own.
 
 use burn::backend::flex::FlexTensor;
-use burn::backend::{
-    BackendTensor, DispatchAutodiffContext, DispatchTensor, DispatchTensorKind, Flex,
-};
+use burn::backend::{BackendTensor, DispatchAutodiffContext, DispatchTensor, DispatchTensorKind};
 use burn::tensor::{DType, Tensor, TensorData};
 
 /// What an operation computes from contiguous f32 tensors.
@@ -19,7 +17,7 @@ pub(super) trait Operation<const N: usize>:
     /// The gradient to every input that is wanted, from the gradient of the result.
     #[cfg_attr(
         not(feature = "train"),
-        expect(dead_code, reason = "nothing is trained")
+        allow(dead_code, reason = "nothing is trained")
     )]
     fn gradients(
         &self,
@@ -81,6 +79,10 @@ fn runs_here(tensor: &DispatchTensor) -> bool {
 fn plain(tensor: DispatchTensor) -> FlexTensor {
     match tensor.kind {
         DispatchTensorKind::Flex(tensor) => tensor.float().to_contiguous(),
+        #[allow(
+            unreachable_patterns,
+            reason = "of a build with one backend it is the only kind"
+        )]
         kind => unreachable!("looked at before: {kind:?}"),
     }
 }
@@ -97,11 +99,11 @@ fn tensor(values: Vec<f32>, shape: &[usize]) -> FlexTensor {
 /// Operations that remember how they came about.
 #[cfg(feature = "train")]
 mod tracked {
-    use burn::backend::Autodiff;
     use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::NoCheckpointing};
     use burn::backend::autodiff::grads::Gradients;
     use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
     use burn::backend::tensor::FloatTensor;
+    use burn::backend::{Autodiff, Flex};
 
     use super::*;
 

@@ -21,6 +21,7 @@ pub use model::WakeModel;
 pub use patches::{PatchTransform, Shares};
 pub use prior::{Expected, Prior};
 pub use prompt_parser::PromptParser;
+#[cfg(feature = "train")]
 pub(crate) use prompt_parser::windows;
 pub(crate) use sea::SeaFields;
 pub(crate) use windows::ChannelWindows;
