@@ -1,7 +1,7 @@
 //! The plots: radial spectra against the simulator's, and wake correlation scene by scene.
 
-use crate::judge::Report;
-use crate::source::Result;
+use crate::Result;
+use crate::report::Report;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -58,7 +58,7 @@ pub(crate) fn wake(path: &Path, report: &Report) -> Result<()> {
         .y_desc("model, 8 against 8 images")
         .draw()?;
     let wake = &report.wake_correlation;
-    let pairs = wake.simulator.iter().zip(wake.model.iter().flatten());
+    let pairs = wake.simulator.iter().zip(&wake.model);
     let colour = COLOURS[0];
     chart
         .draw_series(pairs.map(|(&s, &m)| Circle::new((s, m), 4, colour.filled())))?

@@ -33,14 +33,6 @@ pub(crate) fn held_out(index: u64) -> Scene {
     scene
 }
 
-/// The same scene with another random sea.
-pub(crate) fn other_sea(scene: &Scene, number: u64) -> Scene {
-    Scene {
-        seed: scene.seed + number,
-        ..scene.clone()
-    }
-}
-
 /// The ship of a scene; every held-out scene has one.
 pub(crate) fn ship(scene: &Scene) -> Ship {
     scene.ships.first().cloned().unwrap_or_default()

@@ -1,6 +1,7 @@
 //! The report of seas as text.
 
-use crate::sea::{SeaReport, SeaRow};
+use crate::sea::SeaReport;
+use wake_ldm::evaluation::sea::SeaRow;
 use wake_ldm::train::TwoSample;
 
 /// The report in Markdown.

@@ -1,9 +1,10 @@
 //! A model of images and prompts alone as a source of images: the paper's own way.
 
+use crate::Result;
 use crate::scenes::SIZE;
-use crate::source::{ImageSource, Result, Told};
 use burn::tensor::Device;
 use std::path::Path;
+use wake_ldm::evaluation::{ImageSource, Told};
 use wake_ldm::pipeline::{Pipeline, Request};
 use wake_physics::grey::GreyScale;
 use wake_physics::{Field, Scene};
@@ -13,6 +14,7 @@ use wake_text::Wording;
 const STEPS: usize = 50;
 
 /// A pipeline in the layout of diffusers; it is told the paper's sentence, whatever else there is.
+#[derive(Debug)]
 pub(crate) struct TextToImage(Pipeline);
 
 impl TextToImage {
@@ -32,7 +34,7 @@ impl TextToImage {
 }
 
 impl ImageSource for TextToImage {
-    fn draw(&self, scenes: &[Scene], _: Told) -> Result<Vec<Field>> {
+    fn draw(&self, scenes: &[Scene], _: Told) -> wake_ldm::Result<Vec<Field>> {
         let prompts = scenes.iter().map(|scene| Wording::Paper.prompt(scene));
         let prompts: Vec<String> = prompts.collect::<wake_text::Result<_>>()?;
         let seeds: Vec<u64> = scenes.iter().map(|scene| scene.seed).collect();

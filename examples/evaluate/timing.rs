@@ -1,11 +1,12 @@
 //! Seconds per image: the model, the simulator's fast methods, and its harmonic sum.
 
+use crate::Result;
 use crate::scenes::{SIZE, held_out, ship};
-use crate::source::{ImageSource, Result, Told};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 use std::time::Instant;
+use wake_ldm::evaluation::{ImageSource, Told};
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::KelvinWake;
 use wake_physics::scene::{SpectrumModel, SpreadingModel};
@@ -49,7 +50,7 @@ pub(crate) struct TimingRow {
 
 /// Times all of them in one run.
 pub(crate) fn timings(
-    model: Option<&dyn ImageSource>,
+    model: &dyn ImageSource,
     text_to_image: Option<&dyn ImageSource>,
 ) -> Result<Vec<TimingRow>> {
     SIZES
@@ -74,7 +75,7 @@ pub(crate) fn timings(
                 size,
                 simulator_fast: fast,
                 simulator_harmonic_sum: harmonic_seconds(&scene),
-                model: drawn(model)?,
+                model: drawn(Some(model))?,
                 text_to_image: drawn(text_to_image)?,
             })
         })

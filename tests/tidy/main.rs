@@ -143,11 +143,24 @@ fn rooms_meet_only_where_they_may() {
     let foreign: [(&str, &[&str]); 2] = [
         (
             "wake_physics",
-            &["error", "files", "wake_model", "dataset", "train"],
+            &[
+                "error",
+                "files",
+                "wake_model",
+                "dataset",
+                "train",
+                "evaluation",
+            ],
         ),
         (
             "wake_text",
-            &["error", "stable_diffusion", "wake_model", "dataset"],
+            &[
+                "error",
+                "stable_diffusion",
+                "wake_model",
+                "dataset",
+                "evaluation",
+            ],
         ),
     ];
     for module in code.files.keys().filter(|module| !module.is_empty()) {

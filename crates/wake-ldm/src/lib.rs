@@ -18,6 +18,8 @@ mod wake_model;
 #[cfg(feature = "dataset")]
 pub mod dataset;
 #[cfg(feature = "train")]
+pub mod evaluation;
+#[cfg(feature = "train")]
 pub mod train;
 #[cfg(feature = "flex")]
 mod self_check;

@@ -155,7 +155,7 @@ fn numbers(mean: f64, spread: f64, texture: &Texture) -> [f32; NUMBERS] {
 }
 
 /// The middle value; 0 of no pixel.
-pub(super) fn median(field: &Field) -> f32 {
+pub(crate) fn median(field: &Field) -> f32 {
     let mut sorted = field.values.clone();
     let middle = sorted.len() / 2;
     match sorted.is_empty() {

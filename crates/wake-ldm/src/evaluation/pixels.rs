@@ -1,20 +1,22 @@
 //! Figures of images against the simulator's image of the same scene: SSIM, PSNR, LPIPS, spectrum, brightness.
 
-use crate::statistics::mean;
-use burn::tensor::{Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData};
 use serde::Serialize;
-use wake_ldm::metrics::{Lpips, Plane, SsimWindow, blurred, psnr, ssim};
 use wake_physics::Field;
 use wake_physics::grey::GreyScale;
 use wake_physics::measure::{Binning, radial_spectrum};
+
+use super::statistics::mean;
+use crate::metrics::{Lpips, Plane, SsimWindow, blurred, psnr, ssim};
 
 /// Standard deviation of the blurred baseline [pixels].
 const BLUR: f64 = 4.0;
 /// Smallest power of a ring, so that a constant image has a logarithm.
 const LEAST_POWER: f64 = 1e-6;
 
-/// Grey 0 to 1 of intensity, by the one mapping of the project.
-pub(crate) fn grey(intensity: &Field) -> Field {
+/// Grey 0 to 1 of intensity, by the default mapping, which all figures are of.
+#[must_use]
+pub fn grey(intensity: &Field) -> Field {
     let scale = GreyScale::default();
     let grey = |&v: &f32| scale.grey(f64::from(v)) as f32;
     Field {
@@ -24,7 +26,7 @@ pub(crate) fn grey(intensity: &Field) -> Field {
 }
 
 /// A constant image with the mean of another.
-pub(crate) fn constant(image: &Field) -> Field {
+pub(super) fn constant(image: &Field) -> Field {
     Field {
         values: vec![image.mean() as f32; image.values.len()],
         ..*image
@@ -32,7 +34,7 @@ pub(crate) fn constant(image: &Field) -> Field {
 }
 
 /// A blurred image.
-pub(crate) fn blur(image: &Field) -> Field {
+pub(super) fn blur(image: &Field) -> Field {
     Field {
         values: blurred(&Plane::new(&image.values, image.columns), BLUR),
         ..*image
@@ -40,8 +42,8 @@ pub(crate) fn blur(image: &Field) -> Field {
 }
 
 /// Sums of the figures of one kind of image over scenes.
-#[derive(Debug, Default)]
-pub(crate) struct Tally {
+#[derive(Debug, Clone, Default)]
+pub struct PixelTally {
     ssim: Vec<f64>,
     psnr: Vec<f64>,
     lpips: Vec<f64>,
@@ -53,24 +55,32 @@ pub(crate) struct Tally {
 
 /// The figures of one kind of image.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct PixelRow {
-    pub(crate) image: &'static str,
-    pub(crate) ssim: Option<f64>,
-    pub(crate) psnr_db: Option<f64>,
-    pub(crate) lpips: Option<f64>,
+pub struct PixelRow {
+    /// Kind of image.
+    pub image: &'static str,
+    /// Structural similarity of grey of range 1, with a Gaussian window, mean over scenes.
+    pub ssim: Option<f64>,
+    /// Peak signal-to-noise ratio of range 1, mean over scenes \[dB\].
+    pub psnr_db: Option<f64>,
+    /// Perceptual distance, mean over scenes; `None` without its networks.
+    pub lpips: Option<f64>,
     /// Mean grey less the reference's, mean over scenes \[1\].
-    pub(crate) brightness_difference: Option<f64>,
+    pub brightness_difference: Option<f64>,
     /// Standard deviation of grey over the reference's, mean over scenes \[1\].
-    pub(crate) contrast_ratio: Option<f64>,
+    pub contrast_ratio: Option<f64>,
     /// Largest difference of the mean radial spectrum up to half the Nyquist frequency \[dB\].
-    pub(crate) spectrum_db: Option<f64>,
+    pub spectrum_db: Option<f64>,
     /// The difference, ring by ring \[dB\].
-    pub(crate) spectrum_curve_db: Vec<f64>,
+    pub spectrum_curve_db: Vec<f64>,
 }
 
-impl Tally {
-    /// Counts an image against its reference, both grey.
-    pub(crate) fn add(&mut self, reference: &Field, image: &Field, lpips: Option<&Lpips>) {
+impl PixelTally {
+    /// Counts an image against its reference, both grey and as large as all others.
+    ///
+    /// # Panics
+    ///
+    /// If the sizes differ.
+    pub fn add(&mut self, reference: &Field, image: &Field, lpips: Option<&Lpips>) {
         let planes = [reference, image].map(|f| Plane::new(&f.values, f.columns));
         self.ssim
             .push(ssim(&planes[0], &planes[1], 1.0, SsimWindow::Gaussian));
@@ -91,9 +101,22 @@ impl Tally {
         }
     }
 
+    /// Number of images.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.ssim.len()
+    }
+
+    /// Whether no image was counted.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.ssim.is_empty()
+    }
+
     /// The means.
-    pub(crate) fn row(&self, image: &'static str) -> PixelRow {
-        let count = self.ssim.len().max(1) as f64;
+    #[must_use]
+    pub fn row(&self, image: &'static str) -> PixelRow {
+        let count = self.len().max(1) as f64;
         let curve: Vec<f64> = self.spectrum.iter().map(|sum| sum / count).collect();
         // Ring 0 is the mean, counted as brightness; the rings end at the Nyquist frequency.
         let half = curve.iter().take(curve.len() / 2 + 1).skip(1);
@@ -120,5 +143,33 @@ fn deviation(image: &Field) -> f64 {
 /// Grey as the three equal channels that a network for photographs takes.
 fn colour(image: &Field) -> Tensor<4> {
     let data = TensorData::new(image.values.repeat(3), [1, 3, image.rows, image.columns]);
-    Tensor::from_data(data, &burn::tensor::Device::default())
+    Tensor::from_data(data, &Device::default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::NoiseSource;
+
+    /// Twice the contrast around the same mean: 20 lg 2 dB in every ring, no difference of brightness.
+    #[test]
+    fn contrast_shows_in_every_ring_of_the_spectrum() {
+        let side = 32;
+        let noise = NoiseSource::new(4).normal(0, side * side);
+        let image = |contrast: f32| Field {
+            rows: side,
+            columns: side,
+            values: noise.iter().map(|x| 0.5 + contrast * x).collect(),
+        };
+        let mut tally = PixelTally::default();
+        tally.add(&image(0.05), &image(0.1), None);
+        let row = tally.row("twice the contrast");
+        let expected = 20.0 * 2f64.log10();
+        // Ring 0 holds the mean.
+        for db in &row.spectrum_curve_db[1..] {
+            assert!((db - expected).abs() < 1e-3, "{row:?}");
+        }
+        assert!(row.contrast_ratio.is_some_and(|r| (r - 2.0).abs() < 1e-5));
+        assert!(row.lpips.is_none() && tally.len() == 1);
+    }
 }

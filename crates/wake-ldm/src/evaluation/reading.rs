@@ -1,0 +1,196 @@
+//! What is read from an image, against what its scene says.
+
+use wake_physics::measure::{
+    Measured, ShipPlace, angle_between, axis_between, incidence, measure_wake, open_sea, wind_axis,
+    wind_speed,
+};
+use wake_physics::scene::Ship;
+use wake_physics::{Field, Raster, Scene};
+
+use super::source::{ImageSource, Told, draw_all};
+use crate::error::Result;
+
+/// What can be read from an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Heading of the scene's first ship \[deg clockwise from azimuth\].
+    Heading,
+    /// Its speed \[m/s\].
+    Speed,
+    /// Wind speed \[m/s\].
+    WindSpeed,
+    /// Where the wind blows to, which an image shows to 180° \[deg clockwise from azimuth\].
+    WindDirection,
+    /// Incidence \[deg\].
+    Incidence,
+}
+
+/// Not measured.
+const NOTHING: Measured = Measured {
+    value: f64::NAN,
+    confidence: 0.0,
+    measurable: false,
+};
+
+impl Quantity {
+    /// All of them, in the order of every list.
+    pub const ALL: [Self; 5] = [
+        Self::Heading,
+        Self::Speed,
+        Self::WindSpeed,
+        Self::WindDirection,
+        Self::Incidence,
+    ];
+
+    /// Name and unit in reports.
+    #[must_use]
+    pub fn name(self) -> [&'static str; 2] {
+        match self {
+            Self::Heading => ["heading", "deg"],
+            Self::Speed => ["ship speed", "m/s"],
+            Self::WindSpeed => ["wind speed", "m/s"],
+            Self::WindDirection => ["wind direction, to 180°", "deg"],
+            Self::Incidence => ["incidence", "deg"],
+        }
+    }
+
+    /// Its value in a scene; `None` of a ship that is not there.
+    #[must_use]
+    pub fn truth(self, scene: &Scene) -> Option<f64> {
+        match self {
+            Self::Heading => scene.ships.first().map(|ship| ship.heading),
+            Self::Speed => scene.ships.first().map(|ship| ship.speed),
+            Self::WindSpeed => Some(scene.sea.wind_speed),
+            Self::WindDirection => Some(scene.sea.wind_toward),
+            Self::Incidence => Some(scene.radar.incidence),
+        }
+    }
+
+    /// `one` less `other`, the short way round for directions.
+    #[must_use]
+    pub fn difference(self, one: f64, other: f64) -> f64 {
+        match self {
+            Self::Heading => angle_between(one, other),
+            Self::WindDirection => axis_between(one, other),
+            _ => one - other,
+        }
+    }
+}
+
+/// All that was read from one image.
+#[derive(Debug, Clone, Copy)]
+pub struct Reading {
+    /// In the order of [`Quantity::ALL`].
+    pub values: [Measured; 5],
+}
+
+impl Reading {
+    /// Reads an image of intensity before speckle. Brightness is read with the scene's other values given, the wake with the
+    /// place of its first ship; without a ship neither heading nor speed is measurable.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`](crate::Error::Scene) for a value of the scene out of its range.
+    pub fn of(image: &Field, scene: &Scene) -> Result<Self> {
+        let raster = raster(scene);
+        let ship = scene.ships.first();
+        let wake = ship.map(|ship| measure_wake(image, &raster, &place(ship, scene)));
+        let seen = ship.zip(wake.as_ref()).map(|(ship, wake)| {
+            let heading = wake.heading.measurable_value();
+            (ship.position, heading.unwrap_or(ship.heading))
+        });
+        let [wind, axis, angle] = match &open_sea(image, &raster, seen) {
+            Some(sea) => [
+                wind_speed(sea, scene)?,
+                wind_axis(sea, scene)?,
+                incidence(sea, scene)?,
+            ],
+            None => [NOTHING; 3],
+        };
+        let [heading, speed] = wake.map_or([NOTHING; 2], |wake| [wake.heading, wake.speed]);
+        Ok(Self {
+            values: [heading, speed, wind, axis, angle],
+        })
+    }
+
+    /// Readings of all images that a source draws.
+    ///
+    /// - `step`: told the number of images after each batch
+    ///
+    /// # Errors
+    ///
+    /// As [`ImageSource::draw`] and [`of`](Self::of).
+    pub fn of_source(
+        source: &dyn ImageSource,
+        scenes: &[Scene],
+        told: Told,
+        step: impl FnMut(u64),
+    ) -> Result<Vec<Self>> {
+        let images = draw_all(source, scenes, told, step)?;
+        let pairs = images.iter().zip(scenes);
+        pairs.map(|(image, scene)| Self::of(image, scene)).collect()
+    }
+
+    /// What was read of a quantity.
+    #[must_use]
+    pub fn value(&self, quantity: Quantity) -> Measured {
+        self.values[quantity as usize]
+    }
+
+    /// Absolute error of a quantity, if it is measurable.
+    #[must_use]
+    pub fn error(&self, quantity: Quantity, scene: &Scene) -> Option<f64> {
+        let value = self.value(quantity).measurable_value()?;
+        Some(quantity.difference(value, quantity.truth(scene)?).abs())
+    }
+}
+
+/// The pixels of a scene.
+pub(super) fn raster(scene: &Scene) -> Raster {
+    Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing)
+}
+
+/// What the wake of a ship is measured with.
+pub(super) fn place(ship: &Ship, scene: &Scene) -> ShipPlace {
+    ShipPlace {
+        position: ship.position,
+        length: ship.length,
+        depth: scene.sea.depth,
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// Headings turn by 360°, axes of the wind by 180°.
+    #[test]
+    fn directions_differ_the_short_way_round() {
+        for (quantity, one, other, expected) in [
+            (Quantity::Heading, 350.0, 10.0, -20.0),
+            (Quantity::WindDirection, 175.0, 5.0, -10.0),
+            (Quantity::Speed, 9.0, 10.5, -1.5),
+        ] {
+            let found = quantity.difference(one, other);
+            assert!((found - expected).abs() < 1e-12, "{quantity:?}: {found}");
+        }
+    }
+
+    /// An image without a ship still has a sea.
+    #[test]
+    fn a_sea_alone_is_read_without_a_wake() {
+        let keys = ["grid.rows = 64", "grid.columns = 64"];
+        let mut scene = Scene::default().with_assignments(&keys).unwrap();
+        scene.ships.clear();
+        let image = wake_physics::expected_intensity(&scene).unwrap();
+        let reading = Reading::of(&image, &scene).unwrap();
+        for quantity in [Quantity::Heading, Quantity::Speed] {
+            assert!(!reading.value(quantity).measurable);
+            assert!(reading.error(quantity, &scene).is_none());
+        }
+        // Of a constant the brightness is exactly that of the wind, up to the curve's interpolation.
+        let error = reading.error(Quantity::WindSpeed, &scene);
+        assert!(error.is_some_and(|error| error < 0.3), "{reading:?}");
+    }
+}

@@ -1,0 +1,165 @@
+//! One number of the scene is changed; the value measured in the image must follow.
+
+use serde::Serialize;
+use wake_physics::Scene;
+
+use super::baseline::Baseline;
+use super::reading::{Quantity, Reading};
+use super::source::{ImageSource, Told};
+use crate::error::Result;
+
+/// How often a measured value followed.
+#[derive(Debug, Clone, Serialize)]
+pub struct SwapRow {
+    /// Name of the quantity that was changed.
+    pub quantity: &'static str,
+    /// What the images' source was told; "simulator" for the simulator with another sea.
+    pub told: &'static str,
+    /// Pairs that were drawn.
+    pub pairs: usize,
+    /// Pairs in which the value follows on simulated images: those that count.
+    pub counted: usize,
+    /// Share of the counted pairs in which it follows on generated images, or on simulated ones of other seas.
+    pub right: Option<f64>,
+}
+
+/// Changes a quantity of each scene, draws both, and counts how often what is read from the images follows: of the simulator with
+/// another sea first, then of the model for each of `told`.
+///
+/// Values move by a fixed step toward the other end of the paper's range (ship 6 to 12 m/s, wind 3 to 7 m/s, incidence 16 to 32°),
+/// headings by 60°, winds by 40°. Scenes whose ship would have to change but is not there do not count.
+///
+/// - `scenes`: bases of the pairs, with values in those ranges
+/// - `step`: called after each scene
+///
+/// # Errors
+///
+/// As [`ImageSource::draw`] and [`Reading::of`].
+pub fn swaps(
+    quantity: Quantity,
+    scenes: &[Scene],
+    model: &dyn ImageSource,
+    told: &[Told],
+    mut step: impl FnMut(),
+) -> Result<Vec<SwapRow>> {
+    let mut counted = Vec::new();
+    for base in scenes {
+        if let Some(pair) = Swap::new(base, quantity)
+            && pair.is_followed(&Baseline::Simulator, Told::Both)?
+        {
+            counted.push(pair);
+        }
+        step();
+    }
+    let row = |name: &'static str, source: &dyn ImageSource, told: Told| -> Result<SwapRow> {
+        let mut right = 0;
+        for pair in &counted {
+            right += usize::from(pair.is_followed(source, told)?);
+        }
+        Ok(SwapRow {
+            quantity: quantity.name()[0],
+            told: name,
+            pairs: scenes.len(),
+            counted: counted.len(),
+            right: (!counted.is_empty()).then(|| right as f64 / counted.len() as f64),
+        })
+    };
+    let mut rows = vec![row("simulator", &Baseline::OtherSea, Told::Both)?];
+    for &told in told {
+        rows.push(row(told.name(), model, told)?);
+    }
+    Ok(rows)
+}
+
+/// A scene, and the same with one value changed.
+struct Swap {
+    quantity: Quantity,
+    scenes: [Scene; 2],
+    /// By how much the value of the second is larger.
+    change: f64,
+}
+
+impl Swap {
+    /// `None` for a scene without the ship that would change.
+    fn new(base: &Scene, quantity: Quantity) -> Option<Self> {
+        let before = quantity.truth(base)?;
+        // Toward the other end of the range, so that the value stays inside.
+        let toward = |low: f64, high: f64, by: f64| match before < 0.5 * (low + high) {
+            true => by,
+            false => -by,
+        };
+        let change = match quantity {
+            Quantity::Heading => 60.0,
+            Quantity::Speed => toward(6.0, 12.0, 3.0),
+            Quantity::WindSpeed => toward(3.0, 7.0, 2.0),
+            Quantity::WindDirection => 40.0,
+            Quantity::Incidence => toward(16.0, 32.0, 8.0),
+        };
+        let (after, turned) = (before + change, (before + change).rem_euclid(360.0));
+        let mut scene = base.clone();
+        match quantity {
+            Quantity::Heading => scene.ships.first_mut()?.heading = turned,
+            Quantity::Speed => scene.ships.first_mut()?.speed = after,
+            Quantity::WindSpeed => scene.sea.wind_speed = after,
+            Quantity::WindDirection => scene.sea.wind_toward = turned,
+            Quantity::Incidence => scene.radar.incidence = after,
+        }
+        Some(Self {
+            quantity,
+            scenes: [base.clone(), scene],
+            change,
+        })
+    }
+
+    /// Whether the measured value moves the way the scene's did; not where either image does not show it.
+    ///
+    /// Both images are read with the base's other values given: they differ in nothing else.
+    fn is_followed(&self, source: &dyn ImageSource, told: Told) -> Result<bool> {
+        let images = source.draw(&self.scenes, told)?;
+        let read = |n: usize| -> Result<Option<f64>> {
+            let reading = Reading::of(&images[n], &self.scenes[0])?;
+            Ok(reading.value(self.quantity).measurable_value())
+        };
+        let (Some(before), Some(after)) = (read(0)?, read(1)?) else {
+            return Ok(false);
+        };
+        Ok(self.quantity.difference(after, before) * self.change > 0.0)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// Values stay in the paper's ranges, and one of them moves alone, by what is said.
+    #[test]
+    fn one_value_moves_and_stays_in_its_range() {
+        for (heading, speed, wind) in [(10.0, 6.5, 3.5), (350.0, 11.5, 6.5)] {
+            let mut base = Scene::default();
+            base.ships[0].heading = heading;
+            base.ships[0].speed = speed;
+            base.sea.wind_speed = wind;
+            base.radar.incidence = 30.0;
+            for quantity in Quantity::ALL {
+                let swap = Swap::new(&base, quantity).unwrap();
+                let other = &swap.scenes[1];
+                let moved =
+                    |q: Quantity| q.difference(q.truth(other).unwrap(), q.truth(&base).unwrap());
+                for each in Quantity::ALL {
+                    let expected = if each == quantity { swap.change } else { 0.0 };
+                    assert!((moved(each) - expected).abs() < 1e-9, "{quantity:?}");
+                }
+                assert!((6.0..=12.0).contains(&other.ships[0].speed));
+                assert!((3.0..=7.0).contains(&other.sea.wind_speed));
+                assert!((16.0..=32.0).contains(&other.radar.incidence));
+            }
+        }
+        let open = Scene {
+            ships: Vec::new(),
+            ..Scene::default()
+        };
+        assert!(Swap::new(&open, Quantity::Speed).is_none());
+        assert!(Swap::new(&open, Quantity::WindSpeed).is_some());
+    }
+}

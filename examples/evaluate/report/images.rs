@@ -1,0 +1,85 @@
+//! Figures of images: rungs, pixels, wake correlation.
+
+use super::{Report, number};
+
+/// Model over simulator.
+fn ratio(model: Option<f64>, simulator: Option<f64>) -> String {
+    number(model.zip(simulator).map(|(m, s)| m / s), 3)
+}
+
+pub(super) fn rungs(report: &Report) -> String {
+    let mut text = "## Rungs\n\nWhat each kind of image has of a sea, means over the scenes: the shape of the grey that is left \
+        when the expected image is subtracted; variance on crests of the wake over that in its troughs; squared differences of neighbours across the borders of squares of \
+        8 pixels over those elsewhere; share of patches of \
+        unseen scenes that the best of up to three small networks tells from simulated ones, 0.5 where it cannot, and the distance of both kinds in the \
+        feature that it tells them by, in standard deviations.\n\n\
+        | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests | seams |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        .to_owned();
+    for r in &report.rungs {
+        let told = r.two_sample.map_or("–".to_owned(), |t| {
+            format!("{:.3} ± {:.3}", t.accuracy, t.half_width)
+        });
+        let [range, azimuth, wind] = r.steepness.map(|s| number(s, 3));
+        text += &format!(
+            "| {} | {told} | {} | {} | {} | {range}, {azimuth}, {wind} | {} | {} | {} |\n",
+            r.image,
+            number(r.two_sample.map(|t| t.distance), 2),
+            number(r.skewness, 3),
+            number(r.kurtosis, 3),
+            number(r.grouping, 3),
+            number(r.crest_variance, 2),
+            number(r.seams, 2)
+        );
+    }
+    text
+}
+
+pub(super) fn pixels(report: &Report) -> String {
+    let mut text = "## Pixels, against a simulated image of the same scene\n\n\
+        | image | SSIM | PSNR dB | LPIPS | brightness | contrast ratio | spectrum dB |\n\
+        | --- | --- | --- | --- | --- | --- | --- |\n"
+        .to_owned();
+    for r in &report.pixels {
+        text += &format!(
+            "| {} | {} | {} | {} | {} | {} | {} |\n",
+            r.image,
+            number(r.ssim, 4),
+            number(r.psnr_db, 2),
+            number(r.lpips, 4),
+            number(r.brightness_difference, 4),
+            number(r.contrast_ratio, 3),
+            number(r.spectrum_db, 2)
+        );
+    }
+    let paper = &report.paper;
+    text += &format!(
+        "| the paper's model | {} | {} | {} | – | – | – |\n",
+        paper.ssim, paper.psnr_db, paper.lpips
+    );
+    let (model, simulator) = (&report.pixels[0], &report.pixels[1]);
+    text += &format!(
+        "\nModel over simulator: SSIM {}, PSNR {}, LPIPS {}. Good is 0.9 to 1.1: as close as another simulated image.\n",
+        ratio(model.ssim, simulator.ssim),
+        ratio(model.psnr_db, simulator.psnr_db),
+        ratio(model.lpips, simulator.lpips)
+    );
+    text + &format!(
+        "Equivalent looks of the open sea after {} looks of speckle: simulator {}, model {}.\n",
+        report.speckle.looks,
+        number(report.speckle.simulator, 2),
+        number(report.speckle.model, 2)
+    )
+}
+
+pub(super) fn wake(report: &Report) -> String {
+    let wake = &report.wake_correlation;
+    format!(
+        "## Wake correlation\n\nInside the Kelvin wedge, over {} scenes, medians: simulator (4 against 4 images) {}, \
+         model (8 against 8) {}, ratio {}.\n",
+        wake.simulator.len(),
+        number(wake.simulator_median, 3),
+        number(wake.model_median, 3),
+        number(wake.ratio_median, 3)
+    )
+}
