@@ -136,7 +136,8 @@ mod tests {
     #[test]
     fn speckle_is_correlated_as_the_window_says() {
         let mut scene = Scene::default();
-        assert_eq!(StatedSpeckle::of(&scene, 1.0).along_rows, [0.0; 3]);
+        let white = StatedSpeckle::of(&scene, 1.0);
+        assert!(white.along_rows.iter().all(|lag| lag.abs() < 1e-15));
         (scene.radar.window, scene.radar.azimuth_window) = (Some(Window::Uniform), None);
         (scene.radar.looks, scene.radar.look_overlap) = (1, None);
         (scene.radar.range_resolution, scene.radar.resolution) = (Some(4.0), 8.0);
