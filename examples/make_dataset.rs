@@ -11,65 +11,26 @@
 //! Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (the same with oriented boxes), `labelTxt/*.txt` (DOTA),
 //! `metadata.jsonl`, `coco.json`, `data.yaml` with `train.txt` and `val.txt`, and `dataset.json`; see docs/dataset.md. A run that was killed continues where it stopped.
 
+#[path = "make_dataset/arguments.rs"]
+mod arguments;
 #[path = "common/exit.rs"]
 mod exit;
 #[path = "common/progress.rs"]
 mod progress;
 
+use arguments::Arguments;
 use clap::Parser;
 use serde_json::json;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use wake_ldm::burn::tensor::Device;
-use wake_ldm::dataset::{Manifest, Progress, Recipe, Shard, Simulated, merge, shard_folder, write};
+use wake_ldm::dataset::{
+    Manifest, PAPER_SCENES, Progress, Recipe, Simulated, merge, shard_folder, write,
+};
 use wake_ldm::fingerprint;
 use wake_ldm::sea_texture::SeaTexture;
-use wake_physics::Plan;
-
-/// Number of scenes in the paper's grid.
-const PAPER_COUNT: u64 = 3456;
-
-/// Simulate a labelled data set of ship wakes.
-#[derive(Parser)]
-#[command(version)]
-struct Arguments {
-    /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), detector (what satellites
-    /// deliver), or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = "ranges")]
-    grid: String,
-    /// Change one value of the recipe, such as speckle=true; may be repeated; keys: see docs/dataset.md
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Number of images of the whole set [default: 100; 3456 for the paper's grid]
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
-    count: Option<u64>,
-    /// Seed of the whole set
-    #[arg(long, default_value_t = 7)]
-    seed: u64,
-    /// Share of the images that are for validation, 0 to 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
-    val_share: f64,
-    /// Draw the scenes on a sea learnt from real images: a file that `train -- sea` wrote
-    #[arg(long, value_name = "FILE")]
-    sea: Option<PathBuf>,
-    /// Make only share i of n, into the folder shard-i
-    #[arg(long, value_name = "I/N")]
-    shard: Option<Shard>,
-    /// Join the shards made before
-    #[arg(long, conflicts_with_all = ["shard", "count", "set", "sea"])]
-    merge: bool,
-    /// Images made at the same time [default: one for each core]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-    /// Folder of the set, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/make_dataset")]
-    out: PathBuf,
-    /// Print a report as JSON on standard output, and nothing else
-    #[arg(long)]
-    json: bool,
-}
 
 fn main() -> ExitCode {
     exit::code(|| run(&Arguments::parse()))
@@ -112,7 +73,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 
 fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
     let default_count = match arguments.grid.as_str() {
-        "paper" => PAPER_COUNT,
+        "paper" => PAPER_SCENES,
         _ => 100,
     };
     let count = arguments.count.unwrap_or(default_count);
@@ -135,20 +96,12 @@ fn source(manifest: &Manifest, arguments: &Arguments) -> wake_ldm::Result<Simula
     }
 }
 
-/// Scenes that are planned before a set is made.
-const PLANNED: u64 = 8;
 /// Seconds of a core above which what a set costs is said first.
 const LONG: f64 = 600.0;
 
 /// Says what a large set costs, by the plans of its first scenes.
 fn tell_cost(manifest: &Manifest) -> wake_ldm::Result<()> {
-    let (source, indices) = (manifest.source()?, manifest.indices());
-    let planned = PLANNED.min(indices.end - indices.start).max(1);
-    let mut seconds = 0.0;
-    for index in indices.start..indices.start + planned {
-        seconds += Plan::new(&source.scene(index)?)?.cost().core_seconds;
-    }
-    let each = seconds / planned as f64;
+    let (each, indices) = (manifest.core_seconds()?, manifest.indices());
     let total = each * (indices.end - indices.start) as f64;
     if total > LONG {
         exit::note(&format!(

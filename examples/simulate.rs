@@ -11,6 +11,10 @@
 //! the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
 //! `comparison.json`, and quick-looks of what was simulated, `sheet.png`.
 
+#[path = "simulate/across.rs"]
+mod across;
+#[path = "simulate/arguments.rs"]
+mod arguments;
 #[path = "simulate/compare.rs"]
 mod compare;
 #[path = "common/exit.rs"]
@@ -19,75 +23,21 @@ mod exit;
 mod progress;
 #[path = "simulate/real.rs"]
 mod real;
+#[path = "simulate/results.rs"]
+mod results;
 
-use clap::{Parser, ValueEnum};
+use arguments::{Arguments, MethodName};
+use clap::Parser;
 use serde_json::Value;
 use std::error::Error;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use wake_physics::grey::GreyScale;
+use wake_physics::measure::ImageFigures;
 use wake_physics::picture::Picture;
-use wake_physics::{Method, Plan, Scene, Simulation, export, output, simulate_with};
-
-/// Simulate the SAR image of a ship wake from the numbers of a scene.
-#[derive(Parser)]
-#[command(
-    version,
-    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
-                  grid.spacing is that of the image; the plan says which spacing is computed on (computed_spacing): docs/scene.md"
-)]
-struct Arguments {
-    /// Scene file (TOML), or several; without it, the default scene with its ship
-    #[arg(long, value_name = "FILE", num_args = 1..)]
-    scene: Vec<PathBuf>,
-    /// Change one value of the scene, such as ship.speed=8; may be repeated
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// How fields are computed: the fast methods, or the slow oracles they are checked against
-    #[arg(long, value_enum, default_value = "fast")]
-    method: MethodName,
-    /// What the grey of the picture is linear in: decibels on one scale for all scenes, or amplitude as in quick-looks
-    #[arg(long, value_enum, default_value = "decibel")]
-    grey: GreyName,
-    /// Also write the picture with boxes, arms and tips drawn on it
-    #[arg(long)]
-    overlay: bool,
-    /// Also write every field as a file of its own, for NumPy or as TIFF
-    #[arg(long, value_enum, value_delimiter = ',')]
-    export: Vec<Export>,
-    /// Folder of the results, made if absent; of several scenes each has a folder of its name in it
-    #[arg(long, value_name = "DIR", default_value = "out/simulate")]
-    out: PathBuf,
-    /// Compare open sea and wakes with those of the PNG images of a folder (grey linear in amplitude; the axes of wakes in
-    /// its labels.json, if there is one)
-    #[arg(long, value_name = "DIR")]
-    compare: Option<PathBuf>,
-    /// Print the report as JSON on standard output, and nothing else
-    #[arg(long)]
-    json: bool,
-}
+use wake_physics::{Method, Plan, Scene, Simulation, output, simulate_with};
 
 /// Pixels of a quick-look along its longer side, and quick-looks in a row of the sheet.
 const SIDE: usize = 334;
 const ACROSS: usize = 3;
-
-#[derive(Clone, Copy, ValueEnum)]
-enum MethodName {
-    Fast,
-    Direct,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum GreyName {
-    Decibel,
-    Amplitude,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Export {
-    Npy,
-    Tiff,
-}
 
 fn main() -> ExitCode {
     exit::code(|| run(&Arguments::parse()))
@@ -103,7 +53,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             exit::note(&format!("note: {cost}"));
         }
     }
-    let real = arguments.compare.as_deref().map(compare::real_rows);
+    let real = arguments.compare.as_deref().map(real::figures);
     let real = real.transpose()?;
     output::make_folder(&arguments.out)?;
     let (mut reports, mut rows, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
@@ -113,13 +63,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             _ => arguments.out.join(name),
         };
         let simulation = simulated(scene, arguments.method)?;
-        reports.push(write(&simulation, arguments, &out)?);
+        reports.push(results::write(&simulation, arguments, &out)?);
         if !arguments.json {
-            exit::say(&summary(&simulation, &out))?;
+            exit::say(&results::summary(&simulation, &out))?;
         }
         if arguments.compare.is_some() {
-            rows.push(compare::Row::simulated(name, &simulation));
-            pictures.push(quick_look(&simulation).captioned(name));
+            rows.push(ImageFigures::of_simulation(name, &simulation));
+            let levels = simulation.levels(&simulation.quick_look());
+            let picture = Picture::reduced(&levels, simulation.raster.columns, SIDE);
+            pictures.push(picture.captioned(name));
         }
     }
     if let Some(real) = real {
@@ -173,61 +125,4 @@ fn simulated(scene: &Scene, method: MethodName) -> wake_physics::Result<Simulati
             simulation
         }
     }
-}
-
-fn write(
-    simulation: &Simulation,
-    arguments: &Arguments,
-    out: &Path,
-) -> wake_physics::Result<Value> {
-    let grey = match arguments.grey {
-        GreyName::Decibel => GreyScale::default(),
-        GreyName::Amplitude => simulation.quick_look(),
-    };
-    let report = simulation.write_in(out, &grey)?;
-    if arguments.overlay {
-        let levels: Vec<u8> = simulation.levels(&grey);
-        let mut picture = Picture::from_levels(&levels, simulation.raster.columns);
-        picture.draw_labels(&simulation.labels);
-        picture.write(&out.join("overlay.png"))?;
-    }
-    for form in &arguments.export {
-        write_fields(simulation, *form, out)?;
-    }
-    Ok(report)
-}
-
-/// A picture of at most some 330 pixels a side, each the mean of square blocks of a quick-look.
-fn quick_look(simulation: &Simulation) -> Picture {
-    let levels = simulation.levels(&simulation.quick_look());
-    let [rows, columns] = [simulation.raster.rows, simulation.raster.columns];
-    let block = rows.max(columns).div_ceil(SIDE);
-    let [down, right] = [rows / block, columns / block];
-    let mean = |n: usize| {
-        let first = n / right * block * columns + n % right * block;
-        let lines = (0..block).map(|line| &levels[first + line * columns..][..block]);
-        let sum: usize = lines.flatten().map(|&level| usize::from(level)).sum();
-        (sum / (block * block)) as u8
-    };
-    let levels: Vec<u8> = (0..down * right).map(mean).collect();
-    Picture::from_levels(&levels, right)
-}
-
-fn write_fields(simulation: &Simulation, form: Export, out: &Path) -> wake_physics::Result<()> {
-    for (name, field) in simulation.named_fields() {
-        match form {
-            Export::Npy => export::write_npy(&out.join(format!("{name}.npy")), field)?,
-            Export::Tiff => {
-                export::write_tiff(&out.join(format!("{name}.tif")), &simulation.raster, field)?;
-            }
-        }
-    }
-    Ok(())
-}
-
-fn summary(simulation: &Simulation, out: &Path) -> String {
-    let notes = simulation.plan.notes.iter();
-    let notes: String = notes.map(|note| format!("note: {note}\n")).collect();
-    let (plan, seconds) = (&simulation.plan, &simulation.seconds);
-    format!("{plan}\n{notes}{seconds}\nwritten to {}", out.display())
 }

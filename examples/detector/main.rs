@@ -16,14 +16,15 @@ mod detect;
 mod evaluate;
 #[path = "../common/exit.rs"]
 mod exit;
-mod labels;
 mod named;
 #[path = "../common/progress.rs"]
 mod progress;
+mod real;
 mod real_sea;
 mod report;
 mod show;
 mod train;
+mod visibility;
 
 use std::path::Path;
 use std::process::ExitCode;

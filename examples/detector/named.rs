@@ -1,7 +1,12 @@
-//! Recipes by their names on the command line.
+//! Recipes, numbers and networks as the command line names them.
+
+use std::error::Error;
+use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use wake_detector::Detector;
 use wake_detector::train::Recipe;
+use wake_ldm::device_named;
 
 /// Reads the name of a recipe; `--help` tells what each shows.
 pub(crate) fn recipe() -> impl TypedValueParser<Value = Recipe> {
@@ -10,4 +15,38 @@ pub(crate) fn recipe() -> impl TypedValueParser<Value = Recipe> {
         let found = Recipe::ALL.into_iter().find(|recipe| recipe.name() == name);
         found.ok_or("no such recipe")
     })
+}
+
+/// Reads the side of a pixel \[m\].
+pub(crate) fn spacing(text: &str) -> Result<f32, String> {
+    bounded(text, 0.5, 100.0, "m")
+}
+
+/// Reads a score.
+pub(crate) fn score(text: &str) -> Result<f32, String> {
+    bounded(text, 0.0, 1.0, "probability")
+}
+
+fn bounded(text: &str, low: f32, high: f32, unit: &str) -> Result<f32, String> {
+    let number: f32 = text
+        .parse()
+        .map_err(|_| format!("give a number of {unit}"))?;
+    match (low..=high).contains(&number) {
+        true => Ok(number),
+        false => Err(format!("it lies outside {low} to {high} {unit}")),
+    }
+}
+
+/// The network of a file, or the one that ships, which tells wakes from a score on.
+pub(crate) fn network(
+    weights: Option<&Path>,
+    device: &str,
+    least_score: f32,
+) -> Result<Detector, Box<dyn Error>> {
+    let device = device_named(device)?;
+    let detector = match weights {
+        Some(file) => Detector::load(file, &device)?,
+        None => Detector::pretrained(&device)?,
+    };
+    Ok(detector.with_least_score(least_score)?)
 }

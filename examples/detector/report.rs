@@ -1,10 +1,13 @@
 //! What `evaluate` writes.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use serde_json::{Value, json};
 
 use wake_detector::score::{Curve, Judged, Rule};
+
+use super::real_sea;
 
 /// False alarms an image at which recall is told.
 pub(crate) const FALSE_ALARMS: f64 = 0.5;
@@ -35,11 +38,20 @@ impl Report {
         }));
     }
 
+    /// Writes `report.json` and `report.md` into a folder.
+    pub(crate) fn write(&self, folder: &Path) -> Result<(), String> {
+        let rows = format!("{:#}\n", json!({"rows": self.rows, "sea": self.sea}));
+        for (name, text) in [("report.json", rows), ("report.md", self.text())] {
+            let path = folder.join(name);
+            let failed = |error| format!("cannot write {}: {error}", path.display());
+            std::fs::write(&path, text).map_err(failed)?;
+        }
+        Ok(())
+    }
+
     pub(crate) fn text(&self) -> String {
-        let count = self
-            .rows
-            .first()
-            .map_or(0, |row| row["count"].as_u64().unwrap_or(0));
+        let count = self.rows.first().and_then(|row| row["count"].as_u64());
+        let count = count.unwrap_or(0);
         let rungs = match self.rungs.is_empty() {
             true => "",
             false => " --rung NAME=FILE …",
@@ -52,16 +64,17 @@ impl Report {
              | images | number | wakes | found by | AP | AP boxes | recall | at score |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
         );
         let number = |value: &Value| value.as_f64().map_or("–".to_owned(), |x| format!("{x:.3}"));
+        let told = |value: &Value| value.as_str().unwrap_or_default().to_owned();
         let of_rung = |row: &&Value| self.rungs.iter().any(|rung| row["finder"] == **rung);
         for row in self.rows.iter().filter(|row| !of_rung(row)) {
             // Writing into a string cannot fail.
             let _ = writeln!(
                 text,
                 "| {} | {} | {} | {} | {} | {} | {} | {} |",
-                row["images"].as_str().unwrap_or_default(),
+                told(&row["images"]),
                 row["count"],
                 row["wakes"],
-                row["finder"].as_str().unwrap_or_default(),
+                told(&row["finder"]),
                 number(&row["average_precision"]),
                 number(&row["average_precision_boxes"]),
                 number(&row["recall_at_half_false_alarm"]),
@@ -77,29 +90,7 @@ impl Report {
             text.push_str(&self.transfer());
         }
         if !self.sea.is_empty() {
-            text.push_str(&self.open_sea());
-        }
-        text
-    }
-
-    /// A table of how often a small network tells one sea from another.
-    fn open_sea(&self) -> String {
-        let mut text = "\n## The open sea\n\nHow often a small network, trained on windows of the left halves of the real tiles, is \
-             right on patches of 64² pixels of the right halves (docs/evaluation.md; 0.5: nothing tells the two kinds apart). \
-             The tiles come from other sensors and in other stretches of grey than the recipe has.\n\n\
-             | kinds | right | windows |\n| --- | --- | --- |\n"
-            .to_owned();
-        for row in &self.sea {
-            let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
-            // Writing into a string cannot fail.
-            let _ = writeln!(
-                text,
-                "| {} | {:.2} ± {:.2} | {} |",
-                row["kinds"].as_str().unwrap_or_default(),
-                number("accuracy"),
-                number("half_width"),
-                row["images"],
-            );
+            text.push_str(&real_sea::table(&self.sea));
         }
         text
     }

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use wake_detector::Detector;
 use wake_detector::drawing::sheet;
+use wake_detector::judging::compared;
 use wake_detector::train::{Recipe, Sample};
 use wake_ldm::device_named;
 
-use super::evaluate::{HELD_OUT, SIZE, picture};
+use super::evaluate::{HELD_OUT, SIZE};
 use super::progress;
 
 /// Images that are shown.
@@ -34,7 +35,7 @@ pub(crate) fn show(out: &Path) -> Result<(), Box<dyn Error>> {
                 found.len()
             );
         });
-        pictures.push(picture(&image, &sample.wakes, &found));
+        pictures.push(compared(&image, &sample.wakes, &found));
         bar.inc(1);
     }
     bar.finish_and_clear();

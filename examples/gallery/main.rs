@@ -20,7 +20,7 @@ use std::process::ExitCode;
 use wake_detector::drawing::Drawing;
 use wake_detector::{Detector, GreyImage};
 use wake_ldm::{WakeSampler, device_named};
-use wake_physics::grey::{GreyScale, Mapping};
+use wake_physics::grey::GreyScale;
 use wake_physics::picture::Picture;
 use wake_physics::{Field, Scene, Simulation, output, simulate};
 
@@ -115,20 +115,9 @@ fn labelled(simulation: &Simulation) -> Picture {
     picture
 }
 
-/// Levels in amplitude between those that one pixel in a hundred lies below and one in two hundred above: for people, who
-/// compare nothing.
+/// Levels that fill their range.
 fn filling(field: &Field) -> Vec<u8> {
-    let mut sorted = field.values.clone();
-    sorted.sort_unstable_by(f32::total_cmp);
-    let db = |share: f64| {
-        let value = sorted[(share * (sorted.len() - 1) as f64) as usize];
-        10.0 * f64::from(value).max(1e-9).log10()
-    };
-    let grey = GreyScale {
-        darkest_db: db(0.01),
-        brightest_db: db(0.995),
-        mapping: Mapping::Amplitude,
-    };
+    let grey = GreyScale::filling(field);
     let level = |&value: &f32| grey.level(f64::from(value));
     field.values.iter().map(level).collect()
 }

@@ -138,12 +138,8 @@ fn finish(arguments: &Arguments, report: &Value) -> Result<(), Box<dyn Error>> {
     if arguments.json {
         return Ok(exit::say(&format!("{report:#}"))?);
     }
-    let files: Vec<&str> = report["files"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_str)
-        .collect();
+    let files = report["files"].as_array().into_iter().flatten();
+    let files: Vec<&str> = files.filter_map(Value::as_str).collect();
     let seconds = report["seconds"]["total"].as_f64().unwrap_or_default();
     let (files, out) = (files.join(", "), out.display());
     Ok(exit::say(&format!("{files} in {out}, {seconds:.2} s"))?)

@@ -3,17 +3,8 @@
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use wake_physics::measure::WakeAxis;
+use wake_physics::measure::{ImageFigures, WakeAxis};
 use wake_physics::{Error, Field, Result};
-
-/// One image.
-pub(crate) struct Real {
-    pub(crate) name: String,
-    /// Its grey, taken as linear in amplitude.
-    pub(crate) amplitude: Field,
-    /// Its wakes by name, without the doubtful ones.
-    pub(crate) wakes: Vec<(String, WakeAxis)>,
-}
 
 /// `labels.json` of a folder; more keys are allowed.
 #[derive(Deserialize, Default)]
@@ -34,8 +25,9 @@ struct Wake {
     confidence: String,
 }
 
-/// The PNG images of a folder by name, without those whose name ends in `_mask`.
-pub(crate) fn images(folder: &Path) -> Result<Vec<Real>> {
+/// Figures of the PNG images of a folder by name, without those whose name ends in `_mask`: their grey is taken as linear in
+/// amplitude, and doubtful wakes are left out.
+pub(crate) fn figures(folder: &Path) -> Result<Vec<ImageFigures>> {
     let labels = labels(&folder.join("labels.json"))?;
     let mut images = Vec::new();
     for path in pictures(folder)? {
@@ -45,19 +37,15 @@ pub(crate) fn images(folder: &Path) -> Result<Vec<Real>> {
         let wakes = labels.images.get(&name(path.file_name()));
         let wakes = wakes.into_iter().flat_map(|image| &image.wakes);
         let wakes = wakes.filter(|wake| wake.confidence != "doubtful");
-        images.push(Real {
-            name: name(path.file_stem()),
-            amplitude: grey(&path)?,
-            wakes: wakes
-                .map(|wake| {
-                    let axis = WakeAxis {
-                        tip: wake.tip,
-                        direction: wake.axis_deg,
-                    };
-                    (wake.id.clone(), axis)
-                })
-                .collect(),
+        let wakes = wakes.map(|wake| {
+            let axis = WakeAxis {
+                tip: wake.tip,
+                direction: wake.axis_deg,
+            };
+            (wake.id.clone(), axis)
         });
+        let name = name(path.file_stem());
+        images.push(ImageFigures::of_amplitude(&name, &grey(&path)?, wakes));
     }
     Ok(images)
 }

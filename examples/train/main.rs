@@ -39,19 +39,22 @@ mod fine_tune;
 mod options;
 #[path = "../common/progress.rs"]
 mod progress;
+mod screen;
 mod sea;
 #[path = "../common/sea_images.rs"]
 mod sea_images;
-mod sheet;
 mod source;
-mod stage;
 mod stages;
 mod text_to_image;
 
+use std::error::Error;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use options::Options;
+use options::defaults;
+use wake_ldm::train::WakeStage;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// Train the small wake model.
 #[derive(Parser)]
@@ -64,27 +67,34 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Stage {
     /// Fit the patch transform, in closed form.
-    Autoencoder(Options),
+    #[command(mut_args(defaults(stages::DEFAULTS)))]
+    Autoencoder(stages::Options),
     /// Train the reader of prompts.
-    Words(Options),
+    #[command(mut_args(defaults(stages::DEFAULTS)))]
+    Words(stages::Options),
     /// Train mean and spread of the latents.
-    Mean(Options),
+    #[command(mut_args(defaults(stages::DEFAULTS)))]
+    Mean(stages::Options),
     /// Train the flow that draws the sea.
-    Diffusion(Options),
+    #[command(mut_args(defaults(stages::DEFAULTS)))]
+    Diffusion(stages::Options),
     /// Learn the sea of a folder of real images, without labels.
+    #[command(mut_args(defaults(sea::DEFAULTS)))]
     Sea(sea::Options),
     /// Learn a model of Stable Diffusion's kind from nothing.
+    #[command(mut_args(defaults(text_to_image::DEFAULTS)))]
     TextToImage(text_to_image::Options),
     /// Fit a model in diffusers layout to simulated pairs: its U-Net, or low-rank changes of it.
+    #[command(mut_args(defaults(fine_tune::DEFAULTS)))]
     FineTune(fine_tune::Options),
 }
 
 fn main() -> ExitCode {
     exit::code(|| match Arguments::parse().stage {
-        Stage::Autoencoder(options) => stages::autoencoder(&options),
-        Stage::Words(options) => stages::words(&options),
-        Stage::Mean(options) => stages::mean(&options),
-        Stage::Diffusion(options) => stages::diffusion(&options),
+        Stage::Autoencoder(options) => stages::run(WakeStage::Autoencoder, &options),
+        Stage::Words(options) => stages::run(WakeStage::Words, &options),
+        Stage::Mean(options) => stages::run(WakeStage::Mean, &options),
+        Stage::Diffusion(options) => stages::run(WakeStage::Diffusion, &options),
         Stage::Sea(options) => sea::run(&options),
         Stage::TextToImage(options) => text_to_image::run(&options),
         Stage::FineTune(options) => fine_tune::run(&options),

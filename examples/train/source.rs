@@ -1,110 +1,73 @@
 //! Pairs to learn from, on disk or simulated.
 
-use std::error::Error;
-use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
 
-use serde_json::{Value, json};
-use wake_ldm::dataset::{self, Folder, Manifest, Pair, Recipe, Simulated};
+use wake_ldm::dataset::{Folder, Recipe};
 use wake_ldm::network::WakeModelConfig;
+use wake_ldm::train::TrainingPairs;
+use wake_physics::available_memory;
 
-use super::options::Options;
+use super::Outcome;
+use super::stages::Options;
 
-/// The first `count` pairs of a source.
-pub(crate) struct Source {
-    pairs: Arc<dyn dataset::Source>,
-    count: u64,
-    set: Manifest,
+/// The pairs of --data, or those of --recipe.
+pub(crate) fn pairs(options: &Options) -> Outcome<TrainingPairs> {
+    if let Some(path) = &options.data {
+        return Ok(TrainingPairs::folder(folder(path)?));
+    }
+    let recipe = Recipe::named_or_read(&options.recipe)?;
+    Ok(TrainingPairs::simulated(
+        recipe,
+        options.place.seed,
+        options.count,
+    )?)
 }
 
-impl Source {
-    /// Pairs that a model can learn from: those of --data, of which every scene must fit it, or simulated ones.
-    pub(crate) fn new(options: &Options, config: &WakeModelConfig) -> Result<Self, Box<dyn Error>> {
-        let Some(path) = &options.data else {
-            let mut recipe = options.recipe()?;
-            recipe.scene.grid.rows = config.image_size;
-            recipe.scene.grid.columns = config.image_size;
-            recipe.grey = config.grey;
-            return Self::simulated(recipe, options.seed, options.count);
-        };
-        let folder = folder(path)?;
-        let (found, grey) = (folder.manifest().grey, config.grey);
-        if found != grey {
-            return Err(format!(
-                "--data {}: grey is {found:?}, but the model's is {grey:?}; make the set with the recipe's grey, or train \
-                 another model in another --out",
-                path.display()
-            )
-            .into());
-        }
-        for (number, scene) in folder.scenes().enumerate() {
-            let told = |error| format!("--data {}: pair {number}: {error}", path.display());
-            config.check_scene(scene).map_err(told)?;
-        }
-        Ok(Self::of(folder))
+/// The same for a model: of --data every scene must fit it, and what is simulated has its size and grey.
+pub(crate) fn fitting(options: &Options, config: &WakeModelConfig) -> Outcome<TrainingPairs> {
+    let Some(path) = &options.data else {
+        let mut recipe = Recipe::named_or_read(&options.recipe)?;
+        recipe.scene.grid.rows = config.image_size;
+        recipe.scene.grid.columns = config.image_size;
+        recipe.grey = config.grey;
+        let (seed, count) = (options.place.seed, options.count);
+        return Ok(TrainingPairs::simulated(recipe, seed, count)?);
+    };
+    let folder = folder(path)?;
+    let (found, grey) = (folder.manifest().grey, config.grey);
+    if found != grey {
+        return Err(format!(
+            "--data {}: grey is {found:?}, but the model's is {grey:?}; make the set with the recipe's grey, or train \
+             another model in another --out",
+            path.display()
+        )
+        .into());
     }
-
-    /// Pairs that any model can learn from: those of a folder, or simulated ones of a recipe.
-    pub(crate) fn any(
-        data: Option<&Path>,
-        recipe: Recipe,
-        seed: u64,
-        count: u64,
-    ) -> Result<Self, Box<dyn Error>> {
-        match data {
-            Some(path) => Ok(Self::of(folder(path)?)),
-            None => Self::simulated(recipe, seed, count),
-        }
+    for (number, scene) in folder.scenes().enumerate() {
+        let told = |error| format!("--data {}: pair {number}: {error}", path.display());
+        config.check_scene(scene).map_err(told)?;
     }
-
-    fn simulated(recipe: Recipe, seed: u64, count: u64) -> Result<Self, Box<dyn Error>> {
-        Ok(Self {
-            set: Manifest::new(recipe.clone(), seed, count)?,
-            pairs: Arc::new(Simulated::new(recipe, seed)?),
-            count,
-        })
-    }
-
-    fn of(folder: Folder) -> Self {
-        Self {
-            count: folder.len(),
-            set: folder.manifest().clone(),
-            pairs: Arc::new(folder),
-        }
-    }
-
-    /// The first pairs, to be shown.
-    pub(crate) fn first(&self, count: u64) -> wake_ldm::Result<Vec<Pair>> {
-        self.items(0..self.count.min(count))
-    }
-
-    /// The pairs at some positions.
-    pub(crate) fn items(&self, positions: Range<u64>) -> wake_ldm::Result<Vec<Pair>> {
-        self.pairs.items(positions)
-    }
-
-    /// Where they come from.
-    pub(crate) fn pairs(&self) -> &dyn dataset::Source {
-        self.pairs.as_ref()
-    }
-
-    /// Number of pairs.
-    pub(crate) fn len(&self) -> u64 {
-        self.count
-    }
-
-    /// What the pairs are, as a run notes it.
-    pub(crate) fn identity(&self) -> Value {
-        json!({"set": self.set, "shard": self.set.shard})
-    }
+    Ok(TrainingPairs::folder(folder))
 }
 
 /// A folder with pairs in it.
-fn folder(path: &Path) -> Result<Folder, Box<dyn Error>> {
+pub(crate) fn folder(path: &Path) -> Outcome<Folder> {
     let folder = Folder::open(path)?;
     match folder.is_empty() {
         true => Err(format!("--data {}: no pair to learn from", path.display()).into()),
         false => Ok(folder),
     }
+}
+
+/// Refuses pairs that do not fit in memory.
+pub(crate) fn check_memory(count: u64, needed: u64) -> Outcome<()> {
+    let Some(free) = available_memory().filter(|&free| free < needed) else {
+        return Ok(());
+    };
+    let [needed, free] = [needed, free].map(|bytes| bytes as f64 / (1u64 << 30) as f64);
+    Err(format!(
+        "{count} pairs need {needed:.1} GiB of memory, but {free:.1} GiB are free; lower --count, or take a \
+         smaller --data"
+    )
+    .into())
 }

@@ -17,6 +17,25 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
+    /// A file or folder that cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+
+    /// A folder without images.
+    #[error("{} holds no PNG, JPEG or TIFF file; name another folder", folder.display())]
+    NoImages { folder: PathBuf },
+
+    /// Two images whose results nothing would tell apart.
+    #[error("two images are called {name:?}; search them one after the other")]
+    SameName { name: String },
+
+    /// Labels of another form than that of `labels.json`.
+    #[error("{}: {message}", path.display())]
+    Labels { path: PathBuf, message: String },
+
     /// A file that is no image.
     #[error(
         "{} is no image that can be read ({why}); give a PNG, JPEG or TIFF file of 8 or 16 bits",

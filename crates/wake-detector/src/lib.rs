@@ -2,6 +2,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod error;
+mod files;
 mod image;
 mod normalize;
 mod scaling;
@@ -18,11 +19,17 @@ pub mod drawing;
 pub mod radon;
 pub mod score;
 
+mod finder;
+
+#[cfg(feature = "train")]
+pub mod judging;
 #[cfg(feature = "train")]
 pub mod train;
 
 pub use burn;
 pub use detector::Detector;
 pub use error::{Error, Result};
+pub use files::image_files;
+pub use finder::Finder;
 pub use image::GreyImage;
 pub use wake::{Detection, Wake};

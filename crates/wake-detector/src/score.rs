@@ -82,6 +82,17 @@ pub struct Judged {
     pub found: Vec<Found>,
 }
 
+impl Judged {
+    /// The same image with what a finder has found in it.
+    #[must_use]
+    pub fn with_found(&self, found: &[Detection]) -> Self {
+        Self {
+            found: found.iter().map(Found::from).collect(),
+            ..self.clone()
+        }
+    }
+}
+
 /// By which rule detections are right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rule {

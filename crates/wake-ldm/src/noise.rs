@@ -71,6 +71,12 @@ pub(crate) mod uniform {
     /// Training steps of fine-tuning.
     #[cfg(feature = "train")]
     pub(crate) const STEPS: u32 = 2100;
+    /// Pairs of fine-tuning.
+    #[cfg(feature = "train")]
+    pub(crate) const PAIRS: u32 = 2200;
+    /// Prompts that fine-tuning leaves out.
+    #[cfg(feature = "train")]
+    pub(crate) const UNTOLD: u32 = 2201;
     /// The order of examples; round i of the shuffle has `ORDER + i`.
     #[cfg(feature = "dataset")]
     pub(crate) const ORDER: u32 = 1 << 20;

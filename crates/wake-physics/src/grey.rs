@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::LN_10;
 
 use crate::error::{Error, Result};
+use crate::raster::Field;
 
 /// Grey between two fixed ends, the same for every scene: linear in decibel, or in amplitude as quick-looks are.
 ///
@@ -69,6 +70,26 @@ impl GreyScale {
         Self {
             darkest_db: -60.0,
             brightest_db: 10.0 * mean_sigma0.log10() + 8.0,
+            mapping: Mapping::Amplitude,
+        }
+    }
+
+    /// Grey in amplitude that fills its range with one image: one pixel in a hundred lies below black, and one in two hundred
+    /// above white. For people, who compare nothing.
+    ///
+    /// - `field`: σ⁰ \[1\], at least one pixel
+    #[must_use]
+    pub fn filling(field: &Field) -> Self {
+        let mut sorted = field.values.clone();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let db = |share: f64| {
+            let place = (share * sorted.len().saturating_sub(1) as f64) as usize;
+            let value = sorted.get(place).copied().unwrap_or_default();
+            10.0 * f64::from(value).max(1e-9).log10()
+        };
+        Self {
+            darkest_db: db(0.01),
+            brightest_db: db(0.995),
             mapping: Mapping::Amplitude,
         }
     }
@@ -166,6 +187,20 @@ impl GreyScale {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of 201 values, the third lies one in a hundred from below, the second to last one in two hundred from above.
+    #[test]
+    fn one_image_fills_its_own_range() {
+        let field = Field {
+            rows: 1,
+            columns: 201,
+            values: (1..=201).rev().map(|n| n as f32).collect(),
+        };
+        let grey = GreyScale::filling(&field);
+        assert!((grey.darkest_db - 10.0 * 3f64.log10()).abs() < 1e-12);
+        assert!((grey.brightest_db - 10.0 * 200f64.log10()).abs() < 1e-12);
+        assert_eq!((grey.level(3.0), grey.level(200.0)), (0, 255));
+    }
 
     /// Against differences of the mapping itself.
     #[test]

@@ -46,6 +46,30 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// A small grey picture of an image: each pixel is the mean of a square block, of as many pixels that neither side is longer
+    /// than `side`; what fills no block at the right and the bottom is left out.
+    ///
+    /// - `levels`, `columns`: as in [`from_levels`](Self::from_levels)
+    ///
+    /// # Panics
+    ///
+    /// If the levels are not whole rows.
+    #[must_use]
+    pub fn reduced(levels: &[u8], columns: usize, side: usize) -> Self {
+        let rows = levels.len() / columns.max(1);
+        assert!(rows * columns == levels.len(), "levels of whole rows");
+        let block = rows.max(columns).div_ceil(side.max(1)).max(1);
+        let [down, right] = [rows / block, columns / block];
+        let mean = |n: usize| {
+            let first = n / right * block * columns + n % right * block;
+            let lines = (0..block).map(|line| &levels[first + line * columns..][..block]);
+            let sum: usize = lines.flatten().map(|&level| usize::from(level)).sum();
+            (sum / (block * block)) as u8
+        };
+        let levels: Vec<u8> = (0..down * right).map(mean).collect();
+        Self::from_levels(&levels, right)
+    }
+
     /// A grey picture from levels of 8 bits, `[rows, columns]`, row after row.
     ///
     /// # Panics
@@ -286,6 +310,21 @@ mod tests {
         places
             .filter(|&[i, j]| picture.at(i, j) == colour)
             .collect()
+    }
+
+    /// Seven columns give three blocks of two, and one column that is left out.
+    #[test]
+    fn pixels_of_a_small_picture_are_means_of_blocks() {
+        let levels: Vec<u8> = (0..4 * 7).map(|n| 10 * (n % 7) + n / 7).collect();
+        let small = Picture::reduced(&levels, 7, 4);
+        assert_eq!(small.size(), [2, 3]);
+        let red: Vec<u8> = small.pixels.iter().map(|pixel| pixel[0]).collect();
+        // 10 · (column + ½) + row + ½, rounded down.
+        assert_eq!(red, [5, 25, 45, 7, 27, 47]);
+        assert_eq!(
+            Picture::reduced(&levels, 7, 7),
+            Picture::from_levels(&levels, 7)
+        );
     }
 
     #[test]

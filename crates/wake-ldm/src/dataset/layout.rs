@@ -8,12 +8,15 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use wake_physics::Plan;
 use wake_physics::grey::GreyScale;
 
 /// Version of the layout; a reader refuses others.
 const FORMAT: u32 = 3;
 /// Share of the images that are for validation, unless another is asked for.
 const VAL_SHARE: f64 = 0.1;
+/// Scenes that are planned to tell what a set costs.
+const PLANNED: u64 = 8;
 
 /// What a data set is: the content of its `dataset.json`, from which every other file follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -111,6 +114,21 @@ impl Manifest {
     /// As [`Simulated::new`].
     pub fn source(&self) -> Result<Simulated> {
         Simulated::new(self.recipe.clone(), self.seed)
+    }
+
+    /// What an image of this folder costs, by the plans of its first eight scenes: seconds of a core.
+    ///
+    /// # Errors
+    ///
+    /// As [`Simulated::scene`] and [`Plan::new`].
+    pub fn core_seconds(&self) -> Result<f64> {
+        let (source, indices) = (self.source()?, self.indices());
+        let planned = PLANNED.min(indices.end - indices.start).max(1);
+        let mut seconds = 0.0;
+        for index in indices.start..indices.start + planned {
+            seconds += Plan::new(&source.scene(index)?)?.cost().core_seconds;
+        }
+        Ok(seconds / planned as f64)
     }
 
     /// The indices of this folder: all, or one of nearly equal runs of neighbours.

@@ -56,7 +56,7 @@ pub use pair::{Grey, Pair};
 pub use prompts::Prompts;
 pub use recipe::{Draw, Recipe};
 pub use sampled::Sampled;
-pub use scenes::Simulated;
+pub use scenes::{PAPER_SCENES, Simulated};
 #[cfg(feature = "train")]
 pub(crate) use shuffle::shuffled;
 pub use source::{Finite, Source};

@@ -9,7 +9,7 @@ use wake_physics::scene::paper_grid;
 use wake_text::{PartialScene, Wording};
 
 /// Number of scenes in the paper's grid.
-pub(super) const PAPER_SCENES: u64 = 3456;
+pub const PAPER_SCENES: u64 = 3456;
 
 /// Steps in which the paper's grid is walked: prime, so that every scene comes once, and near the golden section of
 /// the grid, so that the first few already differ in every value.

@@ -23,6 +23,9 @@ pub struct RunFolder {
     _lock: FolderLock,
 }
 
+/// Where the checkpoints of all stages lie in it.
+const CHECKPOINTS: &str = "checkpoints";
+
 /// How far the results of a stage are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Noted {
@@ -53,7 +56,7 @@ impl RunFolder {
         };
         let model = serde_json::to_value(model).map_err(encode)?;
         compare(path, &model, data)?;
-        check_begin(path, stage, resume)?;
+        check_begin(path, &path.join(CHECKPOINTS).join(stage), stage, resume)?;
         let lock = output::lock_folder(path)?;
         let mut record = read(&path.join("run.json"))?.unwrap_or_default();
         if !data.is_null() {
@@ -69,9 +72,14 @@ impl RunFolder {
         Ok(folder)
     }
 
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Where the checkpoints of a stage lie.
     pub fn checkpoints(&self, stage: &str) -> PathBuf {
-        self.path.join("checkpoints").join(stage)
+        self.path.join(CHECKPOINTS).join(stage)
     }
 
     /// The checkpoint that a stage goes on from, or none for one that begins.
@@ -80,7 +88,7 @@ impl RunFolder {
     ///
     /// [`Error::InvalidOption`] when there is none to resume, or one that a new beginning would lose.
     pub fn begin(&self, stage: &str, resume: bool) -> Result<Option<Checkpoint>> {
-        check_begin(&self.path, stage, resume)?;
+        check_begin(&self.path, &self.checkpoints(stage), stage, resume)?;
         Checkpoint::newest(&self.checkpoints(stage))
     }
 
@@ -160,13 +168,23 @@ fn compare(path: &Path, model: &Value, data: &Value) -> Result<()> {
 }
 
 /// Refuses to resume what never began, and to begin what has begun.
-fn check_begin(path: &Path, stage: &str, resume: bool) -> Result<()> {
-    let folder = path.join("checkpoints").join(stage);
-    match (Checkpoint::newest_step(&folder)?, resume) {
+///
+/// - `path`: the folder of the run
+/// - `checkpoints`: where those of the stage lie
+pub(super) fn check_begin(
+    path: &Path,
+    checkpoints: &Path,
+    stage: &str,
+    resume: bool,
+) -> Result<()> {
+    match (Checkpoint::newest_step(checkpoints)?, resume) {
         (Some(_), true) | (None, false) => Ok(()),
         (None, true) => Err(Error::InvalidOption {
             option: "--resume".to_owned(),
-            value: format!("given, but there is no checkpoint in {}", folder.display()),
+            value: format!(
+                "given, but there is no checkpoint in {}",
+                checkpoints.display()
+            ),
             expected: "no --resume for a run that begins".to_owned(),
         }),
         (Some(step), false) => Err(Error::InvalidOption {

@@ -2,10 +2,10 @@
 
 use burn::module::Module;
 use serde_json::{Map, Value, json};
-use std::path::Path;
 
 use super::folder::RunFolder;
 use super::metrics::Metrics;
+use super::progress::Progress;
 use super::run::{Run, Task};
 use crate::error::Error;
 
@@ -14,22 +14,20 @@ use crate::error::Error;
 pub struct Stage<'a> {
     /// Name of the stage, its checkpoints and its log.
     pub name: &'static str,
-    /// Folder of the results.
-    pub out: &'a Path,
     /// Whether it goes on from the newest checkpoint.
     pub resume: bool,
     /// Steps between checkpoints, at least 1.
     pub every: usize,
     /// Steps in all.
     pub steps: usize,
-    /// Files that are written after every checkpoint.
+    /// Files of the folder that are written after every checkpoint.
     pub results: &'a [&'a str],
 }
 
 impl Stage<'_> {
     /// Makes all steps.
     ///
-    /// - `done`: told the number of steps and the loss after each
+    /// - `progress`: told of every step
     /// - `show`: writes the results, after every checkpoint; and at the start, where a kill has left those of an earlier one
     ///
     /// # Errors
@@ -40,10 +38,14 @@ impl Stage<'_> {
         folder: &mut RunFolder,
         mut run: Run<M>,
         task: &impl Task<M>,
-        mut done: impl FnMut(usize, f64),
+        progress: &dyn Fn(Progress),
         show: impl Fn(&Run<M>) -> Result<(), E>,
     ) -> Result<(), E> {
         let Self { name, steps, .. } = self;
+        progress(Progress::Begin {
+            what: name,
+            of: steps as u64,
+        });
         if let Some(checkpoint) = folder.begin(name, self.resume)? {
             run.resume(checkpoint)?;
             if !folder.is_current(name, run.steps(), self.results) {
@@ -51,7 +53,7 @@ impl Stage<'_> {
             }
             folder.note(name, run.steps(), steps)?;
         }
-        let log = self.out.join(format!("{name}.jsonl"));
+        let log = folder.path().join(format!("{name}.jsonl"));
         let mut metrics = Metrics::open(&log, run.steps())?;
         while run.steps() < steps {
             let (report, terms) = run.step(task)?;
@@ -60,13 +62,17 @@ impl Stage<'_> {
                 .map(|(term, value)| (term.to_owned(), json!(value)))
                 .collect();
             metrics.write(run.steps(), steps, report, &Value::Object(terms))?;
-            done(run.steps(), report.loss);
+            progress(Progress::Step {
+                step: run.steps(),
+                loss: report.loss,
+            });
             if run.steps().is_multiple_of(self.every.max(1)) || run.steps() == steps {
                 run.checkpoint(&folder.checkpoints(name))?;
                 show(&run)?;
                 folder.note(name, run.steps(), steps)?;
             }
         }
+        progress(Progress::Made { stage: name, steps });
         Ok(())
     }
 }

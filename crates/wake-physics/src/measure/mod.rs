@@ -14,6 +14,7 @@
 //! band, R/V 78 s) that are not among those of the `evaluate` example, which reports how good the result is.
 
 mod arms;
+mod figures;
 mod inversion;
 mod open_sea;
 mod profile;
@@ -28,6 +29,7 @@ mod wake;
 #[cfg(test)]
 mod tests;
 
+pub use figures::{ImageFigures, StatedSpeckle, WakeFigures};
 pub use inversion::{incidence, mean_sigma0, wind_axis, wind_speed};
 pub use open_sea::{OpenSea, open_sea};
 pub use profile::{Streak, WakeAxis, WakeProfile, wake_arms, wake_profile};

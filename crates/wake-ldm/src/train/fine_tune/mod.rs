@@ -1,5 +1,8 @@
 //! Fine-tuning of a Stable Diffusion-layout model: the U-Net, or low-rank changes of it.
 
+mod batches;
+mod training;
+
 use std::path::{Path, PathBuf};
 
 use burn::module::Module;
@@ -16,6 +19,9 @@ use crate::scheduler::{NoiseLevel, NoiseSchedule, Prediction};
 use crate::text::ClipText;
 use crate::unet::{UNet, UNetInput};
 use crate::weights::Layout;
+
+pub use batches::PromptedBatches;
+pub use training::FineTuning;
 
 /// Constants of a [`FineTune`] run.
 #[derive(Debug, Clone)]

@@ -1,0 +1,152 @@
+//! Figures of one image that stand beside those of others, simulated or real: the texture of its sea, and what lies across
+//! its wakes.
+
+use serde::Serialize;
+
+use super::profile::{Streak, WakeAxis, WakeProfile, wake_arms, wake_profile};
+use super::texture::{Texture, amplitude_correlation, texture};
+use crate::raster::Field;
+use crate::scene::Scene;
+use crate::simulate::Simulation;
+use crate::window::Window;
+
+/// Side of the windows of open sea \[pixels\].
+const SIDE: usize = 256;
+/// Stretches of a wake from its tip \[pixels\].
+const STRETCHES: [[f64; 2]; 3] = [[25.0, 85.0], [85.0, 170.0], [170.0, 300.0]];
+
+/// What is measured in one image of amplitude.
+#[derive(Debug, Clone, Serialize)]
+pub struct ImageFigures {
+    /// Name of the image.
+    pub name: String,
+    /// What window, resolution and looks say of the speckle of a simulated image.
+    pub stated: Option<StatedSpeckle>,
+    /// The texture of its open sea, in windows of 256 pixels a side; `None` where no window holds sea alone.
+    pub texture: Option<Texture>,
+    /// What lies across its wakes.
+    pub wakes: Vec<WakeFigures>,
+}
+
+/// Speckle in closed form, see [`amplitude_correlation`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StatedSpeckle {
+    /// Independent looks that overlapping ones are worth.
+    pub looks: f64,
+    /// Correlation of amplitudes one, two and three pixels apart in a row.
+    pub along_rows: [f64; 3],
+    /// The same in a column.
+    pub along_columns: [f64; 3],
+}
+
+/// What lies across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
+#[derive(Debug, Clone, Serialize)]
+pub struct WakeFigures {
+    /// Names of the image and of the wake in it.
+    pub name: String,
+    /// Dark line and bright streak of each stretch.
+    pub stretches: [Option<WakeProfile>; 3],
+    /// Arms of each stretch, on either side of the axis.
+    pub arms: [[Option<Streak>; 2]; 3],
+}
+
+impl ImageFigures {
+    /// Those of a simulated image with speckle; its wakes are called by letters.
+    #[must_use]
+    pub fn of_simulation(name: &str, simulation: &Simulation) -> Self {
+        let mut amplitude = simulation.speckled.clone();
+        amplitude.values.iter_mut().for_each(|v| *v = v.sqrt());
+        let wakes = simulation.labels.ships.iter().map(|ship| &ship.wake);
+        let axes = wakes.filter_map(|wake| {
+            Some(WakeAxis {
+                tip: wake.tip_px?,
+                direction: wake.axis_deg?,
+            })
+        });
+        let axes = axes.enumerate().map(|(n, axis)| (letter(n), axis));
+        Self {
+            stated: Some(StatedSpeckle::of(
+                &simulation.scene,
+                simulation.raster.spacing,
+            )),
+            ..Self::of_amplitude(name, &amplitude, axes)
+        }
+    }
+
+    /// Those of an image that is linear in amplitude.
+    ///
+    /// - `wakes`: the axes of its wakes by their names
+    #[must_use]
+    pub fn of_amplitude(
+        name: &str,
+        amplitude: &Field,
+        wakes: impl IntoIterator<Item = (String, WakeAxis)>,
+    ) -> Self {
+        let wakes = wakes.into_iter().map(|(letter, axis)| WakeFigures {
+            name: format!("{name} {letter}"),
+            stretches: STRETCHES.map(|stretch| wake_profile(amplitude, &axis, stretch)),
+            arms: STRETCHES.map(|stretch| wake_arms(amplitude, &axis, stretch)),
+        });
+        Self {
+            name: name.to_owned(),
+            stated: None,
+            wakes: wakes.collect(),
+            texture: texture(amplitude, SIDE),
+        }
+    }
+}
+
+impl StatedSpeckle {
+    /// That of a scene's radar.
+    ///
+    /// - `spacing`: of the pixels \[m\]
+    #[must_use]
+    pub fn of(scene: &Scene, spacing: f64) -> Self {
+        let radar = &scene.radar;
+        let window = radar.window.unwrap_or(Window::Uniform);
+        let overlap = radar.look_overlap.unwrap_or(0.0);
+        let looks = window.overlapping_looks(radar.looks, overlap);
+        let lags = |resolution: Option<f64>, window: Window| {
+            [1.0, 2.0, 3.0].map(|lag| match resolution {
+                None => 0.0,
+                Some(resolution) => {
+                    let x = lag * spacing / resolution * window.width();
+                    amplitude_correlation(looks, window.correlation(x))
+                }
+            })
+        };
+        let azimuth = radar.range_resolution.map(|_| radar.resolution);
+        Self {
+            looks,
+            along_rows: lags(radar.range_resolution, window),
+            along_columns: lags(azimuth, radar.azimuth_window.unwrap_or(window)),
+        }
+    }
+}
+
+fn letter(n: usize) -> String {
+    char::from(b'a' + (n % 26) as u8).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A uniform window has sinc²: zero at whole numbers of resolution cells, (2/π)² of the intensity at half of one.
+    #[test]
+    fn speckle_is_correlated_as_the_window_says() {
+        let mut scene = Scene::default();
+        let white = StatedSpeckle::of(&scene, 1.0);
+        assert!(white.along_rows.iter().all(|lag| lag.abs() < 1e-15));
+        (scene.radar.window, scene.radar.azimuth_window) = (Some(Window::Uniform), None);
+        (scene.radar.looks, scene.radar.look_overlap) = (1, None);
+        (scene.radar.range_resolution, scene.radar.resolution) = (Some(4.0), 8.0);
+        let cell = Window::Uniform.width();
+        let stated = StatedSpeckle::of(&scene, 4.0 / cell);
+        let half = amplitude_correlation(1.0, (2.0 / std::f64::consts::PI).powi(2));
+        assert!(stated.along_rows.iter().all(|lag| lag.abs() < 1e-12));
+        assert!((stated.along_columns[0] - half).abs() < 1e-12, "{stated:?}");
+        assert!(stated.along_columns[1].abs() < 1e-12);
+        assert!((stated.looks - 1.0).abs() < 1e-12);
+    }
+}
