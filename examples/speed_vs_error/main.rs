@@ -15,15 +15,20 @@
 //! second part is the model, where it is built in: steps, batch size and weights against many steps from the same noise. The
 //! third is the loader: images a second that a training loop gets of the simulator and of the model, by threads.
 
+mod arguments;
 #[path = "../common/exit.rs"]
 mod exit;
 #[cfg(feature = "dataset")]
 mod loader;
 #[cfg(feature = "ldm")]
 mod model;
+#[cfg(feature = "ldm")]
+mod model_row;
 mod plot;
 #[path = "../common/progress.rs"]
 mod progress;
+#[cfg(feature = "ldm")]
+mod reference;
 #[cfg(feature = "ldm")]
 mod rounding;
 mod row;
@@ -32,48 +37,13 @@ mod spacing;
 mod stages;
 mod sweep;
 
-use clap::{Parser, ValueEnum};
-use serde_json::json;
-use stages::STAGES;
+use arguments::{Arguments, Part};
+use clap::Parser;
+use serde::Serialize;
+use serde_json::{Value, json};
 use std::error::Error;
-use std::path::PathBuf;
 use std::process::ExitCode;
 use wake_physics::output;
-
-/// Measure every fast method of the simulator against its slow oracle.
-#[derive(Parser)]
-#[command(version)]
-struct Arguments {
-    /// Folder of the results, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/speed_vs_error")]
-    out: PathBuf,
-    /// Print {"rows": [...]} on standard output, and nothing else
-    #[arg(long)]
-    json: bool,
-    /// Largest size of the sweep over sizes, 128 to 2048 [pixels]
-    #[arg(long, default_value_t = 2048, value_parser = clap::value_parser!(u32).range(128..=2048))]
-    largest: u32,
-    /// What to measure
-    #[arg(long, value_enum, default_value = "all")]
-    part: Part,
-    /// Where the loader's model computes: flex, ndarray, wgpu or cuda, where compiled in
-    #[arg(long, default_value = "flex")]
-    device: String,
-    /// Stages of the simulator alone, without spacing, model and loader [repeatable; default: all]
-    #[arg(long, value_name = "STAGE", value_parser = STAGES)]
-    stage: Vec<String>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Part {
-    All,
-    /// The fast methods of the simulator
-    Simulator,
-    /// The model, where it is built in
-    Model,
-    /// Images a second through the data set's loader, where it is built in
-    Loader,
-}
 
 fn main() -> ExitCode {
     exit::code(|| run(&Arguments::parse()))
@@ -105,9 +75,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let bar = progress::bar(model::PARTS as u64, "rows of the model");
         let measured = model::measure(|| bar.inc(1))?;
         bar.finish_and_clear();
-        let steps = model::steps(&measured);
+        let steps = model_row::steps(&measured);
         plot::draw(&out.join("model.svg"), &plot::MODEL, &steps)?;
-        parts.push(("model.md", model::table(&measured)));
+        parts.push(("model.md", model_row::table(&measured)));
         add(&mut rows, &measured)?;
     }
     #[cfg(feature = "dataset")]
@@ -143,10 +113,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 }
 
 /// Adds measured rows to those of the report.
-fn add<T: serde::Serialize>(
-    rows: &mut Vec<serde_json::Value>,
-    measured: &[T],
-) -> serde_json::Result<()> {
+fn add(rows: &mut Vec<Value>, measured: &[impl Serialize]) -> serde_json::Result<()> {
     for row in measured {
         rows.push(serde_json::to_value(row)?);
     }

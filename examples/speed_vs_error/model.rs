@@ -1,43 +1,20 @@
 //! The model: steps, batch size and rounded weights against many steps from the same noise.
 
+use crate::model_row::ModelRow;
+use crate::reference::Reference;
 use crate::rounding::{Rounding, rounded};
-use crate::row::{Errors, Row, median_seconds, seconds};
+use crate::row::seconds;
 use burn::tensor::Device;
-use serde::Serialize;
 use std::error::Error;
 use wake_ldm::WakeSampler;
-use wake_physics::measure::{Binning, radial_spectrum};
 use wake_physics::{Field, Scene};
 
 /// Steps of the reference.
-const REFERENCE: usize = 100;
+pub(crate) const REFERENCE: usize = 100;
 /// Numbers of steps; each image alone, weights as they ship.
-const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
+pub(crate) const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Images at a time, at the sampler's own number of steps.
 const BATCHES: [usize; 2] = [4, 16];
-/// Runs of which the median counts.
-const RUNS: usize = 3;
-/// Smallest power of a ring, so that a constant image has a logarithm.
-const LEAST_POWER: f64 = 1e-6;
-
-/// One way to draw images against the reference.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct ModelRow {
-    /// Seconds are those of one image; the oracle is the same model with [`REFERENCE`] steps, one image at a time.
-    /// Errors are those of grey, relative to the reference's standard deviation.
-    #[serde(flatten)]
-    pub(crate) row: Row,
-    /// Steps from noise to image.
-    pub(crate) steps: usize,
-    /// How a step is made.
-    pub(crate) sampler: &'static str,
-    /// Bits of the weights; all arithmetic is in f32.
-    pub(crate) precision: &'static str,
-    /// Images at a time.
-    pub(crate) batch: usize,
-    /// Largest difference of the mean radial spectrum up to half the Nyquist frequency \[dB\].
-    pub(crate) spectrum_db: f64,
-}
 
 /// All rows; `done` hears of each.
 pub(crate) fn measure(done: impl Fn()) -> Result<Vec<ModelRow>, Box<dyn Error>> {
@@ -95,7 +72,11 @@ fn scenes(sampler: &WakeSampler) -> Vec<Scene> {
 }
 
 /// Draws the scenes, again from the first where a batch has more; image k has the seed k, whatever the batch.
-fn draw(sampler: &WakeSampler, scenes: &[Scene], batch: usize) -> wake_ldm::Result<Vec<Field>> {
+pub(crate) fn draw(
+    sampler: &WakeSampler,
+    scenes: &[Scene],
+    batch: usize,
+) -> wake_ldm::Result<Vec<Field>> {
     let count = scenes.len().max(batch);
     let seeded = |(seed, scene): (u64, &Scene)| Scene {
         seed,
@@ -111,112 +92,4 @@ fn draw(sampler: &WakeSampler, scenes: &[Scene], batch: usize) -> wake_ldm::Resu
         images.extend(drawn.into_iter().map(|image| image.grey));
     }
     Ok(images)
-}
-
-struct Reference {
-    scenes: Vec<Scene>,
-    images: Vec<Field>,
-    /// For one image.
-    seconds: f64,
-}
-
-impl Reference {
-    fn row(
-        &self,
-        sampler: &WakeSampler,
-        precision: &'static str,
-        batch: usize,
-    ) -> Result<ModelRow, Box<dyn Error>> {
-        let (seconds, images) = median_seconds(RUNS, || draw(sampler, &self.scenes, batch));
-        let images = images?;
-        let seconds = seconds / images.len() as f64;
-        let errors = self.errors(&images);
-        Ok(ModelRow {
-            row: Row {
-                stage: "model",
-                size: self.images[0].rows,
-                tolerance: None,
-                fast_seconds: seconds,
-                oracle_seconds: self.seconds,
-                pixels: self.images[0].values.len(),
-                matrix_product_seconds: None,
-                ratio: self.seconds / seconds,
-                max_error: errors.max,
-                rms_error: errors.rms,
-            },
-            steps: sampler.steps(),
-            sampler: "euler",
-            precision,
-            batch,
-            spectrum_db: self.spectrum_db(&images),
-        })
-    }
-
-    /// Over all images together.
-    fn errors(&self, images: &[Field]) -> Errors {
-        let all = |images: &[Field]| -> Vec<f64> {
-            let values = images.iter().flat_map(|image| &image.values);
-            values.map(|&v| f64::from(v)).collect()
-        };
-        let exact = all(&self.images);
-        let squares: f64 = self
-            .images
-            .iter()
-            .map(|image| {
-                let mean = image.mean();
-                let values = image.values.iter();
-                values.map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>()
-            })
-            .sum();
-        let deviation = (squares / exact.len() as f64).sqrt();
-        Errors::of(all(images).into_iter(), &exact, deviation)
-    }
-
-    /// The largest difference of the mean spectra in dB.
-    fn spectrum_db(&self, images: &[Field]) -> f64 {
-        let half = self.images[0].rows.min(self.images[0].columns) / 4;
-        let mut difference = vec![0.0; half + 1];
-        for (reference, image) in self.images.iter().zip(images) {
-            let [of_reference, of_image] =
-                [reference, image].map(|field| radial_spectrum(field, Binning::Round).power);
-            for (ring, sum) in difference.iter_mut().enumerate() {
-                let ratio = of_image[ring].max(LEAST_POWER) / of_reference[ring].max(LEAST_POWER);
-                *sum += 10.0 * ratio.log10() / self.images.len() as f64;
-            }
-        }
-        // Ring 0 is the mean.
-        difference[1..]
-            .iter()
-            .fold(0.0, |most, d| most.max(d.abs()))
-    }
-}
-
-/// The rows of the steps alone, for a plot.
-pub(crate) fn steps(rows: &[ModelRow]) -> Vec<Row> {
-    let steps = rows.iter().take(STEPS.len());
-    steps.map(|row| row.row.clone()).collect()
-}
-
-/// The rows as a table in Markdown.
-pub(crate) fn table(rows: &[ModelRow]) -> String {
-    let mut text =
-        "| steps | sampler | weights | batch | ms per image | ratio | max error | rms error | spectrum dB |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
-            .to_owned();
-    for r in rows {
-        text += &format!(
-            "| {} | {} | {} | {} | {:.1} | {:.1} | {:.1e} | {:.1e} | {:.2} |\n",
-            r.steps,
-            r.sampler,
-            r.precision,
-            r.batch,
-            1e3 * r.row.fast_seconds,
-            r.row.ratio,
-            r.row.max_error,
-            r.row.rms_error,
-            r.spectrum_db
-        );
-    }
-    let reference = rows.first().map_or(0.0, |r| r.row.oracle_seconds);
-    text + &format!("\nReference: {REFERENCE} steps, {reference:.2} s per image.\n")
 }
