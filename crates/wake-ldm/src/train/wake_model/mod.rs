@@ -193,14 +193,14 @@ impl<'a> WakeTraining<'a> {
     }
 
     /// Encodes all pairs and the images expected of their scenes, which then stay in memory.
-    fn latents(&mut self, patches: &PatchTransform) -> Result<Arc<LatentSet>> {
+    fn latents(&mut self, transform: &PatchTransform) -> Result<Arc<LatentSet>> {
         if let Some(latents) = &self.latents {
             return Ok(latents.clone());
         }
         let (pairs, config) = (self.pairs()?, &self.config);
         let (source, count) = (pairs.source(), pairs.len());
         let set = counted("pairs", count, self.progress, |done| {
-            LatentSet::of(source, count, config, patches, done)
+            LatentSet::of(source, count, config, transform, done)
         });
         let set = Arc::new(set?);
         self.latents = Some(set.clone());
