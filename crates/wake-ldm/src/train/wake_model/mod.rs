@@ -83,8 +83,8 @@ impl WakeStage {
 /// The training of one [`WakeModel`](crate::network::WakeModel) in a folder.
 ///
 /// A stage runs the earlier ones first, or to their end, where their weights are not in the folder yet. They leave there
-/// what [`WakeSampler::load`](crate::WakeSampler::load) reads (weights averaged, 16 bits), `shares.json`, a log `STAGE.jsonl` for
-/// each stage, `sheet.png`, and what a [`RunFolder`] has.
+/// what [`WakeSampler::from_folder`](crate::WakeSampler::from_folder) reads (weights averaged, 16 bits),
+/// `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and what a [`RunFolder`] has.
 ///
 /// ```no_run
 /// use wake_ldm::dataset::Recipe;
