@@ -83,8 +83,8 @@ impl WakeStage {
 /// The training of one [`WakeModel`](crate::network::WakeModel) in a folder.
 ///
 /// A stage runs the earlier ones first, or to their end, where their weights are not in the folder yet. They leave there
-/// what [`WakeSampler::load`](crate::WakeSampler::load) reads (weights averaged, 16 bits), `shares.json`, a log `STAGE.jsonl` for
-/// each stage, `sheet.png`, and what a [`RunFolder`] has.
+/// what [`WakeSampler::from_folder`](crate::WakeSampler::from_folder) reads (weights averaged, 16 bits),
+/// `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and what a [`RunFolder`] has.
 ///
 /// ```no_run
 /// use wake_ldm::dataset::Recipe;
@@ -193,14 +193,14 @@ impl<'a> WakeTraining<'a> {
     }
 
     /// Encodes all pairs and the images expected of their scenes, which then stay in memory.
-    fn latents(&mut self, patches: &PatchTransform) -> Result<Arc<LatentSet>> {
+    fn latents(&mut self, transform: &PatchTransform) -> Result<Arc<LatentSet>> {
         if let Some(latents) = &self.latents {
             return Ok(latents.clone());
         }
         let (pairs, config) = (self.pairs()?, &self.config);
         let (source, count) = (pairs.source(), pairs.len());
         let set = counted("pairs", count, self.progress, |done| {
-            LatentSet::of(source, count, config, patches, done)
+            LatentSet::of(source, count, config, transform, done)
         });
         let set = Arc::new(set?);
         self.latents = Some(set.clone());
