@@ -97,14 +97,20 @@ fn a_model_in_diffusers_layout_is_fine_tuned_whole_and_by_low_rank_changes() {
     let set = folder.path().join("set");
     for (name, rank) in [("whole", None), ("changes", Some("2"))] {
         let out = folder.path().join(name);
-        // Two steps, then two more from the checkpoint.
-        for more in [&["--steps", "2"][..], &["--steps", "4", "--resume"]] {
+        let fine_tune = |more: &[&str], out: &Path| {
             let mut arguments = vec!["fine-tune", "--weights", weights, "--data", text(&set)];
             arguments.extend(["--batch", "2", "--rate", "1e-3"]);
             arguments.extend(more);
             arguments.extend(rank.iter().flat_map(|rank| ["--rank", *rank]));
-            done("train", &arguments, &out);
-        }
+            done("train", &arguments, out);
+        };
+        // Two steps, then two more from the checkpoint; beside it the first two again, from the same seed.
+        fine_tune(&["--steps", "2"], &out);
+        let again = folder.path().join(format!("{name}-again"));
+        fine_tune(&["--steps", "2"], &again);
+        let unet = Path::new("unet/diffusion_pytorch_model.safetensors");
+        assert!(files(&out)[unet] == files(&again)[unet], "{name}");
+        fine_tune(&["--steps", "4", "--resume"], &out);
         let metrics = std::fs::read_to_string(out.join("fine_tune.jsonl")).expect("metrics");
         assert_eq!(metrics.lines().count(), 4);
         let written = files(&out);

@@ -96,7 +96,8 @@ impl FineTune {
         Ok(Self::new(learning, frozen, options, device))
     }
 
-    /// A run that leaves the U-Net as it is and learns changes of rank `rank` of its attentions.
+    /// A run that leaves the U-Net as it is and learns changes of rank `rank` of its attentions, which begin as the seed of the
+    /// options says.
     ///
     /// # Errors
     ///
@@ -110,6 +111,7 @@ impl FineTune {
     ) -> Result<Self> {
         check(&options)?;
         let unet = unet.no_grad().train().fork(device);
+        device.seed(options.seed);
         let changes = LowRank::of_attentions(&unet, Layout::Diffusers, rank)?;
         let trainer = Trainer::new(changes, options.trainer, vec![device.clone()]);
         let learning = Learning::Changes(Box::new(trainer), Box::new(unet));
