@@ -7,12 +7,13 @@ use std::time::Instant;
 use wake_ldm::dataset::{Loader, Recipe, Sampled, Simulated, Source};
 use wake_ldm::{WakeSampler, device_named};
 
-/// Threads that make batches; on each the physics of one batch is computed while the device draws another.
+/// Threads that make batches, as many as there are cores at most; on each the physics of one batch is computed while the device draws
+/// another.
 const THREADS: [usize; 4] = [1, 2, 4, 8];
 /// Images of a batch.
 const BATCH: usize = 16;
 /// Batches that are timed, after as many as there are threads.
-const BATCHES: usize = 16;
+const BATCHES: usize = 8;
 /// The seed of both sources; the scenes are those of the recipe `detector`.
 const SEED: u64 = 3;
 
@@ -30,7 +31,15 @@ pub(crate) struct LoaderRow {
 }
 
 /// Number of times that [`measure`] says it has done something.
-pub(crate) const PARTS: usize = 2 * THREADS.len();
+pub(crate) fn parts() -> u64 {
+    2 * threads().count() as u64
+}
+
+/// Those of [`THREADS`] that this machine has cores for.
+fn threads() -> impl Iterator<Item = usize> {
+    let cores = rayon::current_num_threads();
+    THREADS.into_iter().filter(move |&threads| threads <= cores)
+}
 
 /// All rows; `done` hears of each.
 pub(crate) fn measure(device: &str, done: impl Fn()) -> Result<Vec<LoaderRow>, Box<dyn Error>> {
@@ -41,9 +50,9 @@ pub(crate) fn measure(device: &str, done: impl Fn()) -> Result<Vec<LoaderRow>, B
         ("simulator", Arc::new(scenes)),
         ("model", Arc::new(sampled)),
     ];
-    let mut rows = Vec::with_capacity(PARTS);
+    let mut rows = Vec::new();
     for (name, source) in sources {
-        for threads in THREADS {
+        for threads in threads() {
             rows.push(LoaderRow {
                 stage: "loader",
                 source: name,
@@ -81,10 +90,10 @@ pub(crate) fn table(rows: &[LoaderRow]) -> String {
     let cores = rayon::current_num_threads();
     let mut text =
         format!("{cores} cores, batches of {BATCH}; images a second.\n\n| images of | device |");
-    for threads in THREADS {
+    for threads in threads() {
         text += &format!(" threads {threads} |");
     }
-    text += &format!("\n| --- | --- |{}\n", " --- |".repeat(THREADS.len()));
+    text += &format!("\n| --- | --- |{}\n", " --- |".repeat(threads().count()));
     for of_source in rows.chunk_by(|a, b| a.source == b.source) {
         text += &format!("| {} | {} |", of_source[0].source, of_source[0].device);
         for row in of_source {

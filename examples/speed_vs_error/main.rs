@@ -82,7 +82,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     #[cfg(feature = "dataset")]
     if asked(Part::Loader) {
-        let bar = progress::bar(loader::PARTS as u64, "rows of the loader");
+        let bar = progress::bar(loader::parts(), "rows of the loader");
         let measured = loader::measure(&arguments.device, || bar.inc(1))?;
         bar.finish_and_clear();
         parts.push(("loader.md", loader::table(&measured)));
