@@ -7,7 +7,7 @@ use wake_physics::{Field, Scene};
 use super::baseline::Baseline;
 use super::pixels::{PixelRow, PixelTally, blur, constant, grey};
 use super::reading::{Reading, raster};
-use super::source::{ImageSource, Told, other_sea};
+use super::source::{ImageSource, Told, drawn, other_sea};
 use super::statistics::quantile;
 use crate::error::Result;
 use crate::metrics::Lpips;
@@ -44,7 +44,8 @@ impl Comparison {
     ///
     /// # Errors
     ///
-    /// As [`ImageSource::draw`] and [`Reading::of`].
+    /// As [`ImageSource::draw`] and [`Reading::of`], and [`Error::InvalidOption`](crate::Error::InvalidOption) for a source that
+    /// gives other images than were asked for.
     pub fn add(
         &mut self,
         scenes: &[Scene],
@@ -52,12 +53,12 @@ impl Comparison {
         beside: Option<&dyn ImageSource>,
         lpips: Option<&Lpips>,
     ) -> Result<()> {
-        let references = Baseline::Simulator.draw(scenes, Told::Both)?;
+        let references = drawn(&Baseline::Simulator, scenes, Told::Both)?;
         let others: Vec<Scene> = scenes.iter().map(|scene| other_sea(scene, 1)).collect();
-        let seconds = Baseline::Simulator.draw(&others, Told::Both)?;
-        let generated = model.draw(scenes, Told::Both)?;
-        let linear = Baseline::Gaussian.draw(scenes, Told::Both)?;
-        let latent = beside.map_or(Ok(Vec::new()), |source| source.draw(scenes, Told::Both))?;
+        let seconds = drawn(&Baseline::Simulator, &others, Told::Both)?;
+        let generated = drawn(model, scenes, Told::Both)?;
+        let linear = drawn(&Baseline::Gaussian, scenes, Told::Both)?;
+        let latent = beside.map_or(Ok(Vec::new()), |source| drawn(source, scenes, Told::Both))?;
         for (n, scene) in scenes.iter().enumerate() {
             let images = [&references[n], &seconds[n], &generated[n], &linear[n]];
             let [reference, second, model, gaussian] = images.map(grey);

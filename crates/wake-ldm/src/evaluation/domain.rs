@@ -5,12 +5,13 @@ use std::time::Instant;
 use burn::tensor::Device;
 use rayon::prelude::*;
 use serde::Serialize;
-use wake_physics::{Field, Scene, unit_speckle};
+use wake_physics::{Field, Scene};
 
 use super::judge::told_apart;
 use super::pixels::grey;
 use super::source::{ImageSource, Told, draw_all};
 use crate::error::Result;
+use crate::sampler::speckled;
 use crate::train::TwoSample;
 
 /// One kind of image against simulated ones of the same scenes.
@@ -50,7 +51,7 @@ impl Views {
         let images = draw_all(source, scenes, Told::Scene, step)?;
         let seconds = start.elapsed().as_secs_f64() / scenes.len().max(1) as f64;
         Ok(Self {
-            speckled: speckled(scenes, &images)?,
+            speckled: greys_with_speckle(scenes, &images)?,
             plain: images.iter().map(grey).collect(),
             seconds,
         })
@@ -74,14 +75,10 @@ impl Views {
 }
 
 /// Grey of images with the speckle of their scenes.
-fn speckled(scenes: &[Scene], images: &[Field]) -> Result<Vec<Field>> {
+fn greys_with_speckle(scenes: &[Scene], images: &[Field]) -> Result<Vec<Field>> {
     let pairs: Vec<_> = scenes.iter().zip(images).collect();
-    let with_speckle = |(scene, image): &(&Scene, &Field)| {
-        let mut speckle = unit_speckle(scene)?;
-        let values = speckle.values.iter_mut().zip(&image.values);
-        values.for_each(|(speckle, value)| *speckle *= value);
-        Ok(grey(&speckle))
-    };
-    let speckled = pairs.par_iter().map(with_speckle);
-    Ok(speckled.collect::<wake_physics::Result<_>>()?)
+    let greys = pairs
+        .par_iter()
+        .map(|(scene, image)| Ok(grey(&speckled(image, scene)?)));
+    greys.collect()
 }

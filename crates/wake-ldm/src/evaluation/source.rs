@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use wake_physics::{Field, Scene};
 use wake_text::Wording;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::sampler::{Conditioning, WakeSampler};
 
 /// Images that [`draw_all`] asks a source for at once.
@@ -48,7 +48,7 @@ pub trait ImageSource: Debug {
     ///
     /// # Errors
     ///
-    /// If one cannot be drawn.
+    /// If one cannot be drawn. Another number of images, or another size, is refused by whatever judges them.
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
 }
 
@@ -96,10 +96,28 @@ pub fn draw_all(
 ) -> Result<Vec<Field>> {
     let mut images = Vec::with_capacity(scenes.len());
     for batch in scenes.chunks(BATCH) {
-        images.extend(source.draw(batch, told)?);
+        images.extend(drawn(source, batch, told)?);
         step(batch.len() as u64);
     }
     Ok(images)
+}
+
+/// Images of a source, one of each scene and of its size, which a source of a user's own might miss.
+pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
+    let images = source.draw(scenes, told)?;
+    let size = |image: &Field| [image.rows, image.columns, image.values.len()];
+    let asked = |scene: &Scene| {
+        let [rows, columns] = [scene.grid.rows, scene.grid.columns];
+        [rows, columns, rows * columns]
+    };
+    if images.iter().map(size).eq(scenes.iter().map(asked)) {
+        return Ok(images);
+    }
+    Err(Error::InvalidOption {
+        option: "images of a source".to_owned(),
+        value: format!("{} for {} scenes", images.len(), scenes.len()),
+        expected: "one of each scene, with its rows and columns".to_owned(),
+    })
 }
 
 /// The same scene with another random sea, that of the seed `number` further on.
@@ -133,11 +151,30 @@ mod tests {
 
     #[test]
     fn scenes_are_drawn_some_at_a_time() {
-        let scenes = vec![Scene::default(); BATCH + 3];
+        let mut scene = Scene::default();
+        (scene.grid.rows, scene.grid.columns) = (1, 1);
+        let scenes = vec![scene; BATCH + 3];
         let mut steps = Vec::new();
         let images = draw_all(&Counted, &scenes, Told::Both, |n| steps.push(n)).unwrap();
         let counts: Vec<usize> = images.iter().map(|f| f.values[0] as usize).collect();
         assert_eq!(counts, [vec![BATCH; BATCH], vec![3; 3]].concat());
         assert_eq!(steps, [BATCH as u64, 3]);
+    }
+    /// One pixel is not the image of a scene of more, and no image is not that of one.
+    #[test]
+    fn other_images_than_were_asked_for_are_refused() {
+        #[derive(Debug)]
+        struct Nothing;
+        impl ImageSource for Nothing {
+            fn draw(&self, _: &[Scene], _: Told) -> Result<Vec<Field>> {
+                Ok(Vec::new())
+            }
+        }
+        let scenes = [Scene::default()];
+        for source in [&Counted as &dyn ImageSource, &Nothing] {
+            let refused = drawn(source, &scenes, Told::Both).unwrap_err().to_string();
+            assert!(refused.contains("for 1 scenes"), "{refused}");
+        }
+        assert!(drawn(&Nothing, &[], Told::Both).unwrap().is_empty());
     }
 }

@@ -5,7 +5,7 @@ use wake_physics::Scene;
 
 use super::baseline::Baseline;
 use super::reading::{Quantity, Reading};
-use super::source::{ImageSource, Told};
+use super::source::{ImageSource, Told, drawn};
 use crate::error::Result;
 
 /// How often a measured value followed.
@@ -115,7 +115,7 @@ impl Swap {
     ///
     /// Both images are read with the base's other values given: they differ in nothing else.
     fn is_followed(&self, source: &dyn ImageSource, told: Told) -> Result<bool> {
-        let images = source.draw(&self.scenes, told)?;
+        let images = drawn(source, &self.scenes, told)?;
         let read = |n: usize| -> Result<Option<f64>> {
             let reading = Reading::of(&images[n], &self.scenes[0])?;
             Ok(reading.value(self.quantity).measurable_value())

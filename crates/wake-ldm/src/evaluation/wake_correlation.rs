@@ -7,7 +7,7 @@ use wake_physics::{Field, Scene};
 use super::baseline::Baseline;
 use super::pixels::grey;
 use super::reading::{place, raster};
-use super::source::{ImageSource, Told, other_sea};
+use super::source::{ImageSource, Told, drawn, other_sea};
 use super::statistics::quantile;
 use crate::error::{Error, Result};
 use crate::metrics::{Plane, correlation};
@@ -67,7 +67,8 @@ pub fn wake_correlation(
 }
 
 fn greys(source: &dyn ImageSource, scenes: &[Scene]) -> Result<Vec<Field>> {
-    Ok(source.draw(scenes, Told::Both)?.iter().map(grey).collect())
+    let images = drawn(source, scenes, Told::Both)?;
+    Ok(images.iter().map(grey).collect())
 }
 
 fn wedge(scene: &Scene) -> Result<Vec<bool>> {

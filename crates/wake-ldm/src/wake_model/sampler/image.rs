@@ -40,6 +40,14 @@ pub struct WakeImage {
     pub seconds: SampleSeconds,
 }
 
+/// An intensity times the speckle of its scene's radar.
+pub(crate) fn speckled(intensity: &Field, scene: &Scene) -> Result<Field> {
+    let mut speckled = unit_speckle(scene)?;
+    let pixels = speckled.values.iter_mut().zip(&intensity.values);
+    pixels.for_each(|(speckle, value)| *speckle *= value);
+    Ok(speckled)
+}
+
 impl WakeImage {
     pub(super) fn new(
         grey: Field,
@@ -55,13 +63,10 @@ impl WakeImage {
                 .collect(),
             ..grey.clone()
         };
-        let mut speckled = unit_speckle(&scene)?;
-        let pixels = speckled.values.iter_mut().zip(&intensity.values);
-        pixels.for_each(|(speckle, value)| *speckle *= value);
         Ok(Self {
             grey,
+            speckled: speckled(&intensity, &scene)?,
             intensity,
-            speckled,
             labels: labels_of(&scene),
             scene,
             scale,

@@ -25,6 +25,8 @@ use crate::wake_model::network::{
     images_of, slope_of,
 };
 use crate::wake_model::sea_texture::SeaTexture;
+#[cfg(feature = "train")]
+pub(crate) use image::speckled;
 pub use image::{SampleSeconds, WakeImage};
 
 /// Steps from noise to image, unless others are asked for.
