@@ -32,7 +32,6 @@ mod reference;
 #[cfg(feature = "ldm")]
 mod rounding;
 mod row;
-mod satellite;
 mod spacing;
 mod stages;
 mod sweep;

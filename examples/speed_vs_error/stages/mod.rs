@@ -5,15 +5,13 @@ mod bunching;
 mod edge;
 mod memo;
 mod oracle;
+mod response;
 mod scene;
 mod surface;
 mod waves;
 
 use crate::row::Row;
-use crate::satellite;
 pub(crate) use memo::Memo;
-pub(crate) use oracle::{QUADRATURES, row, sample};
-pub(crate) use surface::fields;
 use wake_physics::Raster;
 
 /// Stages in the order of the data flow.
@@ -53,7 +51,7 @@ pub(crate) fn measure(
         "swell" => waves::swell(&raster, tolerance),
         "edge" => edge::edge(size),
         "unresolved" => backscatter::unresolved(&raster, tolerance, memo),
-        "response" => satellite::response(size),
+        "response" => response::response(size),
         _ => return scene::scene(size, tolerance, memo),
     })
 }

@@ -1,7 +1,9 @@
 //! The image as a satellite delivers it: through its impulse response.
 
+use super::RUNS;
+use super::oracle::{QUADRATURES, row, sample};
+use super::surface::fields;
 use crate::row::{Errors, Row, median_seconds, seconds};
-use crate::stages::{QUADRATURES, RUNS, fields, row, sample};
 use rayon::prelude::*;
 use wake_physics::sar::ImpulseResponse;
 use wake_physics::sar::impulse::{Axis, PointTarget, Reflectivity};
