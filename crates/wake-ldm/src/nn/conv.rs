@@ -75,11 +75,16 @@ mod native {
         })
     }
 
+    // Training computes directly, as it always did: its weights stay the same to the last bit.
     impl Operation<2> for Geometry {
         type Saved = ();
 
         fn forward(&self, [x, weight]: [&[f32]; 2]) -> (Vec<f32>, ()) {
             (conv::convolve(x, weight, None, self), ())
+        }
+
+        fn result(&self, [x, weight]: [&[f32]; 2]) -> Vec<f32> {
+            conv::convolve_by_tiles(x, weight, None, self)
         }
 
         fn gradients(
@@ -104,6 +109,10 @@ mod native {
 
         fn forward(&self, [x, weight, bias]: [&[f32]; 3]) -> (Vec<f32>, ()) {
             (conv::convolve(x, weight, Some(bias), self), ())
+        }
+
+        fn result(&self, [x, weight, bias]: [&[f32]; 3]) -> Vec<f32> {
+            conv::convolve_by_tiles(x, weight, Some(bias), self)
         }
 
         fn gradients(

@@ -4,7 +4,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Geometry;
-use super::layout::Layout;
+use super::layout::{Gather, Layout};
 use crate::nn::kernels::tile::{self, ROWS};
 
 /// Rows of a panel of patches that are multiplied at once: 16 columns of them are 32 KiB.
@@ -68,7 +68,7 @@ fn block_width(geometry: &Geometry, width: usize) -> usize {
 }
 
 /// Cuts every row of a matrix at the same columns: for each block of columns, its part of each row.
-fn columns(matrix: &mut [f32], row: usize, block: usize) -> Vec<Vec<&mut [f32]>> {
+pub(super) fn columns(matrix: &mut [f32], row: usize, block: usize) -> Vec<Vec<&mut [f32]>> {
     let rows = matrix.len() / row;
     let mut blocks: Vec<Vec<&mut [f32]>> = (0..row.div_ceil(block))
         .map(|_| Vec::with_capacity(rows))
@@ -119,43 +119,13 @@ impl Block<'_> {
     /// Writes the patches of one tile's pixels: for every channel and tap, a row of pixels.
     #[inline(always)]
     fn pack<S: Simd>(&self, channels: std::ops::Range<usize>, first: usize, panel: &mut [f32]) {
-        let width = tile::width::<S>();
-        let taps: Vec<usize> = (0..self.geometry.kernel * self.geometry.kernel)
-            .map(|tap| self.layout.tap(tap))
-            .collect();
-        let pixels = self.pixels(first, width);
-        let run = |pixels: &[usize]| pixels.windows(2).all(|pair| pair[1] == pair[0] + 1);
-        let whole = run(&pixels);
-        let halves = run(&pixels[..S::F32_LANES]) && run(&pixels[S::F32_LANES..]);
+        let gather = Gather::new::<S>(&self.layout, self.geometry, self.first + first);
         let plane = self.layout.plane();
         let planes = self.planes.chunks_exact(plane).skip(channels.start);
-        let rows = panel.chunks_exact_mut(taps.len() * width);
+        let rows = panel.chunks_exact_mut(panel.len() / channels.len());
         for (plane, rows) in planes.zip(rows) {
-            for (tap, row) in taps.iter().zip(rows.chunks_exact_mut(width)) {
-                let plane = &plane[*tap..];
-                if whole {
-                    row.copy_from_slice(&plane[pixels[0]..][..width]);
-                } else if halves {
-                    let (left, right) = row.split_at_mut(S::F32_LANES);
-                    left.copy_from_slice(&plane[pixels[0]..][..S::F32_LANES]);
-                    right.copy_from_slice(&plane[pixels[S::F32_LANES]..][..S::F32_LANES]);
-                } else {
-                    for (value, &pixel) in row.iter_mut().zip(&pixels) {
-                        *value = plane[pixel];
-                    }
-                }
-            }
+            gather.read::<S>(plane, rows);
         }
-    }
-
-    /// Where the pixels of a tile are; beyond the last, the last again.
-    fn pixels(&self, first: usize, width: usize) -> Vec<usize> {
-        let columns = self.geometry.size_out()[1];
-        let last = self.geometry.pixels_out() - 1;
-        (0..width)
-            .map(|i| (self.first + first + i).min(last))
-            .map(|pixel| self.layout.pixel(pixel / columns, pixel % columns))
-            .collect()
     }
 
     /// Adds the product of `depth` columns of the weights, from `start` on, with the patches.

@@ -1,8 +1,10 @@
 //! Images with their border, split by the phase of the stride.
 
+use pulp::Simd;
 use rayon::prelude::*;
 
 use super::Geometry;
+use crate::nn::kernels::tile;
 
 /// Where things are in a laid-out plane.
 ///
@@ -76,9 +78,81 @@ impl Layout {
             }
             return;
         }
-        for (column, &value) in x.iter().enumerate() {
-            if let Some(place) = self.place(row, column + left) {
-                plane[place] = value;
+        for phase in 0..self.stride {
+            // The first pixel of the row whose column in the padded image has this phase.
+            let skipped = (phase + self.stride - left % self.stride) % self.stride;
+            let column = left + skipped;
+            let Some(begin) = self.place(row, column) else {
+                continue;
+            };
+            let room = self.phase[1] - column / self.stride;
+            let plane = &mut plane[begin..begin + room];
+            let values = &x[skipped.min(x.len())..];
+            if self.stride == 2 {
+                // Vectors of pairs, which a step that is not known before does not give.
+                let (pairs, last) = values.as_chunks::<2>();
+                let values = pairs.iter().map(|pair| pair[0]);
+                for (place, value) in plane.iter_mut().zip(values) {
+                    *place = value;
+                }
+                if let (Some(place), [value]) = (plane.get_mut(pairs.len()), last) {
+                    *place = *value;
+                }
+            } else {
+                for (place, value) in plane.iter_mut().zip(values.iter().step_by(self.stride)) {
+                    *place = *value;
+                }
+            }
+        }
+    }
+}
+
+/// Reads the pixels that some consecutive outputs see through the taps of a kernel.
+#[derive(Debug)]
+pub(super) struct Gather {
+    taps: Vec<usize>,
+    pixels: Vec<usize>,
+    /// Whether all pixels follow one another, or those of each vector do.
+    whole: bool,
+    halves: bool,
+}
+
+impl Gather {
+    /// For one tile of outputs from the `first` on; beyond the last, the last again.
+    pub(super) fn new<S: Simd>(layout: &Layout, geometry: &Geometry, first: usize) -> Self {
+        let columns = geometry.size_out()[1];
+        let last = geometry.pixels_out() - 1;
+        let pixels: Vec<usize> = (0..tile::width::<S>())
+            .map(|i| (first + i).min(last))
+            .map(|pixel| layout.pixel(pixel / columns, pixel % columns))
+            .collect();
+        let run = |pixels: &[usize]| pixels.windows(2).all(|pair| pair[1] == pair[0] + 1);
+        Self {
+            taps: (0..geometry.kernel * geometry.kernel)
+                .map(|tap| layout.tap(tap))
+                .collect(),
+            whole: run(&pixels),
+            halves: run(&pixels[..S::F32_LANES]) && run(&pixels[S::F32_LANES..]),
+            pixels,
+        }
+    }
+
+    /// Reads one laid-out plane: `[tap, pixel]`.
+    #[inline(always)]
+    pub(super) fn read<S: Simd>(&self, plane: &[f32], rows: &mut [f32]) {
+        let width = tile::width::<S>();
+        for (tap, row) in self.taps.iter().zip(rows.chunks_exact_mut(width)) {
+            let plane = &plane[*tap..];
+            if self.whole {
+                row.copy_from_slice(&plane[self.pixels[0]..][..width]);
+            } else if self.halves {
+                let (left, right) = row.split_at_mut(S::F32_LANES);
+                left.copy_from_slice(&plane[self.pixels[0]..][..S::F32_LANES]);
+                right.copy_from_slice(&plane[self.pixels[S::F32_LANES]..][..S::F32_LANES]);
+            } else {
+                for (value, &pixel) in row.iter_mut().zip(&self.pixels) {
+                    *value = plane[pixel];
+                }
             }
         }
     }

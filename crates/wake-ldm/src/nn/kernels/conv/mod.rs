@@ -7,10 +7,12 @@
 mod forward;
 mod image;
 mod layout;
+mod tiles;
 mod weights;
 
 pub(in crate::nn) use forward::convolve;
 pub(in crate::nn) use image::image_gradient;
+pub(in crate::nn) use tiles::convolve_by_tiles;
 pub(in crate::nn) use weights::{bias_gradient, weight_gradient};
 
 /// Sizes of a convolution with a square kernel.

@@ -102,6 +102,111 @@ fn products_are_the_sums_that_define_them() {
     }
 }
 
+/// The most that rounding can change of a convolution by tiles: every number that is summed, and how many roundings it sees.
+///
+/// A kernel's transform rounds at most four times, a window's two, the product once, its sum once a channel, the pixel's
+/// four times, the bias once.
+fn rounding_of_tiles(x: &[f32], weight: &[f32], g: &Geometry) -> Vec<f64> {
+    let absolute = |values: &[f32]| values.iter().map(|v| v.abs()).collect::<Vec<_>>();
+    let (x, weight) = (absolute(x), absolute(weight));
+    let ([channels_in, channels_out], [rows, columns]) = (g.channels, g.size);
+    let [rows_out, columns_out] = g.size_out();
+    let pixel = |n: usize, c: usize, row: usize, column: usize| {
+        let inside =
+            |at: usize, border: usize, size: usize| at.checked_sub(border).filter(|&q| q < size);
+        match (
+            inside(row, g.border[0], rows),
+            inside(column, g.border[1], columns),
+        ) {
+            (Some(r), Some(q)) => f64::from(x[((n * channels_in + c) * rows + r) * columns + q]),
+            _ => 0.0,
+        }
+    };
+    // Which windows' places, kernels' rows and products add up, signs left out.
+    const B: [[f64; 4]; 4] = [
+        [1., 0., 1., 0.],
+        [0., 1., 1., 0.],
+        [0., 1., 1., 0.],
+        [0., 1., 0., 1.],
+    ];
+    const G: [[f64; 3]; 4] = [[1., 0., 0.], [0.5, 0.5, 0.5], [0.5, 0.5, 0.5], [0., 0., 1.]];
+    const A: [[f64; 4]; 2] = [[1., 1., 1., 0.], [0., 1., 1., 1.]];
+    let mut bounds = Vec::new();
+    for (n, o) in (0..g.batch).flat_map(|n| (0..channels_out).map(move |o| (n, o))) {
+        for (row, column) in (0..rows_out).flat_map(|r| (0..columns_out).map(move |c| (r, c))) {
+            let (tile, within) = ([row / 2 * 2, column / 2 * 2], [row % 2, column % 2]);
+            let mut size = 0.0;
+            for c in 0..channels_in {
+                let kernel = &weight[(o * channels_in + c) * 9..][..9];
+                for place in 0..16 {
+                    let (i, j) = (place / 4, place % 4);
+                    let w: f64 = (0..9)
+                        .map(|t| G[i][t / 3] * G[j][t % 3] * f64::from(kernel[t]))
+                        .sum();
+                    let d: f64 = (0..16)
+                        .map(|t| {
+                            B[i][t / 4]
+                                * B[j][t % 4]
+                                * pixel(n, c, tile[0] + t / 4, tile[1] + t % 4)
+                        })
+                        .sum();
+                    size += A[within[0]][i] * A[within[1]][j] * w * d;
+                }
+            }
+            bounds.push((channels_in + 12) as f64 * f64::from(f32::EPSILON) / 2.0 * size);
+        }
+    }
+    bounds
+}
+
+/// Sides that tiles fill and do not, lopsided borders, channels that rows of a product do not divide, panels of several rows
+/// of tiles and several panels a task.
+#[test]
+fn tiles_give_the_sums_that_define_them() {
+    let cases = [
+        (1, [16, 16], [64, 64], [1, 1, 1, 1]),
+        (2, [17, 20], [32, 30], [1, 1, 1, 1]),
+        (1, [16, 23], [63, 33], [1, 1, 1, 1]),
+        (1, [19, 16], [40, 65], [0, 2, 1, 0]),
+        (40, [16, 18], [8, 16], [1, 1, 1, 1]),
+    ];
+    for (batch, channels, size, border) in cases {
+        let g = Geometry {
+            batch,
+            channels,
+            size,
+            kernel: 3,
+            stride: 1,
+            border,
+        };
+        let x = noise(batch * channels[0] * size[0] * size[1], 1);
+        let weight = noise(channels[1] * g.patch(), 2);
+        let bias = noise(channels[1], 3);
+        let y = convolve_by_tiles(&x, &weight, Some(&bias), &g);
+        let direct = convolve(&x, &weight, Some(&bias), &g);
+        assert_ne!(y, direct, "computed by tiles: {g:?}");
+        let exact = oracle(&x, &weight, &vec![0.0; y.len()], &g).y;
+        let bounds = rounding_of_tiles(&x, &weight, &g);
+        let bias = bias
+            .iter()
+            .flat_map(|b| vec![f64::from(*b); g.pixels_out()]);
+        for (i, (((ours, exact), bound), bias)) in y
+            .iter()
+            .zip(exact)
+            .zip(bounds)
+            .zip(bias.cycle())
+            .enumerate()
+        {
+            let error = (f64::from(*ours) - exact[0] - bias).abs();
+            let bound = bound + f64::from(f32::EPSILON) * bias.abs();
+            assert!(
+                error <= bound,
+                "y[{i}] of {g:?}: {ours}, off by {error:e}, {bound:e} allowed"
+            );
+        }
+    }
+}
+
 #[test]
 fn bias_is_added_to_every_pixel_and_its_gradient_is_their_sum() {
     let g = Geometry {
