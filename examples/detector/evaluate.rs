@@ -9,8 +9,8 @@ use wake_detector::drawing::sheet;
 use wake_detector::judging::{Searched, compared};
 use wake_detector::train::Recipe;
 
+use super::recall::{by_scene, by_visibility};
 use super::report::Report;
-use super::visibility::by_visibility;
 use super::{exit, named, progress, real, real_sea};
 
 #[derive(clap::Args, Debug, Clone)]
@@ -124,9 +124,11 @@ fn simulated(
         }
     }
     let names: Vec<&str> = finders.iter().map(|(name, _)| *name).collect();
-    report
-        .visibility
-        .push(by_visibility(recipe, &names, &searched));
+    let by_visibility = by_visibility(recipe, &names, &searched);
+    report.visibility.push(by_visibility);
+    if recipe == Recipe::Detector {
+        report.scenes = by_scene(recipe, &names, &searched);
+    }
     let megapixels = (SIZE * SIZE) as f64 * 1e-6;
     println!(
         "{}: {:.2} megapixels a second",

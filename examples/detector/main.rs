@@ -21,10 +21,10 @@ mod named;
 mod progress;
 mod real;
 mod real_sea;
+mod recall;
 mod report;
 mod show;
 mod train;
-mod visibility;
 
 use std::path::Path;
 use std::process::ExitCode;

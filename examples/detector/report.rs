@@ -22,6 +22,8 @@ pub(crate) struct Report {
     pub(crate) sea: Vec<Value>,
     /// Tables of recall by visibility.
     pub(crate) visibility: Vec<String>,
+    /// Tables of recall by sensor, wind and heading.
+    pub(crate) scenes: String,
 }
 
 impl Report {
@@ -86,6 +88,11 @@ impl Report {
              intensity (docs/labels.md), of painted ones by the signal over noise of a filter that knows the wake.\n",
         );
         text.push_str(&self.visibility.join(""));
+        text.push_str(
+            "\nThe same recall of simulated wakes by sensor, by wind, and by the angle between the wake and the flight of the radar: at \
+             0° the ship sails along the flight, at 90° across it.\n",
+        );
+        text.push_str(&self.scenes);
         if !self.rungs.is_empty() {
             text.push_str(&self.transfer());
         }

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use wake_ldm::dataset::Source;
+use wake_physics::Scene;
 
 use crate::error::Result;
 use crate::finder::Finder;
@@ -38,6 +39,8 @@ pub struct Searched {
     pub judged: Vec<Vec<Judged>>,
     /// The wakes of each image, as many as it has labels.
     pub wakes: Vec<Vec<Wake>>,
+    /// The scene of each image.
+    pub scenes: Vec<Scene>,
     /// What the first finder takes for an image while no other works \[s\].
     pub seconds: f64,
 }
@@ -76,6 +79,8 @@ impl Searched {
                 done(image, &sample.wakes, &found);
                 searched.push(sample, &found);
             }
+            let scenes = pairs.into_iter().map(|pair| pair.scene);
+            searched.scenes.extend(scenes);
         }
         Ok(searched)
     }
@@ -160,7 +165,7 @@ mod tests {
         let searched = Searched {
             judged: vec![vec![image]],
             wakes: vec![wakes.to_vec()],
-            seconds: 0.0,
+            ..Searched::default()
         };
         let counts = |label: &Label| label.counts;
         assert!(searched.judged[0][0].labels.iter().all(counts));
