@@ -33,30 +33,43 @@ pub(in crate::nn) fn convolve(
 ) -> Vec<f32> {
     let layout = Layout::new(geometry);
     let planes = layout.lay_out(x, geometry);
-    let [channels_in, channels_out] = geometry.channels;
-    let pixels = geometry.pixels_out();
-    let mut y = vec![0.0; geometry.batch * channels_out * pixels];
+    let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
     let arch = Arch::new();
     let block = block_width(geometry, arch.dispatch(tile::Width));
-    y.par_chunks_mut(channels_out * pixels)
-        .zip(planes.par_chunks(channels_in * layout.plane()))
+    by_blocks(&mut y, &planes, geometry, block, |planes, i, y| {
+        arch.dispatch(Block {
+            planes,
+            weight,
+            bias,
+            first: i * block,
+            y,
+            geometry,
+            layout,
+        });
+    });
+    y
+}
+
+/// Computes every image in blocks of consecutive pixels of all its channels, on all cores.
+///
+/// - `planes`: the laid-out images
+/// - `task`: given the planes of an image, the number of a block in it, and the block's part of each channel
+pub(super) fn by_blocks(
+    y: &mut [f32],
+    planes: &[f32],
+    geometry: &Geometry,
+    block: usize,
+    task: impl Fn(&[f32], usize, Vec<&mut [f32]>) + Sync,
+) {
+    let (image, pixels) = (y.len() / geometry.batch, geometry.pixels_out());
+    y.par_chunks_mut(image)
+        .zip(planes.par_chunks(planes.len() / geometry.batch))
         .for_each(|(y, planes)| {
             columns(y, pixels, block)
                 .into_par_iter()
                 .enumerate()
-                .for_each(|(i, y)| {
-                    arch.dispatch(Block {
-                        planes,
-                        weight,
-                        bias,
-                        first: i * block,
-                        y,
-                        geometry,
-                        layout,
-                    });
-                });
+                .for_each(|(i, y)| task(planes, i, y));
         });
-    y
 }
 
 /// Pixels of one task: few enough that every core has work, many enough to reuse the weights.

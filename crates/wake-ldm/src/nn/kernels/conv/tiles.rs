@@ -21,7 +21,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Geometry;
-use super::forward::{columns, convolve};
+use super::forward::{by_blocks, columns, convolve};
 use super::layout::{Gather, Layout};
 use crate::nn::kernels::tile::{self, ROWS};
 
@@ -34,12 +34,15 @@ const NEAR: usize = 128 * 1024;
 /// Most numbers of transformed kernels, which all tasks read: 20 MiB, a share of the cores' last cache.
 const FAR: usize = 5 * 1024 * 1024;
 
+/// Below so many channels transforms cost more than they save.
+const FEW: usize = 16;
+
 /// Products that take as long as the transform of one kernel.
 const TRANSFORM: usize = 500;
 
 /// Convolves a batch of images, by tiles where that saves products and directly elsewhere.
 ///
-/// Rounding is that of the direct sum times at most some ten.
+/// Tiles round more often than the direct sum: windows and kernels are sums before they are multiplied.
 ///
 /// # Shapes
 ///
@@ -59,47 +62,41 @@ pub(in crate::nn) fn convolve_by_tiles(
     let layout = Layout::new(&tiles);
     let planes = layout.lay_out(x, &tiles);
     let weight = &transformed(weight, geometry);
-    let [channels_in, channels_out] = geometry.channels;
-    let pixels = geometry.pixels_out();
     let rows = rows_of_a_task(&tiles, width);
-    let tile_columns = tiles.size_out()[1];
-    let mut y = vec![0.0; geometry.batch * channels_out * pixels];
-    y.par_chunks_mut(channels_out * pixels)
-        .zip(planes.par_chunks(channels_in * layout.plane()))
-        .for_each(|(y, planes)| {
-            columns(y, pixels, 2 * rows * geometry.size_out()[1])
-                .into_par_iter()
-                .enumerate()
-                .for_each(|(i, y)| {
-                    arch.dispatch(Block {
-                        planes,
-                        weight,
-                        bias,
-                        first: i * rows * tile_columns,
-                        y,
-                        columns: geometry.size_out()[1],
-                        tiles: &tiles,
-                        layout,
-                    });
-                });
-        });
+    let columns = geometry.size_out()[1];
+    let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
+    by_blocks(
+        &mut y,
+        &planes,
+        geometry,
+        2 * rows * columns,
+        |planes, i, y| {
+            arch.dispatch(Block {
+                planes,
+                weight,
+                bias,
+                first: i * rows * tiles.size_out()[1],
+                y,
+                columns,
+                tiles: &tiles,
+                layout,
+            });
+        },
+    );
     y
 }
 
-/// Whether tiles need at most two thirds of the products, transforms of kernels and unfilled vectors counted, and kernels stay near.
+/// Whether tiles need at most two thirds of the products of an image, transforms of kernels and unfilled vectors counted, and
+/// kernels stay near. The batch does not count: an image is the same in each.
 fn tiles_win(geometry: &Geometry, width: usize) -> bool {
     let [channels_in, channels_out] = geometry.channels;
     let [rows, columns] = geometry.size_out();
-    let kernels_fit = PLACES * channels_in * channels_out <= FAR;
-    if geometry.kernel != 3 || geometry.stride != 1 || !kernels_fit {
-        return false;
-    }
-    if channels_in.min(channels_out) < 16 {
-        return false;
-    }
-    let fill = |pixels: usize| geometry.batch * pixels.div_ceil(width) * width;
+    let fill = |pixels: usize| pixels.div_ceil(width) * width;
     let tiles = PLACES * fill(rows.div_ceil(2) * columns.div_ceil(2));
-    3 * (tiles + TRANSFORM) <= 2 * 9 * fill(rows * columns)
+    (geometry.kernel, geometry.stride) == (3, 1)
+        && channels_in.min(channels_out) >= FEW
+        && PLACES * channels_in * channels_out <= FAR
+        && 3 * (tiles + TRANSFORM) <= 2 * 9 * fill(rows * columns)
 }
 
 /// The windows that tiles see: 4 × 4 pixels, two apart.
