@@ -37,8 +37,8 @@ const FAR: usize = 5 * 1024 * 1024;
 /// Below so many channels transforms cost more than they save.
 const FEW: usize = 16;
 
-/// Products that take as long as the transform of one kernel.
-const TRANSFORM: usize = 500;
+/// Products that take as long as the transform of one kernel, memory included.
+const TRANSFORM: usize = 1500;
 
 /// Convolves a batch of images, by tiles where that saves products and directly elsewhere.
 ///
@@ -86,12 +86,12 @@ pub(in crate::nn) fn convolve_by_tiles(
     y
 }
 
-/// Whether tiles need at most two thirds of the products of an image, transforms of kernels and unfilled vectors counted, and
-/// kernels stay near. The batch does not count: an image is the same in each.
+/// Whether tiles need at most two thirds of the products, transforms of kernels and unfilled vectors counted, and kernels stay
+/// near.
 fn tiles_win(geometry: &Geometry, width: usize) -> bool {
     let [channels_in, channels_out] = geometry.channels;
     let [rows, columns] = geometry.size_out();
-    let fill = |pixels: usize| pixels.div_ceil(width) * width;
+    let fill = |pixels: usize| geometry.batch * pixels.div_ceil(width) * width;
     let tiles = PLACES * fill(rows.div_ceil(2) * columns.div_ceil(2));
     (geometry.kernel, geometry.stride) == (3, 1)
         && channels_in.min(channels_out) >= FEW
