@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (the same with oriented boxes), `labelTxt/*.txt` (DOTA),
-//! `metadata.jsonl`, `coco.json`, `data.yaml` with `train.txt` and `val.txt`, and `dataset.json`; see docs/dataset.md. A run that was killed continues where it stopped.
+//! `metadata.jsonl`, `coco.json`, `data.yaml` with `trainset.txt` and `valset.txt`, and `dataset.json`; see docs/dataset.md. A run that was killed continues where it stopped.
 
 #[path = "make_dataset/arguments.rs"]
 mod arguments;

@@ -70,6 +70,6 @@ for line in lines:
 print("YOLO-OBB and DOTA agree")
 
 # Every image is in one of the two lists that data.yaml names.
-lists = [(folder / name).read_text().split() for name in ("train.txt", "val.txt")]
+lists = [(folder / name).read_text().split() for name in ("trainset.txt", "valset.txt")]
 assert sorted(lists[0] + lists[1]) == ["./" + line["file_name"] for line in lines]
 print(len(lists[0]), "images to train,", len(lists[1]), "to validate")

@@ -172,7 +172,7 @@ pub(super) fn data_yaml() -> String {
         .map(|class| format!("  {}: {}\n", class.number(), class.name()))
         .concat();
     format!(
-        "# Lists of images beside this file; no scene is in both.\ntrain: train.txt\nval: val.txt\nnames:\n{names}"
+        "# Lists of images beside this file; no scene is in both.\ntrain: trainset.txt\nval: valset.txt\nnames:\n{names}"
     )
 }
 

@@ -214,9 +214,10 @@ impl Layout<'_> {
         ["images", "labels", "labels-obb", "labelTxt"].map(|name| self.0.join(name))
     }
 
-    /// The lists of images to train with, and to validate with.
+    /// The lists of images to train with, and to validate with. A name that has `train` or `val` as a word of its own would be
+    /// taken for the whole split by Hugging Face `datasets`, which then finds no image in it.
     pub(super) fn lists(self) -> [PathBuf; 2] {
-        ["train.txt", "val.txt"].map(|name| self.0.join(name))
+        ["trainset.txt", "valset.txt"].map(|name| self.0.join(name))
     }
 
     /// The image of one pair and its labels, as in [`Self::folders`].

@@ -94,7 +94,7 @@ fn the_files_are_those_of_the_documentation() {
     for folder in ["labelTxt", "labels", "labels-obb"] {
         expected.extend((0..COUNT).map(|i| format!("{folder}/00000{i}.txt")));
     }
-    expected.extend(["metadata.jsonl", "train.txt", "val.txt"].map(String::from));
+    expected.extend(["metadata.jsonl", "trainset.txt", "valset.txt"].map(String::from));
     assert_eq!(names, expected);
 }
 
@@ -144,7 +144,7 @@ fn a_killed_run_continues() {
             left.retain(|name, _| {
                 !matches!(
                     name.to_str(),
-                    Some("coco.json" | "train.txt" | "val.txt" | "data.yaml")
+                    Some("coco.json" | "trainset.txt" | "valset.txt" | "data.yaml")
                 )
             });
             left.insert(metadata.clone(), log[..cut].to_vec());
@@ -261,8 +261,8 @@ fn a_killed_merge_continues() {
     for name in [
         "metadata.jsonl",
         "coco.json",
-        "train.txt",
-        "val.txt",
+        "trainset.txt",
+        "valset.txt",
         "data.yaml",
     ] {
         check(&left, &format!("before {name}"));
@@ -276,8 +276,8 @@ fn a_killed_merge_continues() {
     assert_eq!(leftovers.len(), 7);
     for name in [
         "coco.json",
-        "train.txt",
-        "val.txt",
+        "trainset.txt",
+        "valset.txt",
         "data.yaml",
         "metadata.jsonl",
         "shard.json",
@@ -526,7 +526,7 @@ fn training_and_validation_share_no_scene() {
     assert!((0..8000).all(|i| val[i] == val[i % 3456]));
     let whole = whole();
     let list = |name: &str| String::from_utf8(whole[Path::new(name)].clone()).unwrap();
-    let (train, val) = (list("train.txt"), list("val.txt"));
+    let (train, val) = (list("trainset.txt"), list("valset.txt"));
     let mut all: Vec<&str> = train.lines().chain(val.lines()).collect();
     all.sort_unstable();
     let images: Vec<String> = (0..COUNT)
