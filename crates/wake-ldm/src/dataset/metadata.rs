@@ -20,7 +20,9 @@ pub(super) struct Row {
     pub(super) text: String,
     #[serde(flatten)]
     columns: Columns,
-    /// The scene that made the image.
+    /// The scene that made the image, as JSON in a string: its keys hold words in one scene and numbers in another, which
+    /// the columns of a table cannot.
+    #[serde(with = "in_a_string")]
     pub(super) scene: Scene,
     /// What is where.
     pub(super) objects: Objects,
@@ -40,6 +42,21 @@ impl Row {
             objects: Objects::of(&pair.labels),
             amplitudes: pair.amplitudes,
         }
+    }
+}
+
+/// A scene as JSON in a string.
+mod in_a_string {
+    use serde::de::{Deserialize, Deserializer, Error as _};
+    use serde::ser::{Error as _, Serializer};
+    use wake_physics::Scene;
+
+    pub(super) fn serialize<S: Serializer>(scene: &Scene, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(&serde_json::to_string(scene).map_err(S::Error::custom)?)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Scene, D::Error> {
+        serde_json::from_str(&String::deserialize(from)?).map_err(D::Error::custom)
     }
 }
 
