@@ -12,7 +12,7 @@ use wake_physics::Plan;
 use wake_physics::grey::GreyScale;
 
 /// Version of the layout; a reader refuses others.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 /// Share of the images that are for validation, unless another is asked for.
 const VAL_SHARE: f64 = 0.1;
 /// Scenes that are planned to tell what a set costs.

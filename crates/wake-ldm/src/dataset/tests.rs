@@ -363,6 +363,51 @@ fn other_sets_are_refused() {
     }
 }
 
+/// Notes of what kind the values are under a path, and below it.
+fn kinds(path: &str, value: &serde_json::Value, found: &mut BTreeMap<String, &'static str>) {
+    use serde_json::Value;
+    let kind = match value {
+        Value::Null => return,
+        Value::Bool(_) => "truth",
+        Value::Number(_) => "number",
+        Value::String(_) => "text",
+        Value::Array(_) => "list",
+        Value::Object(_) => "object",
+    };
+    let before = *found.entry(path.to_owned()).or_insert(kind);
+    assert_eq!(before, kind, "{path} changes");
+    if let Value::Array(parts) = value {
+        parts
+            .iter()
+            .for_each(|part| kinds(&format!("{path}[]"), part, found));
+    }
+    if let Value::Object(parts) = value {
+        parts
+            .iter()
+            .for_each(|(key, part)| kinds(&format!("{path}.{key}"), part, found));
+    }
+}
+
+/// A table's column holds one kind of value, as readers of tables ask; scenes of several sensors have words and numbers under
+/// one key.
+#[test]
+fn columns_hold_one_kind_of_value() {
+    let small = ["scene.grid.rows = 24", "scene.grid.columns = 24"];
+    let recipe = Recipe::detector()
+        .unwrap()
+        .with_assignments(&small)
+        .unwrap();
+    let manifest = Manifest::new(recipe, 3, 12).unwrap();
+    let folder = TempDir::new().unwrap();
+    made(folder.path(), &manifest);
+    let lines = fs::read_to_string(folder.path().join("metadata.jsonl")).unwrap();
+    let mut found = BTreeMap::new();
+    for line in lines.lines() {
+        kinds("", &serde_json::from_str(line).unwrap(), &mut found);
+    }
+    assert_eq!((found[".scene"], found[".ship_speed"]), ("text", "number"));
+}
+
 #[test]
 fn broken_lines_are_named() {
     let mut files = whole();

@@ -75,7 +75,7 @@ mod native {
         })
     }
 
-    // Training computes directly, as it always did: its weights stay the same to the last bit.
+    // What is tracked is computed directly: tiles would change the last digits of trained weights, those that ship among them.
     impl Operation<2> for Geometry {
         type Saved = ();
 
