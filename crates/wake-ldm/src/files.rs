@@ -7,11 +7,15 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use wake_physics::output;
 
-/// No configuration file is longer than this.
+/// No configuration file is longer than this \[bytes\].
 const LONGEST_TEXT: u64 = 16 << 20;
 
-/// Reads a configuration file.
-pub(crate) fn read_text(path: &Path) -> Result<String> {
+/// Reads a text file of at most 16 MiB, such as a configuration or the labels of a folder.
+///
+/// # Errors
+///
+/// [`Error::Io`] if it is longer, no regular file, no UTF-8, or cannot be read.
+pub fn read_text(path: &Path) -> Result<String> {
     let io = |source| unreadable(path, source);
     // Opening a pipe would wait for somebody to write into it.
     if !fs::metadata(path).map_err(io)?.is_file() {
@@ -21,7 +25,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String> {
     let mut file = File::open(path).map_err(io)?.take(LONGEST_TEXT + 1);
     file.read_to_string(&mut text).map_err(io)?;
     if text.len() as u64 > LONGEST_TEXT {
-        let message = "longer than 16 MiB, so no configuration";
+        let message = "longer than 16 MiB";
         return Err(io(std::io::Error::other(message)));
     }
     Ok(text)

@@ -27,7 +27,7 @@ mod self_check;
 pub use burn;
 pub use device::device_named;
 pub use error::{Error, Mismatch, Misshapen, Result};
-pub use files::fingerprint;
+pub use files::{fingerprint, read_text};
 #[cfg(feature = "flex")]
 pub use self_check::self_check;
 pub use stable_diffusion::{autoencoder, lora, pipeline, scheduler, text};

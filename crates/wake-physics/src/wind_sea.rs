@@ -3,7 +3,7 @@
 use crate::dispersion::{angular_frequency, depth_factor};
 use crate::scene::{SpectrumModel, SpreadingModel};
 use crate::spectrum::{Spectrum, deep_equivalent, from_deep_equivalent};
-use crate::spreading::Spreading;
+use crate::spreading::{Spread, Spreading};
 
 /// Beyond this peak wavenumber [rad/m] (a wave of 0.06 mm) there is no wave: the sea is flat.
 const LARGEST_PEAK: f64 = 1e5;
@@ -56,6 +56,21 @@ pub struct Moments {
     pub radial_velocity: f64,
     /// `⟨a_r²⟩` [m²/s⁴], the acceleration toward the radar squared.
     pub radial_acceleration: f64,
+}
+
+/// Waves of one wavenumber, see [`DirectionalSpectrum::ring`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ring {
+    /// S(k)/k \[m⁴\].
+    level: f64,
+    spread: Spread,
+}
+
+impl Ring {
+    /// Density Ψ \[m⁴\] of waves that travel at an angle to the wind, from its cosine.
+    pub(crate) fn psi(&self, cos_angle: f64) -> f64 {
+        self.level * self.spread.density(cos_angle)
+    }
 }
 
 impl DirectionalSpectrum {
@@ -126,15 +141,19 @@ impl DirectionalSpectrum {
     #[must_use]
     pub fn psi(&self, [kx, ky]: [f64; 2]) -> f64 {
         let k = kx.hypot(ky);
-        let s = self.omnidirectional(k);
-        if s <= 0.0 {
-            return 0.0;
+        match self.ring(k) {
+            Some(ring) => ring.psi((kx * self.wind[0] + ky * self.wind[1]) / k),
+            None => 0.0,
         }
-        let cos_angle = (kx * self.wind[0] + ky * self.wind[1]) / k;
-        s / k
-            * self
-                .spreading
-                .density(deep_equivalent(k, self.depth), cos_angle)
+    }
+
+    /// The waves of one wavenumber in all directions; `None` where there is none.
+    pub(crate) fn ring(&self, wavenumber: f64) -> Option<Ring> {
+        let s = self.omnidirectional(wavenumber);
+        (s > 0.0).then(|| Ring {
+            level: s / wavenumber,
+            spread: self.spreading.at(deep_equivalent(wavenumber, self.depth)),
+        })
     }
 
     /// Variances of the waves from `low` to `high` seen at an incidence.

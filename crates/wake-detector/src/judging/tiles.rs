@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Deserialize;
+use wake_ldm::read_text;
 
 use crate::error::{Error, Result};
 use crate::image::GreyImage;
@@ -28,7 +29,8 @@ impl Tile {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] where there is no `labels.json`, [`Error::Labels`] for one of another form, and as [`GreyImage::read`].
+    /// [`Error::Model`] where there is no `labels.json` or one of more than 16 MiB, [`Error::Labels`] for one of another
+    /// form, and as [`GreyImage::read`].
     pub fn read_all(folder: &Path) -> Result<Vec<Self>> {
         let tile = |(name, known): (String, KnownTile)| {
             Ok(Self {
@@ -91,10 +93,7 @@ enum Confidence {
 
 fn labels(folder: &Path) -> Result<BTreeMap<String, KnownTile>> {
     let path = folder.join("labels.json");
-    let text = std::fs::read_to_string(&path).map_err(|source| Error::Io {
-        path: path.clone(),
-        source,
-    })?;
+    let text = read_text(&path)?;
     let labels: Labels = serde_json::from_str(&text).map_err(|error| Error::Labels {
         path,
         message: error.to_string(),
@@ -140,6 +139,10 @@ mod tests {
         std::fs::write(&path, "[]").unwrap();
         let other = Tile::read_all(folder.path()).unwrap_err();
         assert!(matches!(other, Error::Labels { .. }), "{other}");
+        let file = std::fs::File::create(&path).unwrap();
+        file.set_len((16 << 20) + 1).unwrap();
+        let long = Tile::read_all(folder.path()).unwrap_err().to_string();
+        assert!(long.contains("longer than 16 MiB"), "{long}");
         let wake = |sure: &str| {
             format!(r#"{{"tip": [1, 2], "axis_deg": 90, "length_px": 9, "confidence": "{sure}"}}"#)
         };

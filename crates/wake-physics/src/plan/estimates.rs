@@ -32,6 +32,8 @@ impl AsRef<WaveSample> for Weighed<'_> {
 /// The waves of a survey, weighed once for all terms.
 struct Estimates<'a> {
     survey: &'a Survey,
+    /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
+    backscatter: [f64; 2],
     sea: Vec<Weighed<'a>>,
     swell: Vec<Weighed<'a>>,
     wake: Vec<Weighed<'a>>,
@@ -40,8 +42,10 @@ struct Estimates<'a> {
 }
 
 /// One effect a term, in the order of the data flow.
-pub(super) fn effects(survey: &Survey) -> Vec<Effect> {
-    let estimates = Estimates::new(survey);
+///
+/// - `backscatter`: relative root mean square change of σ⁰ without tilt average, and without specular return
+pub(super) fn effects(survey: &Survey, backscatter: [f64; 2]) -> Vec<Effect> {
+    let estimates = Estimates::new(survey, backscatter);
     let absent = |term| survey.absent.iter().find(|(absent, _)| *absent == term);
     let effect = |&term: &Term| Effect {
         term,
@@ -52,7 +56,7 @@ pub(super) fn effects(survey: &Survey) -> Vec<Effect> {
 }
 
 impl<'a> Estimates<'a> {
-    fn new(survey: &'a Survey) -> Self {
+    fn new(survey: &'a Survey, backscatter: [f64; 2]) -> Self {
         let at_rest = survey.resolution.at(0.0);
         let weighed = |waves: &'a [WaveSample]| -> Vec<Weighed<'a>> {
             let one = |wave: &'a WaveSample| Weighed {
@@ -64,11 +68,10 @@ impl<'a> Estimates<'a> {
         };
         let (sea, wake) = (weighed(&survey.sea), weighed(&survey.wake));
         let swell = weighed(&survey.swell);
-        let contrast = linear(&sea)
-            .hypot(linear(&wake))
-            .hypot(survey.backscatter[1]);
+        let contrast = linear(&sea).hypot(linear(&wake)).hypot(backscatter[1]);
         Self {
             survey,
+            backscatter,
             sea,
             swell,
             wake,
@@ -97,8 +100,8 @@ impl<'a> Estimates<'a> {
                 change * self.contrast.hypot(1.0) + wider * self.contrast
             }
             Term::Turbulent => self.survey.damping * self.survey.modulation.bragg_share,
-            Term::TiltAverage => self.survey.backscatter[0],
-            Term::Specular => self.survey.backscatter[1],
+            Term::TiltAverage => self.backscatter[0],
+            Term::Specular => self.backscatter[1],
             Term::RangeBunching => {
                 self.part(|m| m.range_bunching) + self.both(|w| self.range_shift(w)) * self.contrast
             }
@@ -164,7 +167,7 @@ impl<'a> Estimates<'a> {
         // A spot of width w spread to w' loses about (1 − w²/w'²)/2 of its height.
         let widths = [nominal, moving].map(|rho| self.width(rho));
         let spots = 0.5 * (1.0 - (widths[0] / widths[1]).powi(2));
-        self.both(change) * self.contrast.hypot(1.0) + spots * survey.backscatter[1]
+        self.both(change) * self.contrast.hypot(1.0) + spots * self.backscatter[1]
     }
 
     /// Displacements in azimuth over the width of what is displaced.
@@ -194,7 +197,10 @@ mod tests {
     use super::*;
     use crate::modulation::ModulationTransfer;
     use crate::sar::AzimuthResolution;
+    use crate::scattering::SlopeCovariance;
     use crate::waves::Transfer;
+
+    const BACKSCATTER: [f64; 2] = [0.21, 0.3];
 
     /// One wave of the sea along range and one of the wake along azimuth, both of ω = 1/s, tan θ = 3/4, and numbers of
     /// their own for all else.
@@ -233,8 +239,7 @@ mod tests {
             added: [0.17, 0.18],
             response: 0.19,
             mean: [1.0, 1.0],
-            backscatter: [0.21, 0.3],
-            modulation_variance: 0.0,
+            resolved: SlopeCovariance::NONE,
             spacing: 4.0,
             looks: 25.0,
             absent: vec![(Term::Kelvin, "there is no ship")],
@@ -267,7 +272,7 @@ mod tests {
         let of_swell =
             (0.5 * sea + 3.0 * 0.01 * 0.01) * product + 0.5 * sea_shift[0].hypot(sea_shift[1]) * c;
         let survey = survey();
-        for effect in effects(&survey) {
+        for effect in effects(&survey, BACKSCATTER) {
             let expected = match effect.term {
                 Term::Sea => of_sea,
                 Term::Swell => of_swell,
@@ -303,14 +308,14 @@ mod tests {
         // Speckle that neighbours share may be more than the contrast.
         let mut smooth = survey;
         smooth.response = 0.9;
-        let estimates = Estimates::new(&smooth);
+        let estimates = Estimates::new(&smooth, BACKSCATTER);
         assert!((estimates.of(Term::Response) - 0.9).abs() < 1e-15);
     }
 
     /// Every term once, and what is absent says so of itself alone.
     #[test]
     fn what_is_absent_is_told_of_its_own_term() {
-        let effects = effects(&survey());
+        let effects = effects(&survey(), BACKSCATTER);
         let terms: Vec<Term> = effects.iter().map(|e| e.term).collect();
         assert_eq!(terms, Term::ALL);
         for effect in effects {

@@ -19,7 +19,7 @@ use crate::models::Models;
 use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::surface::lattice_size;
-use crate::survey::Survey;
+use crate::survey::{Survey, modulation_variance};
 use serde::Serialize;
 
 /// Fields of four bytes a pixel that are alive at once, at most; the target of the design.
@@ -129,7 +129,9 @@ impl Plan {
 
     pub(crate) fn of(scene: &Scene, models: &Models, survey: &Survey) -> Result<Self> {
         let tolerance = scene.model.tolerance;
-        let effects = estimates::effects(survey);
+        let sensitivity = models.backscatter(true, true).sensitivity(&survey.resolved);
+        let backscatter = [sensitivity.tilt_average, sensitivity.specular];
+        let effects = estimates::effects(survey, backscatter);
         let terms = terms::choose(&effects, &scene.model.terms, tolerance);
         let uses = |term| terms.iter().any(|t| t.term == term && t.used);
         let margin = survey.margin(models);
@@ -168,7 +170,7 @@ impl Plan {
             notes: survey.notes(scene, models),
             wakes,
             mean_sigma0: survey.mean[0] + survey.mean[1],
-            modulation_variance: survey.modulation_variance,
+            modulation_variance: modulation_variance(models),
         })
     }
 

@@ -26,6 +26,7 @@ pub(crate) struct Coefficients {
 /// Valenzuela (1978), Boundary-Layer Meteorology 13, 61, Eqs. 4.3–4.4 (with ε for sea water, no approximation
 /// for large |ε|).
 #[must_use]
+#[inline(always)]
 pub(crate) fn coefficients(permittivity: Complex64, cos_incidence: f64) -> Coefficients {
     let (e, cos) = (permittivity, cos_incidence);
     let sin2 = 1.0 - cos * cos;
@@ -39,6 +40,7 @@ pub(crate) fn coefficients(permittivity: Complex64, cos_incidence: f64) -> Coeff
 }
 
 /// Principal square root of a number with positive imaginary part, without the sines of the general one.
+#[inline(always)]
 fn square_root(z: Complex64) -> Complex64 {
     let re = (0.5 * (z.norm_sqr().sqrt() + z.re)).sqrt();
     Complex64::new(re, 0.5 * z.im / re)
@@ -66,6 +68,7 @@ pub(crate) fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
 ///
 /// Valenzuela (1978), Eq. 4.2; Romeiser et al. (1997), J. Geophys. Res. 102, 25237, Eq. 1, in another notation.
 #[must_use]
+#[inline(always)]
 pub(crate) fn cross_section(
     radar_wavenumber: f64,
     cos_incidence: f64,

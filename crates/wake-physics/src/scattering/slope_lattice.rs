@@ -13,29 +13,41 @@ pub(crate) struct SlopeLattice {
 }
 
 impl SlopeLattice {
-    /// Samples `function`, row by row in parallel.
-    pub(crate) fn sample(
+    /// Samples a function, row by row in parallel.
+    ///
+    /// - `fill`: its values in a row, from coordinates of the row's first node on
+    pub(crate) fn of_rows(
         start: [f64; 2],
         step: f64,
         nodes: [usize; 2],
-        function: impl Fn([f64; 2]) -> f64 + Sync,
+        fill: impl Fn([f64; 2], &mut [f64]) + Sync,
     ) -> Self {
         let mut values = vec![0.0; nodes[0] * nodes[1]];
         values
             .par_chunks_mut(nodes[0])
             .enumerate()
-            .for_each(|(j, row)| {
-                let v = start[1] + step * j as f64;
-                for (i, value) in row.iter_mut().enumerate() {
-                    *value = function([start[0] + step * i as f64, v]);
-                }
-            });
+            .for_each(|(j, row)| fill([start[0], start[1] + step * j as f64], row));
         Self {
             start,
             step,
             nodes,
             values,
         }
+    }
+
+    /// Samples a function, node by node.
+    #[cfg(test)]
+    pub(crate) fn sample(
+        start: [f64; 2],
+        step: f64,
+        nodes: [usize; 2],
+        function: impl Fn([f64; 2]) -> f64 + Sync,
+    ) -> Self {
+        Self::of_rows(start, step, nodes, |[u, v], row| {
+            for (i, value) in row.iter_mut().enumerate() {
+                *value = function([u + step * i as f64, v]);
+            }
+        })
     }
 
     /// Coordinates of node `n`, counted as the values are.

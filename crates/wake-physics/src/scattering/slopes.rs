@@ -161,6 +161,7 @@ impl SlopeDensity {
 
 impl PrincipalAxes {
     /// Slope (x, y) at coordinates (u, v) along the axes.
+    #[inline(always)]
     pub(crate) fn slope(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [a, b] = self.axis;
         [a * u - b * v, b * u + a * v]

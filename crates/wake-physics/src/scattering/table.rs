@@ -316,8 +316,9 @@ impl Facets {
         let cells = range.map(|[first, last]| ((last - first) / (2.0 * spacing)).ceil() as usize);
         let nodes = [0, 1].map(|a| 2 * cells[a] + 7 + 2 * radius[a]);
         let start = [0, 1].map(|a| range[a][0] - spacing * (3 + radius[a]) as f64);
-        let lattice = SlopeLattice::sample(start, spacing, nodes, |point| {
-            backscatter.two_scale.facet(axes.slope(point))
+        let step = axes.slope([spacing, 0.0]);
+        let lattice = SlopeLattice::of_rows(start, spacing, nodes, |first, row| {
+            backscatter.two_scale.facets(axes.slope(first), step, row);
         });
         Self {
             lattice,

@@ -4,6 +4,7 @@ use crate::scattering::Polarization;
 use crate::scattering::bragg::{coefficients, cross_section};
 use crate::scattering::slopes::{SlopeCovariance, gaussian_nodes};
 use crate::spectrum::Elfouhaily;
+use crate::vectorize::{exp, vectorized};
 use num_complex::Complex64;
 
 /// Split wavenumber over radar wavenumber, `k_d`/`k_e` \[1\]. Longer waves tilt facets, shorter ones scatter.
@@ -101,36 +102,61 @@ impl TwoScale {
     /// the beam, which raises mean σ⁰ by at most 0.2 dB. Here σ⁰ is per unit area of sea.
     #[must_use]
     pub fn facet(&self, slope: [f64; 2]) -> f64 {
-        let [sx, sy] = slope;
+        self.facet_by(slope, f64::exp)
+    }
+
+    /// [`Self::facet`] of slopes on a line, from `first` by `step`.
+    pub(crate) fn facets(&self, first: [f64; 2], step: [f64; 2], out: &mut [f64]) {
+        vectorized(
+            #[inline(always)]
+            || {
+                // What is written could be a part of the model, for all the compiler knows, but not of this copy.
+                let model = self.clone();
+                for (n, value) in (0u32..).zip(out) {
+                    let n = f64::from(n);
+                    let slope = [first[0] + n * step[0], first[1] + n * step[1]];
+                    *value = model.facet_by(slope, exp);
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn facet_by(&self, [sx, sy]: [f64; 2], exp: impl Fn(f64) -> f64 + Copy) -> f64 {
+        if self.spectrum.is_flat() {
+            return 0.0;
+        }
         let in_plane = (1.0 + sx * sx).sqrt();
         let area = (1.0 + sx * sx + sy * sy).sqrt();
         let cos_look = (self.cos_incidence + self.sin_incidence * sx) / in_plane;
         let sin_look = (self.sin_incidence - self.cos_incidence * sx) / in_plane;
-        if cos_look <= 0.0 {
-            return 0.0;
-        }
         let (sin_tilt, cos_tilt) = (sy / area, in_plane / area);
         let bragg = [sin_look, -cos_look * sin_tilt];
         let sin2 = bragg[0] * bragg[0] + bragg[1] * bragg[1];
-        let passed = self.roll_off(sin2);
-        if passed <= 0.0 {
-            return 0.0;
-        }
+        let passed = self.roll_off(sin2, exp);
         let cos = cos_look * cos_tilt;
         let own = (sin_look * cos_tilt).powi(2) / sin2;
         let gain = self.gain(cos, own, sin_tilt * sin_tilt / sin2);
         let k = bragg.map(|b| 2.0 * self.radar_wavenumber * b);
-        let density = self.spectrum.density(k, self.wind);
-        cross_section(self.radar_wavenumber, cos, gain, density) * passed * area
+        let density = self.spectrum.density_by(k, self.wind, exp);
+        let sigma = cross_section(self.radar_wavenumber, cos, gain, density) * passed * area;
+        // Where nothing passes the rest may be no number.
+        if cos_look > 0.0 && passed > 0.0 {
+            sigma
+        } else {
+            0.0
+        }
     }
 
     /// Share of the Bragg return that counts as such, from `sin²θ_i`.
-    fn roll_off(&self, sin2: f64) -> f64 {
+    #[inline(always)]
+    fn roll_off(&self, sin2: f64, exp: impl Fn(f64) -> f64) -> f64 {
         let ratio2 = (0.5 * ROLL_OFF * SPLIT).powi(2) / sin2;
-        (-ratio2 * ratio2 * ratio2).exp()
+        exp(-ratio2 * ratio2 * ratio2)
     }
 
     /// |g|² of a facet with the given shares of its own and of the other polarization.
+    #[inline(always)]
     fn gain(&self, cos_incidence: f64, own: f64, other: f64) -> f64 {
         let g = coefficients(self.permittivity, cos_incidence);
         match self.polarization {
@@ -158,12 +184,17 @@ impl TwoScale {
     pub(crate) fn average(&self, slope: [f64; 2], unresolved: &SlopeCovariance, step: f64) -> f64 {
         let axes = unresolved.principal_axes();
         let [along, across] = axes.variance.map(|v| gaussian_nodes(v.sqrt(), step));
+        let mut row = vec![0.0; along.len()];
+        let step = match &along[..] {
+            [a, b, ..] => axes.slope([b[0] - a[0], 0.0]),
+            _ => [0.0; 2],
+        };
         let mut sum = 0.0;
         for &[v, weight_v] in &across {
-            for &[u, weight_u] in &along {
-                let [dx, dy] = axes.slope([u, v]);
-                sum += weight_u * weight_v * self.facet([slope[0] + dx, slope[1] + dy]);
-            }
+            let [dx, dy] = axes.slope([along[0][0], v]);
+            self.facets([slope[0] + dx, slope[1] + dy], step, &mut row);
+            let weighed = row.iter().zip(&along).map(|(value, [_, w])| w * value);
+            sum += weight_v * weighed.sum::<f64>();
         }
         sum
     }
@@ -258,6 +289,25 @@ mod tests {
         assert_eq!(model.facet([-1e8, 3.0]), 0.0);
         assert_eq!(model.facet([60f64.to_radians().tan(), 0.0]), 0.0);
         assert!(model.facet([1e8, 1e8]).is_finite());
+    }
+
+    /// Facets on a line are the same facets, towards grazing and towards nadir, to the rounding of the exponent of the roll-off,
+    /// which is up to 700, and of what it takes to get there.
+    #[test]
+    fn facets_on_a_line_are_facets() {
+        for (degrees, polarization) in [(8.0, Polarization::VV), (35.0, Polarization::HH)] {
+            let model = model(degrees, polarization, 6.0);
+            let mut row = [0.0; 83];
+            for j in -40..=40 {
+                let y = 0.0625 * f64::from(j);
+                model.facets([-2.5, y], [0.0625, 0.0], &mut row);
+                for (i, other) in (0..).zip(row) {
+                    let one = model.facet([0.0625 * f64::from(i) - 2.5, y]);
+                    let bound = 700.0 * 10.0 * f64::EPSILON * one + 1e-290;
+                    assert!((one - other).abs() <= bound, "{i} {j}: {one} {other}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -155,8 +155,15 @@ impl Elfouhaily {
         self.peak_wavenumber
     }
 
+    /// Whether there is no wind, and no wave.
+    #[inline(always)]
+    pub(crate) fn is_flat(&self) -> bool {
+        self.peak_wavenumber.is_infinite()
+    }
+
     /// Phase speed c [m/s] in the form of this model: deep water, with surface tension.
     #[must_use]
+    #[inline(always)]
     pub fn phase_speed(&self, wavenumber: f64) -> f64 {
         (self.gravity / wavenumber * (1.0 + (wavenumber / SLOWEST_WAVENUMBER).powi(2))).sqrt()
     }
@@ -164,24 +171,28 @@ impl Elfouhaily {
     /// Curvature spectrum B(k) = k³ S(k) \[1\]; 0 at k ≤ 0 and without wind.
     #[must_use]
     pub fn curvature(&self, wavenumber: f64) -> f64 {
-        let k = wavenumber;
-        if k <= 0.0 || self.peak_wavenumber.is_infinite() {
+        if wavenumber <= 0.0 || self.is_flat() {
             return 0.0;
         }
+        self.curvature_by(wavenumber, f64::exp)
+    }
+
+    /// B(k) at k above 0, of a sea with wind, by an exponential function.
+    #[inline(always)]
+    fn curvature_by(&self, k: f64, exp: impl Fn(f64) -> f64) -> f64 {
         let age = (k / self.peak_wavenumber).sqrt() - 1.0;
         let distance = age / self.peak_width;
         // Nine widths from the peak Γ is below rounding; no exponential for the short waves of a radar.
         let peak = if distance < 9.0 {
-            (-0.5 * distance * distance).exp()
+            exp(-0.5 * distance * distance)
         } else {
             0.0
         };
-        let shape = (self.ln_enhancement * peak - 1.25 * (self.peak_wavenumber / k).powi(2)).exp();
+        let shape = exp(self.ln_enhancement * peak - 1.25 * (self.peak_wavenumber / k).powi(2));
         let long =
-            self.long_level * self.peak_speed * (-self.inverse_wave_age / 10f64.sqrt() * age).exp();
-        let short = self.short_level
-            * SLOWEST_SPEED
-            * (-0.25 * (k / SLOWEST_WAVENUMBER - 1.0).powi(2)).exp();
+            self.long_level * self.peak_speed * exp(-self.inverse_wave_age / 10f64.sqrt() * age);
+        let short =
+            self.short_level * SLOWEST_SPEED * exp(-0.25 * (k / SLOWEST_WAVENUMBER - 1.0).powi(2));
         0.5 * (long + short) / self.phase_speed(k) * shape
     }
 
@@ -203,13 +214,19 @@ impl Elfouhaily {
     /// ```
     #[must_use]
     pub fn anisotropy(&self, wavenumber: f64) -> f64 {
+        self.anisotropy_by(wavenumber, f64::exp)
+    }
+
+    /// Δ(k) by an exponential function.
+    #[inline(always)]
+    fn anisotropy_by(&self, wavenumber: f64, exp: impl Fn(f64) -> f64) -> f64 {
         let c = self.phase_speed(wavenumber);
         let to_two_and_half = |ratio: f64| ratio * ratio * ratio.sqrt();
         let long = 4.0 * to_two_and_half(c / self.peak_speed);
         let wind = 0.13 * self.friction_velocity / SLOWEST_SPEED;
         let x = LN_2 / 4.0 + long + wind * to_two_and_half(SLOWEST_SPEED / c);
         // tanh x, by one exponential: x is far enough from 0 that nothing is lost.
-        1.0 - 2.0 / ((2.0 * x).exp() + 1.0)
+        2.0 / (1.0 + exp(-2.0 * x)) - 1.0
     }
 
     /// Spectral density Ψ(kx, ky) \[m⁴\], two-sided and even.
@@ -217,15 +234,26 @@ impl Elfouhaily {
     /// - `k` [rad/m]; `wind` unit vector of where the wind blows to
     #[must_use]
     pub fn density(&self, k: [f64; 2], wind: [f64; 2]) -> f64 {
-        let squared = k[0] * k[0] + k[1] * k[1];
-        let curvature = self.curvature(squared.sqrt());
-        if curvature <= 0.0 {
+        if k[0].hypot(k[1]) <= 0.0 || self.is_flat() {
             return 0.0;
         }
+        self.density_by(k, wind, f64::exp)
+    }
+
+    /// Ψ(kx, ky) where k is not 0, of a sea with wind, by an exponential function.
+    #[inline(always)]
+    pub(crate) fn density_by(
+        &self,
+        k: [f64; 2],
+        wind: [f64; 2],
+        exp: impl Fn(f64) -> f64 + Copy,
+    ) -> f64 {
+        let squared = k[0] * k[0] + k[1] * k[1];
         let along = k[0] * wind[0] + k[1] * wind[1];
         let cos_twice = 2.0 * along * along / squared - 1.0;
-        let spread = (1.0 + self.anisotropy(squared.sqrt()) * cos_twice) / (2.0 * PI);
-        curvature / (squared * squared) * spread
+        let anisotropy = self.anisotropy_by(squared.sqrt(), exp);
+        let spread = (1.0 + anisotropy * cos_twice) / (2.0 * PI);
+        self.curvature_by(squared.sqrt(), exp) / (squared * squared) * spread
     }
 
     /// Variance of the slopes along and across the wind of all waves from `low` to `high` \[1\].
@@ -241,7 +269,7 @@ impl Elfouhaily {
     pub fn slope_variance(&self, low: f64, high: f64) -> [f64; 2] {
         let low = low.max(self.peak_wavenumber / 10.0);
         let high = high.min((20.0 * SLOWEST_WAVENUMBER).max(1e4 * self.peak_wavenumber));
-        if low >= high || self.peak_wavenumber.is_infinite() {
+        if low >= high || self.is_flat() {
             return [0.0; 2];
         }
         let rule = GaussLegendre::new(5);

@@ -1,5 +1,6 @@
 //! The cos-2s spreading of Longuet-Higgins, with the exponents of Hasselmann and of Mitsuyasu.
 
+use super::Spread;
 use crate::constants::GRAVITY;
 use std::f64::consts::PI;
 
@@ -69,11 +70,13 @@ impl Cos2s {
         gamma_ratio(exponent) / (2.0 * PI.sqrt())
     }
 
-    /// D(k, δ) [1/rad] from k [rad/m] and cos δ.
-    #[must_use]
-    pub fn density(&self, wavenumber: f64, cos_angle: f64) -> f64 {
-        let s = self.exponent(wavenumber);
-        Self::normalization(s) * (0.5 * (1.0 + cos_angle)).max(0.0).powf(s)
+    /// D(δ) of one deep-water wavenumber [rad/m].
+    pub(super) fn at(&self, wavenumber: f64) -> Spread {
+        let exponent = self.exponent(wavenumber);
+        Spread::Cos2s {
+            level: Self::normalization(exponent),
+            exponent,
+        }
     }
 
     /// ∫D cos 2δ dδ = s(s − 1)/((s + 1)(s + 2)).
@@ -144,7 +147,7 @@ mod tests {
             let k = 0.1 + 0.0002 * f64::from(n);
             let s = spreading.exponent(k);
             assert!((s / old - 1.0).abs() < 0.01);
-            assert!(spreading.density(k, 0.9) > spreading.density(k, -0.9));
+            assert!(spreading.at(k).density(0.9) > spreading.at(k).density(-0.9));
             old = s;
         }
     }

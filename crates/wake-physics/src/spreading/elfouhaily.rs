@@ -1,7 +1,7 @@
 //! The even spreading of Elfouhaily et al. (1997).
 
+use super::Spread;
 use crate::spectrum::Elfouhaily;
-use std::f64::consts::PI;
 
 /// Waves along the wind more than across it, as many against it as with it.
 ///
@@ -35,11 +35,11 @@ impl EvenSpreading {
         self.sea.anisotropy(wavenumber)
     }
 
-    /// D(k, δ) [1/rad] from k [rad/m] and cos δ.
-    #[must_use]
-    pub fn density(&self, wavenumber: f64, cos_angle: f64) -> f64 {
-        let cos_twice = 2.0 * cos_angle * cos_angle - 1.0;
-        (1.0 + self.anisotropy(wavenumber) * cos_twice) / (2.0 * PI)
+    /// D(δ) of one deep-water wavenumber [rad/m].
+    pub(super) fn at(&self, wavenumber: f64) -> Spread {
+        Spread::Even {
+            anisotropy: self.anisotropy(wavenumber),
+        }
     }
 
     /// ∫D cos 2δ dδ = Δ/2.

@@ -8,6 +8,7 @@ pub use elfouhaily::EvenSpreading;
 
 use crate::scene::SpreadingModel;
 use crate::spectrum::Elfouhaily;
+use std::f64::consts::PI;
 
 /// The spreading of one sea, by one of the models.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,9 +39,14 @@ impl Spreading {
     /// D(k, δ) [1/rad] for deep-water wavenumber k [rad/m] and cos δ, δ the angle to the wind.
     #[must_use]
     pub fn density(&self, wavenumber: f64, cos_angle: f64) -> f64 {
+        self.at(wavenumber).density(cos_angle)
+    }
+
+    /// The spreading of the waves of one deep-water wavenumber [rad/m].
+    pub(crate) fn at(&self, wavenumber: f64) -> Spread {
         match self {
-            Self::Cos2s(model) => model.density(wavenumber, cos_angle),
-            Self::Even(model) => model.density(wavenumber, cos_angle),
+            Self::Cos2s(model) => model.at(wavenumber),
+            Self::Even(model) => model.at(wavenumber),
         }
     }
 
@@ -50,6 +56,29 @@ impl Spreading {
         match self {
             Self::Cos2s(model) => model.second_harmonic(wavenumber),
             Self::Even(model) => model.second_harmonic(wavenumber),
+        }
+    }
+}
+
+/// The spreading of the waves of one length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Spread {
+    /// D(δ) = level · cos^{2s}(δ/2).
+    Cos2s { level: f64, exponent: f64 },
+    /// D(δ) = (1 + Δ cos 2δ)/(2π).
+    Even { anisotropy: f64 },
+}
+
+impl Spread {
+    /// D(δ) [1/rad] from cos δ, δ the angle to the wind.
+    pub(crate) fn density(self, cos_angle: f64) -> f64 {
+        match self {
+            Self::Cos2s { level, exponent } => {
+                level * (0.5 * (1.0 + cos_angle)).max(0.0).powf(exponent)
+            }
+            Self::Even { anisotropy } => {
+                (1.0 + anisotropy * (2.0 * cos_angle * cos_angle - 1.0)) / (2.0 * PI)
+            }
         }
     }
 }

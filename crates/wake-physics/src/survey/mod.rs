@@ -61,10 +61,8 @@ pub(crate) struct Survey {
     pub(crate) response: f64,
     /// Mean σ⁰: Bragg and specular.
     pub(crate) mean: [f64; 2],
-    /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
-    pub(crate) backscatter: [f64; 2],
-    /// Variance of the hydrodynamic modulation by the resolved sea \[1\].
-    pub(crate) modulation_variance: f64,
+    /// Slopes of the resolved waves where the wake is.
+    pub(crate) resolved: SlopeCovariance,
     /// Pixel size \[m\].
     pub(crate) spacing: f64,
     /// Number of looks.
@@ -95,7 +93,6 @@ impl Survey {
         // Where the wake is, terms matter most; the mean is that of the whole image.
         let [mean_slopes, resolved] = wake_slopes.map(|wake| slopes(&sea).plus(&wake));
         let mean = backscatter.mean_over(&mean_slopes);
-        let sensitivity = backscatter.sensitivity(&resolved);
         let (tilt, curvature) = slope_of_ln_sigma(&backscatter);
         let total = mean[0] + mean[1];
         // Where nothing scatters all that is added is all there is.
@@ -128,8 +125,7 @@ impl Survey {
             resolution: models.resolution(),
             damping: damping(models),
             mean,
-            backscatter: [sensitivity.tilt_average, sensitivity.specular],
-            modulation_variance: modulation_variance(models),
+            resolved,
             spacing: models.image.spacing,
             looks: f64::from(scene.radar.looks),
             absent: Vec::new(),
@@ -356,8 +352,8 @@ fn sampled_straight(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64)
     (waves, area / wedge)
 }
 
-/// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate.
-fn modulation_variance(models: &Models) -> f64 {
+/// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate \[1\].
+pub(crate) fn modulation_variance(models: &Models) -> f64 {
     let band = models
         .image
         .nyquist_wavenumber()

@@ -21,20 +21,24 @@ pub(crate) fn sea(spectrum: &DirectionalSpectrum, band: f64) -> Vec<WaveSample> 
     }
     let step = (band / low).ln() / STEPS[0] as f64;
     let turn = TAU / STEPS[1] as f64;
+    let directions: Vec<[f64; 2]> = (0..STEPS[1])
+        .map(|m| ((m as f64 + 0.5) * turn).sin_cos().into())
+        .collect();
+    let wind = spectrum.wind();
     let mut waves = Vec::with_capacity(STEPS[0] * STEPS[1]);
     for n in 0..STEPS[0] {
         let k = low * ((n as f64 + 0.5) * step).exp();
         let omega = angular_frequency(k, spectrum.depth());
-        for m in 0..STEPS[1] {
-            let (sin, cos) = ((m as f64 + 0.5) * turn).sin_cos();
-            let direction = [k * sin, k * cos];
-            let variance = spectrum.psi(direction) * k * k * step * turn;
-            waves.push(WaveSample {
-                k: direction,
+        let ring = spectrum.ring(k);
+        let wave = |[x, y]: [f64; 2]| {
+            let psi = ring.map_or(0.0, |ring| ring.psi(x * wind[0] + y * wind[1]));
+            WaveSample {
+                k: [k * x, k * y],
                 omega,
-                variance,
-            });
-        }
+                variance: psi * k * k * step * turn,
+            }
+        };
+        waves.extend(directions.iter().map(|&direction| wave(direction)));
     }
     waves
 }
