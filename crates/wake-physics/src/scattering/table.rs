@@ -19,7 +19,7 @@ const MOST_REFINEMENT: usize = 16;
 /// Steepest slope along an axis that the table covers \[1\]; steeper facets are rare and evaluated exactly.
 const STEEPEST: f64 = 1.5;
 
-/// Most facets evaluated for one table: about 0.1 s.
+/// Most facets evaluated for one table.
 const MOST_FACETS: usize = 1 << 19;
 
 /// Backscatter of facets by interpolation.
