@@ -1,6 +1,6 @@
 //! The cos-2s spreading of Longuet-Higgins, with the exponents of Hasselmann and of Mitsuyasu.
 
-use super::Spread;
+use super::spread::Spread;
 use crate::constants::GRAVITY;
 use std::f64::consts::PI;
 

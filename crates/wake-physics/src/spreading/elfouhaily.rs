@@ -1,6 +1,6 @@
 //! The even spreading of Elfouhaily et al. (1997).
 
-use super::Spread;
+use super::spread::Spread;
 use crate::spectrum::Elfouhaily;
 
 /// Waves along the wind more than across it, as many against it as with it.

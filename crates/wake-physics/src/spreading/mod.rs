@@ -2,13 +2,14 @@
 
 mod cos2s;
 mod elfouhaily;
+mod spread;
 
 pub use cos2s::Cos2s;
 pub use elfouhaily::EvenSpreading;
+pub(crate) use spread::Spread;
 
 use crate::scene::SpreadingModel;
 use crate::spectrum::Elfouhaily;
-use std::f64::consts::PI;
 
 /// The spreading of one sea, by one of the models.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,29 +57,6 @@ impl Spreading {
         match self {
             Self::Cos2s(model) => model.second_harmonic(wavenumber),
             Self::Even(model) => model.second_harmonic(wavenumber),
-        }
-    }
-}
-
-/// The spreading of the waves of one length.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Spread {
-    /// D(δ) = level · cos^{2s}(δ/2).
-    Cos2s { level: f64, exponent: f64 },
-    /// D(δ) = (1 + Δ cos 2δ)/(2π).
-    Even { anisotropy: f64 },
-}
-
-impl Spread {
-    /// D(δ) [1/rad] from cos δ, δ the angle to the wind.
-    pub(crate) fn density(self, cos_angle: f64) -> f64 {
-        match self {
-            Self::Cos2s { level, exponent } => {
-                level * (0.5 * (1.0 + cos_angle)).max(0.0).powf(exponent)
-            }
-            Self::Even { anisotropy } => {
-                (1.0 + anisotropy * (2.0 * cos_angle * cos_angle - 1.0)) / (2.0 * PI)
-            }
         }
     }
 }
