@@ -353,7 +353,8 @@ mod tests {
         }
     }
 
-    /// What is surely found in an image is found in the image turned by a quarter, too, by the shipped network.
+    /// What is surely found in an image is found in the image turned by a quarter, too, by the shipped network, and on average
+    /// as surely. A single score may be another one where both ends of a line could be its tip.
     #[test]
     fn a_quarter_turn_turns_what_is_found() {
         let model = Detector::pretrained(&Device::flex()).expect("weights of the repository");
@@ -361,8 +362,8 @@ mod tests {
             seed: 77,
             size: 384,
         };
-        let mut sure = 0;
-        for index in 0..20 {
+        let (mut sure, mut kept, mut scores) = (0, 0.0, 0.0);
+        for index in 0..60 {
             let image = GreyImage::from_levels(384, 384, &source.sample(index).pixels);
             let (upright, turned) = (
                 find(&image, &model, SEARCH),
@@ -378,11 +379,15 @@ mod tests {
                     let apart = (other.wake.tip[0] - 383.0 + y).hypot(other.wake.tip[1] - x);
                     turn.abs() < 10.0 && apart < 60.0
                 });
-                let score = again.map_or(0.0, |again| again.score);
-                assert!(score > 0.5 * one.score, "{one:?} in {turned:?}");
+                let again = again.unwrap_or_else(|| panic!("{one:?} in {turned:?}"));
+                kept += again.score;
+                scores += one.score;
                 sure += 1;
             }
         }
-        assert!(sure >= 4, "{sure} wakes");
+        assert!(sure >= 20, "{sure} wakes");
+        // Scores scatter by a sixth of themselves, the mean of twenty by a twenty-fifth, and those above a threshold are rather
+        // the ones that were lucky upright: a tenth.
+        assert!(kept > 0.9 * scores, "{kept} of {scores}");
     }
 }
