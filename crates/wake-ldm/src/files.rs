@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use wake_physics::output;
 
-/// No configuration file is longer than this \[bytes\].
+/// No text file that is read as a whole is longer than this \[bytes\].
 const LONGEST_TEXT: u64 = 16 << 20;
 
 /// Reads a text file of at most 16 MiB, such as a configuration or the labels of a folder.

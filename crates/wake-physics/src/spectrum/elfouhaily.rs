@@ -234,13 +234,13 @@ impl Elfouhaily {
     /// - `k` [rad/m]; `wind` unit vector of where the wind blows to
     #[must_use]
     pub fn density(&self, k: [f64; 2], wind: [f64; 2]) -> f64 {
-        if k[0].hypot(k[1]) <= 0.0 || self.is_flat() {
+        if self.is_flat() {
             return 0.0;
         }
         self.density_by(k, wind, f64::exp)
     }
 
-    /// Ψ(kx, ky) where k is not 0, of a sea with wind, by an exponential function.
+    /// Ψ(kx, ky) of a sea with wind, by an exponential function.
     #[inline(always)]
     pub(crate) fn density_by(
         &self,
@@ -253,7 +253,13 @@ impl Elfouhaily {
         let cos_twice = 2.0 * along * along / squared - 1.0;
         let anisotropy = self.anisotropy_by(squared.sqrt(), exp);
         let spread = (1.0 + anisotropy * cos_twice) / (2.0 * PI);
-        self.curvature_by(squared.sqrt(), exp) / (squared * squared) * spread
+        let curvature = self.curvature_by(squared.sqrt(), exp);
+        // Where there is no wave, as at k = 0, the rest may be no number.
+        if curvature > 0.0 {
+            curvature / (squared * squared) * spread
+        } else {
+            0.0
+        }
     }
 
     /// Variance of the slopes along and across the wind of all waves from `low` to `high` \[1\].
@@ -452,7 +458,7 @@ mod tests {
         for wind in [0.0, 1e-200, 1e-3, 0.5, 2.0, 2.7] {
             let sea = Elfouhaily::new(wind, 4e4);
             assert!(sea.short_level <= 0.0, "{wind}");
-            for k in [0.0, 1e-6, 1.0, 370.0, 1e6] {
+            for k in [0.0, 1e-200, 1e-90, 1e-6, 1.0, 370.0, 1e6] {
                 let psi = sea.density([k, 0.0], [1.0, 0.0]);
                 assert!(psi.is_finite() && psi >= 0.0, "{wind} {k}");
             }
