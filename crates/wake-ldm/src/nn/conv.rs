@@ -75,16 +75,11 @@ mod native {
         })
     }
 
-    // What is tracked is computed directly: tiles would change the last digits of trained weights, those that ship among them.
     impl Operation<2> for Geometry {
         type Saved = ();
 
         fn forward(&self, [x, weight]: [&[f32]; 2]) -> (Vec<f32>, ()) {
             (conv::convolve(x, weight, None, self), ())
-        }
-
-        fn result(&self, [x, weight]: [&[f32]; 2]) -> Vec<f32> {
-            conv::convolve_by_tiles(x, weight, None, self)
         }
 
         fn gradients(
@@ -109,10 +104,6 @@ mod native {
 
         fn forward(&self, [x, weight, bias]: [&[f32]; 3]) -> (Vec<f32>, ()) {
             (conv::convolve(x, weight, Some(bias), self), ())
-        }
-
-        fn result(&self, [x, weight, bias]: [&[f32]; 3]) -> Vec<f32> {
-            conv::convolve_by_tiles(x, weight, Some(bias), self)
         }
 
         fn gradients(

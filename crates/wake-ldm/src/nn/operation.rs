@@ -14,11 +14,6 @@ pub(super) trait Operation<const N: usize>:
     /// The result, its shape, and what is saved.
     fn forward(&self, inputs: [&[f32]; N]) -> (Vec<f32>, Self::Saved);
 
-    /// The result alone, where nothing is tracked.
-    fn result(&self, inputs: [&[f32]; N]) -> Vec<f32> {
-        self.forward(inputs).0
-    }
-
     /// The gradient to every input that is wanted, from the gradient of the result.
     #[cfg_attr(
         not(feature = "train"),
@@ -50,7 +45,7 @@ pub(super) fn apply<const N: usize, const D: usize, O: Operation<N>>(
     let kind = match context {
         DispatchAutodiffContext::Disabled => {
             let inputs = inputs.map(plain);
-            let values = operation.result(inputs.each_ref().map(values_of));
+            let values = operation.forward(inputs.each_ref().map(values_of)).0;
             DispatchTensorKind::Flex(BackendTensor::Float(tensor(values, &shape)))
         }
         #[cfg(feature = "train")]

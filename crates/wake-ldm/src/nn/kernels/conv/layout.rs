@@ -45,6 +45,16 @@ impl Layout {
         row * self.phase[1] + column
     }
 
+    /// How far an output, counted over all images, is from the first of the first image.
+    pub(super) fn output(&self, output: usize, geometry: &Geometry) -> usize {
+        let columns = geometry.size_out()[1];
+        let (image, pixel) = (
+            output / geometry.pixels_out(),
+            output % geometry.pixels_out(),
+        );
+        image * geometry.channels[0] * self.plane() + self.pixel(pixel / columns, pixel % columns)
+    }
+
     /// Row and column in the laid-out plane of a pixel of the padded image, if any output sees it.
     fn place(&self, row: usize, column: usize) -> Option<usize> {
         let (r, c) = (row / self.stride, column / self.stride);
@@ -118,13 +128,11 @@ pub(super) struct Gather {
 }
 
 impl Gather {
-    /// For one tile of outputs from the `first` on; beyond the last, the last again.
+    /// For one tile of outputs from the `first` on, which is counted over all images; beyond the last, the last again.
     pub(super) fn new<S: Simd>(layout: &Layout, geometry: &Geometry, first: usize) -> Self {
-        let columns = geometry.size_out()[1];
-        let last = geometry.pixels_out() - 1;
+        let last = geometry.batch * geometry.pixels_out() - 1;
         let pixels: Vec<usize> = (0..tile::width::<S>())
-            .map(|i| (first + i).min(last))
-            .map(|pixel| layout.pixel(pixel / columns, pixel % columns))
+            .map(|i| layout.output((first + i).min(last), geometry))
             .collect();
         let run = |pixels: &[usize]| pixels.windows(2).all(|pair| pair[1] == pair[0] + 1);
         Self {
@@ -137,7 +145,7 @@ impl Gather {
         }
     }
 
-    /// Reads one laid-out plane: `[tap, pixel]`.
+    /// Reads one laid-out plane of every image, the first of which is `plane`'s beginning: `[tap, pixel]`.
     #[inline(always)]
     pub(super) fn read<S: Simd>(&self, plane: &[f32], rows: &mut [f32]) {
         let width = tile::width::<S>();

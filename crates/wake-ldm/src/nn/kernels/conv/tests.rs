@@ -1,5 +1,6 @@
 //! Every product against the sum that defines it.
 
+use super::image::{phases_of, turn};
 use super::*;
 use crate::nn::kernels::noise;
 
@@ -75,6 +76,9 @@ fn products_are_the_sums_that_define_them() {
         (1, [5, 40], [9, 5], 1, 1, [0; 4]),
         (2, [3, 4], [5, 7], 2, 1, [1, 0, 0, 1]),
         (1, [2, 7], [12, 9], 5, 3, [2, 1, 4, 3]),
+        (2, [3, 2], [9, 10], 5, 2, [3, 4, 1, 2]),
+        (1, [2, 3], [7, 8], 1, 2, [0; 4]),
+        (1, [3, 2], [10, 11], 2, 3, [1, 0, 0, 1]),
         (1, [130, 7], [6, 16], 3, 1, [1, 1, 1, 1]),
         (1, [1, 1], [1, 1], 3, 1, [1, 1, 1, 1]),
     ];
@@ -102,15 +106,19 @@ fn products_are_the_sums_that_define_them() {
     }
 }
 
-/// The most that rounding can change of a convolution by tiles: every number that is summed, and how many roundings it sees.
-///
-/// A kernel's transform rounds at most four times, a window's two, the product once, its sum once a channel, the pixel's
-/// four times, the bias once.
-fn rounding_of_tiles(x: &[f32], weight: &[f32], g: &Geometry) -> Vec<f64> {
-    let absolute = |values: &[f32]| values.iter().map(|v| v.abs()).collect::<Vec<_>>();
-    let (x, weight) = (absolute(x), absolute(weight));
-    let ([channels_in, channels_out], [rows, columns]) = (g.channels, g.size);
-    let [rows_out, columns_out] = g.size_out();
+/// What the transforms of tiles add up, signs left out: places of windows, rows of kernels, products.
+const B: [[f64; 4]; 4] = [
+    [1., 0., 1., 0.],
+    [0., 1., 1., 0.],
+    [0., 1., 1., 0.],
+    [0., 1., 0., 1.],
+];
+const G: [[f64; 3]; 4] = [[1., 0., 0.], [0.5, 0.5, 0.5], [0.5, 0.5, 0.5], [0., 0., 1.]];
+const A: [[f64; 4]; 2] = [[1., 1., 1., 0.], [0., 1., 1., 1.]];
+
+/// Sizes of the transformed windows of an image: `[image, tile, channel, place]`.
+fn sizes_of_windows(x: &[f32], g: &Geometry) -> Vec<[f64; 16]> {
+    let ([channels, _], [rows, columns]) = (g.channels, g.size);
     let pixel = |n: usize, c: usize, row: usize, column: usize| {
         let inside =
             |at: usize, border: usize, size: usize| at.checked_sub(border).filter(|&q| q < size);
@@ -118,49 +126,113 @@ fn rounding_of_tiles(x: &[f32], weight: &[f32], g: &Geometry) -> Vec<f64> {
             inside(row, g.border[0], rows),
             inside(column, g.border[1], columns),
         ) {
-            (Some(r), Some(q)) => f64::from(x[((n * channels_in + c) * rows + r) * columns + q]),
+            (Some(r), Some(q)) => f64::from(x[((n * channels + c) * rows + r) * columns + q].abs()),
             _ => 0.0,
         }
     };
-    // Which windows' places, kernels' rows and products add up, signs left out.
-    const B: [[f64; 4]; 4] = [
-        [1., 0., 1., 0.],
-        [0., 1., 1., 0.],
-        [0., 1., 1., 0.],
-        [0., 1., 0., 1.],
-    ];
-    const G: [[f64; 3]; 4] = [[1., 0., 0.], [0.5, 0.5, 0.5], [0.5, 0.5, 0.5], [0., 0., 1.]];
-    const A: [[f64; 4]; 2] = [[1., 1., 1., 0.], [0., 1., 1., 1.]];
+    let [down, across] = g.size_out().map(|size| size.div_ceil(2));
+    let mut sizes = Vec::new();
+    for i in 0..g.batch * down * across * channels {
+        let (c, tile) = (i % channels, i / channels);
+        let (n, row, column) = (tile / (down * across), tile / across % down, tile % across);
+        sizes.push(std::array::from_fn(|place| {
+            let (i, j) = (place / 4, place % 4);
+            let seen = |t: usize| pixel(n, c, 2 * row + t / 4, 2 * column + t % 4);
+            (0..16).map(|t| B[i][t / 4] * B[j][t % 4] * seen(t)).sum()
+        }));
+    }
+    sizes
+}
+
+/// The most that rounding can change of a convolution by tiles: every number that is summed, and how many roundings it sees.
+///
+/// A kernel's transform rounds at most four times, a window's two, the product once, its sum once a channel, the pixel's
+/// four times, the bias once.
+fn rounding_of_tiles(x: &[f32], weight: &[f32], g: &Geometry) -> Vec<f64> {
+    let [channels_in, channels_out] = g.channels;
+    let windows = sizes_of_windows(x, g);
+    let kernels: Vec<[f64; 16]> = weight
+        .chunks_exact(9)
+        .map(|kernel| {
+            std::array::from_fn(|place| {
+                let (i, j) = (place / 4, place % 4);
+                let w = |t: usize| f64::from(kernel[t].abs());
+                (0..9).map(|t| G[i][t / 3] * G[j][t % 3] * w(t)).sum()
+            })
+        })
+        .collect();
+    let [rows, columns] = g.size_out();
+    let [down, across] = [rows.div_ceil(2), columns.div_ceil(2)];
     let mut bounds = Vec::new();
-    for (n, o) in (0..g.batch).flat_map(|n| (0..channels_out).map(move |o| (n, o))) {
-        for (row, column) in (0..rows_out).flat_map(|r| (0..columns_out).map(move |c| (r, c))) {
-            let (tile, within) = ([row / 2 * 2, column / 2 * 2], [row % 2, column % 2]);
-            let mut size = 0.0;
-            for c in 0..channels_in {
-                let kernel = &weight[(o * channels_in + c) * 9..][..9];
-                for place in 0..16 {
-                    let (i, j) = (place / 4, place % 4);
-                    let w: f64 = (0..9)
-                        .map(|t| G[i][t / 3] * G[j][t % 3] * f64::from(kernel[t]))
-                        .sum();
-                    let d: f64 = (0..16)
-                        .map(|t| {
-                            B[i][t / 4]
-                                * B[j][t % 4]
-                                * pixel(n, c, tile[0] + t / 4, tile[1] + t % 4)
-                        })
-                        .sum();
-                    size += A[within[0]][i] * A[within[1]][j] * w * d;
-                }
+    for i in 0..g.batch * channels_out * rows * columns {
+        let (column, row) = (i % columns, i / columns % rows);
+        let (o, n) = (
+            i / (rows * columns) % channels_out,
+            i / (rows * columns * channels_out),
+        );
+        let tile = (n * down + row / 2) * across + column / 2;
+        let mut size = 0.0;
+        for c in 0..channels_in {
+            let (d, w) = (
+                &windows[tile * channels_in + c],
+                &kernels[o * channels_in + c],
+            );
+            for place in 0..16 {
+                size += A[row % 2][place / 4] * A[column % 2][place % 4] * w[place] * d[place];
             }
-            bounds.push((channels_in + 12) as f64 * f64::from(f32::EPSILON) / 2.0 * size);
+        }
+        bounds.push((channels_in + 12) as f64 * f64::from(f32::EPSILON) / 2.0 * size);
+    }
+    bounds
+}
+
+/// The most that rounding can change of a gradient to weights by tiles.
+///
+/// A window's transform rounds at most twice, that of the tile's gradient too, the product once, its sum once a tile, the kernel's
+/// four times.
+fn rounding_of_weights(x: &[f32], dy: &[f32], g: &Geometry) -> Vec<f64> {
+    let [channels_in, channels_out] = g.channels;
+    let windows = sizes_of_windows(x, g);
+    let [rows, columns] = g.size_out();
+    let [down, across] = [rows.div_ceil(2), columns.div_ceil(2)];
+    let tiles = g.batch * down * across;
+    let mut asked = vec![[0.0; 16]; tiles * channels_out];
+    for (i, dy) in dy.iter().enumerate() {
+        let (column, row) = (i % columns, i / columns % rows);
+        let (o, n) = (
+            i / (rows * columns) % channels_out,
+            i / (rows * columns * channels_out),
+        );
+        let tile = (n * down + row / 2) * across + column / 2;
+        for (place, sum) in asked[tile * channels_out + o].iter_mut().enumerate() {
+            *sum += A[row % 2][place / 4] * A[column % 2][place % 4] * f64::from(dy.abs());
+        }
+    }
+    let mut bounds = Vec::new();
+    for i in 0..channels_out * channels_in {
+        let (o, c) = (i / channels_in, i % channels_in);
+        let mut places = [0.0; 16];
+        for tile in 0..tiles {
+            let (dy, d) = (
+                &asked[tile * channels_out + o],
+                &windows[tile * channels_in + c],
+            );
+            for (place, sum) in places.iter_mut().enumerate() {
+                *sum += dy[place] * d[place];
+            }
+        }
+        for tap in 0..9 {
+            let size: f64 = (0..16)
+                .map(|place| G[place / 4][tap / 3] * G[place % 4][tap % 3] * places[place])
+                .sum();
+            bounds.push((tiles + 12) as f64 * f64::from(f32::EPSILON) / 2.0 * size);
         }
     }
     bounds
 }
 
 /// Sides that tiles fill and do not, lopsided borders, channels that rows of a product do not divide, panels of several rows
-/// of tiles and several panels a task.
+/// of tiles, several panels a task, and panels of several small images.
 #[test]
 fn tiles_give_the_sums_that_define_them() {
     let cases = [
@@ -169,6 +241,9 @@ fn tiles_give_the_sums_that_define_them() {
         (1, [16, 23], [63, 33], [1, 1, 1, 1]),
         (1, [19, 16], [40, 65], [0, 2, 1, 0]),
         (5, [16, 18], [16, 16], [1, 1, 1, 1]),
+        (16, [16, 20], [8, 8], [1, 1, 1, 1]),
+        (32, [17, 16], [7, 9], [1, 1, 1, 1]),
+        (85, [16, 16], [4, 6], [1, 0, 1, 2]),
     ];
     for (batch, channels, size, border) in cases {
         let g = Geometry {
@@ -182,28 +257,43 @@ fn tiles_give_the_sums_that_define_them() {
         let x = noise(batch * channels[0] * size[0] * size[1], 1);
         let weight = noise(channels[1] * g.patch(), 2);
         let bias = noise(channels[1], 3);
-        let y = convolve_by_tiles(&x, &weight, Some(&bias), &g);
-        let direct = convolve(&x, &weight, Some(&bias), &g);
+        let dy = noise(batch * channels[1] * g.pixels_out(), 4);
+        let exact = oracle(&x, &weight, &dy, &g);
+        let y = convolve(&x, &weight, Some(&bias), &g);
+        let direct = direct::convolve(&x, &weight, Some(&bias), &g);
         assert_ne!(y, direct, "computed by tiles: {g:?}");
-        let exact = oracle(&x, &weight, &vec![0.0; y.len()], &g).y;
+        let of_channels = bias.iter().flat_map(|b| vec![*b; g.pixels_out()]);
+        let of_channels: Vec<f32> = of_channels.cycle().take(y.len()).collect();
         let bounds = rounding_of_tiles(&x, &weight, &g);
-        let bias = bias
-            .iter()
-            .flat_map(|b| vec![f64::from(*b); g.pixels_out()]);
-        for (i, (((ours, exact), bound), bias)) in y
-            .iter()
-            .zip(exact)
-            .zip(bounds)
-            .zip(bias.cycle())
-            .enumerate()
-        {
-            let error = (f64::from(*ours) - exact[0] - bias).abs();
-            let bound = bound + f64::from(f32::EPSILON) * bias.abs();
-            assert!(
-                error <= bound,
-                "y[{i}] of {g:?}: {ours}, off by {error:e}, {bound:e} allowed"
-            );
-        }
+        assert_within(&format!("y {g:?}"), &y, &exact.y, &of_channels, &bounds);
+
+        let (turned, back) = (turn(&weight, &g), phases_of(&g));
+        let dx = image_gradient(&dy, &weight, &g);
+        let direct = direct::convolve(&dy, &turned, None, &back);
+        assert_ne!(dx, direct, "gradient by tiles: {g:?}");
+        let bounds = rounding_of_tiles(&dy, &turned, &back);
+        let none = vec![0.0; dx.len()];
+        assert_within(&format!("dx {g:?}"), &dx, &exact.dx, &none, &bounds);
+
+        let dweight = tiles::weight_gradient(&x, &dy, &g);
+        let bounds = rounding_of_weights(&x, &dy, &g);
+        let none = vec![0.0; dweight.len()];
+        let what = format!("dweight {g:?}");
+        assert_within(&what, &dweight, &exact.dweight, &none, &bounds);
+    }
+}
+
+/// Sums and what is added to them, within their bounds and one rounding of what is added.
+fn assert_within(what: &str, ours: &[f32], exact: &[[f64; 2]], added: &[f32], bounds: &[f64]) {
+    assert_eq!(ours.len(), exact.len(), "{what}");
+    for (i, ours) in ours.iter().enumerate() {
+        let added = f64::from(added[i]);
+        let error = (f64::from(*ours) - exact[i][0] - added).abs();
+        let bound = bounds[i] + f64::from(f32::EPSILON) * added.abs();
+        assert!(
+            error <= bound,
+            "{what}[{i}]: {ours}, off by {error:e}, {bound:e} allowed"
+        );
     }
 }
 

@@ -1,4 +1,4 @@
-//! Gradients of a convolution to its weights and its bias.
+//! Gradients of a convolution to its weights, by the sum that defines them, and to its bias.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -8,23 +8,14 @@ use super::layout::Layout;
 use crate::nn::kernels::sum::sum;
 use crate::nn::kernels::tile::{self, ROWS};
 
-/// Gradient to the weights.
-///
-/// ```text
-/// ∂L/∂weight[o, c, t] = Σ_{n, p} dy[n, o, p] · x[n, c, p · stride + t − border]
-/// ```
-///
-/// # Shapes
-///
-/// - `x`: `[batch, channels in, rows, columns]`
-/// - `dy`: `[batch, channels out, rows out, columns out]`
-/// - result: `[channels out, channels in, kernel, kernel]`
-pub(in crate::nn) fn weight_gradient(x: &[f32], dy: &[f32], geometry: &Geometry) -> Vec<f32> {
+/// Gradient to the weights, with shapes as of [`weight_gradient`](super::weight_gradient).
+pub(super) fn weight_gradient(x: &[f32], dy: &[f32], geometry: &Geometry) -> Vec<f32> {
     let layout = Layout::new(geometry);
     let planes = layout.lay_out(x, geometry);
     let arch = Arch::new();
     let channels_out = geometry.channels[1];
-    let columns = interleave(dy, geometry, arch.dispatch(tile::Width));
+    let width = arch.dispatch(tile::Width);
+    let columns = interleave(dy, channels_out, geometry.size_out(), [0; 4], width);
     let mut transposed = vec![0.0; geometry.patch() * channels_out];
     let tiles = geometry.patch().div_ceil(ROWS);
     let share = tiles.div_ceil(2 * rayon::current_num_threads()) * ROWS;
@@ -62,31 +53,54 @@ pub(in crate::nn) fn bias_gradient(dy: &[f32], geometry: &Geometry) -> Vec<f32> 
         .collect()
 }
 
-/// The gradient of the output tile by tile: `[image, tile of channels, pixel, channel]`.
-fn interleave(dy: &[f32], geometry: &Geometry, width: usize) -> Vec<f32> {
-    let (channels, pixels) = (geometry.channels[1], geometry.pixels_out());
+/// Images of so many channels, rows and columns with a border of zeros, tile by tile: `[image, tile of channels, pixel, channel]`.
+pub(super) fn interleave(
+    images: &[f32],
+    channels: usize,
+    size: [usize; 2],
+    [top, left, bottom, right]: [usize; 4],
+    width: usize,
+) -> Vec<f32> {
+    let [rows, columns] = size;
     let tiles = channels.div_ceil(width);
-    let mut out = vec![0.0; geometry.batch * tiles * pixels * width];
-    out.par_chunks_mut(pixels * width)
+    let batch = images.len() / (channels * rows * columns);
+    let row = (left + columns + right) * width;
+    let plane = (top + rows + bottom) * row;
+    let mut out = vec![0.0; batch * tiles * plane];
+    out.par_chunks_mut(plane)
         .enumerate()
         .with_min_len(2)
         .for_each(|(i, out)| {
             let (image, tile) = (i / tiles, i % tiles);
             let count = width.min(channels - tile * width);
-            let from = (image * channels + tile * width) * pixels;
-            interleave_tile(&dy[from..][..count * pixels], out, width);
+            let from = (image * channels + tile * width) * rows * columns;
+            let planes = &images[from..][..count * rows * columns];
+            if row == columns * width {
+                interleave_rows(
+                    planes,
+                    rows * columns,
+                    &mut out[top * row..][..rows * row],
+                    width,
+                );
+                return;
+            }
+            let out = out.chunks_exact_mut(row).skip(top);
+            for (i, out) in out.take(rows).enumerate() {
+                let out = &mut out[left * width..][..columns * width];
+                interleave_rows(&planes[i * columns..], rows * columns, out, width);
+            }
         });
     out
 }
 
-/// Transposes rows of pixels into pixels of `width` channels, in squares that fit in registers.
-fn interleave_tile(rows: &[f32], out: &mut [f32], width: usize) {
+/// Transposes rows of pixels, `step` apart, into pixels of `width` channels, in squares that fit in registers.
+fn interleave_rows(rows: &[f32], step: usize, out: &mut [f32], width: usize) {
     const SQUARE: usize = 8;
     let pixels = out.len() / width;
-    for (channel, rows) in rows.chunks(SQUARE * pixels).enumerate() {
+    for (channel, rows) in rows.chunks(SQUARE * step).enumerate() {
         for begin in (0..pixels).step_by(SQUARE) {
             let end = pixels.min(begin + SQUARE);
-            for (i, row) in rows.chunks_exact(pixels).enumerate() {
+            for (i, row) in rows.chunks(step).enumerate() {
                 for (j, value) in row[begin..end].iter().enumerate() {
                     out[(begin + j) * width + channel * SQUARE + i] = *value;
                 }

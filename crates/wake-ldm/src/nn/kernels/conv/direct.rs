@@ -1,4 +1,4 @@
-//! The convolution itself, which is also its own gradient to the image.
+//! The convolution by the sum that defines it, for any kernel and stride.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -13,19 +13,8 @@ const DEPTH: usize = 512;
 /// Most panels that share one pass over the weights.
 const PANELS: usize = 8;
 
-/// Convolves a batch of images.
-///
-/// ```text
-/// y[o, p] = bias[o] + Σ_{c, t} weight[o, c, t] · x[c, p · stride + t − border]
-/// ```
-///
-/// # Shapes
-///
-/// - `x`: `[batch, channels in, rows, columns]`
-/// - `weight`: `[channels out, channels in, kernel, kernel]`
-/// - `bias`: `[channels out]`
-/// - result: `[batch, channels out, rows out, columns out]`
-pub(in crate::nn) fn convolve(
+/// Convolves a batch of images, with shapes as of [`convolve`](super::convolve).
+pub(super) fn convolve(
     x: &[f32],
     weight: &[f32],
     bias: Option<&[f32]>,
@@ -36,34 +25,39 @@ pub(in crate::nn) fn convolve(
     let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
     let arch = Arch::new();
     let block = block_width(geometry, arch.dispatch(tile::Width));
-    by_blocks(&mut y, &planes, geometry, block, |planes, i, y| {
+    let one = Geometry {
+        batch: 1,
+        ..*geometry
+    };
+    by_blocks(&mut y, &planes, geometry, [1, block], |planes, i, y| {
         arch.dispatch(Block {
             planes,
             weight,
             bias,
             first: i * block,
             y,
-            geometry,
+            geometry: &one,
             layout,
         });
     });
     y
 }
 
-/// Computes every image in blocks of consecutive pixels of all its channels, on all cores.
+/// Computes some images at a time in blocks of consecutive pixels of all their channels, on all cores.
 ///
 /// - `planes`: the laid-out images
-/// - `task`: given the planes of an image, the number of a block in it, and the block's part of each channel
+/// - `images`, `block`: images at a time, and pixels of each in a block
+/// - `task`: given the planes of these images, the number of a block in them, and the block's part by image and channel
 pub(super) fn by_blocks(
     y: &mut [f32],
     planes: &[f32],
     geometry: &Geometry,
-    block: usize,
+    [images, block]: [usize; 2],
     task: impl Fn(&[f32], usize, Vec<&mut [f32]>) + Sync,
 ) {
     let (image, pixels) = (y.len() / geometry.batch, geometry.pixels_out());
-    y.par_chunks_mut(image)
-        .zip(planes.par_chunks(planes.len() / geometry.batch))
+    y.par_chunks_mut(images * image)
+        .zip(planes.par_chunks(images * (planes.len() / geometry.batch)))
         .for_each(|(y, planes)| {
             columns(y, pixels, block)
                 .into_par_iter()

@@ -1,53 +1,19 @@
-//! Convolutions with kernels of 3 × 3 by tiles of 2 × 2 pixels, with four products a pixel in the place of nine.
-//!
-//! ```text
-//! y = Aᵀ [ (G w Gᵀ) ⊙ (Bᵀ d B) ] A
-//!
-//!      ⎡1  0 −1  0⎤       ⎡ 1   0   0⎤        ⎡1  1  1  0⎤
-//! Bᵀ = ⎢0  1  1  0⎥   G = ⎢ ½   ½   ½⎥   Aᵀ = ⎣0  1 −1 −1⎦
-//!      ⎢0 −1  1  0⎥       ⎢ ½  −½   ½⎥
-//!      ⎣0  1  0 −1⎦       ⎣ 0   0   1⎦
-//! ```
-//!
-//! - `d`: the 4 × 4 pixels that a tile sees, `w`: a kernel
-//! - `⊙`: number by number; summed over the channels, a matrix product for each of the sixteen places
-//!
-//! # References
-//!
-//! Winograd (1980), "Arithmetic Complexity of Computations"; Lavin & Gray (2016), "Fast Algorithms for Convolutional Neural
-//! Networks", Eq. 5 to 8, F(2 × 2, 3 × 3).
+//! The convolution itself by tiles.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::Geometry;
-use super::forward::{by_blocks, columns, convolve};
-use super::layout::{Gather, Layout};
+use super::{PLACES, differences, tiles_of};
+use crate::nn::kernels::conv::Geometry;
+use crate::nn::kernels::conv::direct::{by_blocks, columns};
+use crate::nn::kernels::conv::layout::{Gather, Layout};
 use crate::nn::kernels::tile::{self, ROWS};
-
-/// Places of a transformed tile.
-const PLACES: usize = 16;
 
 /// Numbers of the transformed image that a task keeps in a core's second cache: 512 KiB.
 const NEAR: usize = 128 * 1024;
 
-/// Most numbers of transformed kernels, which all tasks read: 20 MiB, a share of the cores' last cache.
-const FAR: usize = 5 * 1024 * 1024;
-
-/// Below so many channels transforms cost more than they save.
-const FEW: usize = 16;
-
-/// Products that take as long as the transform of one kernel, memory included.
-const TRANSFORM: usize = 1500;
-
-/// Convolves a batch of images, by tiles where that saves products and directly elsewhere.
-///
-/// Tiles round more often than the direct sum: windows and kernels are sums before they are multiplied.
-///
-/// # Shapes
-///
-/// As of [`convolve`].
-pub(in crate::nn) fn convolve_by_tiles(
+/// Convolves a batch of images by tiles, with shapes as of [`convolve`](crate::nn::kernels::conv::convolve).
+pub(in crate::nn::kernels::conv) fn convolve(
     x: &[f32],
     weight: &[f32],
     bias: Option<&[f32]>,
@@ -55,30 +21,31 @@ pub(in crate::nn) fn convolve_by_tiles(
 ) -> Vec<f32> {
     let arch = Arch::new();
     let width = arch.dispatch(tile::Width);
-    if !tiles_win(geometry, width) {
-        return convolve(x, weight, bias, geometry);
-    }
     let tiles = tiles_of(geometry);
     let layout = Layout::new(&tiles);
     let planes = layout.lay_out(x, &tiles);
     let weight = &transformed(weight, geometry);
-    let rows = rows_of_a_task(&tiles, width);
+    let (images, rows) = task(&tiles, width);
     let columns = geometry.size_out()[1];
     let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
+    let block = 2 * rows * columns;
     by_blocks(
         &mut y,
         &planes,
         geometry,
-        2 * rows * columns,
+        [images, block],
         |planes, i, y| {
             arch.dispatch(Block {
                 planes,
                 weight,
                 bias,
                 first: i * rows * tiles.size_out()[1],
-                y,
                 columns,
-                tiles: &tiles,
+                tiles: Geometry {
+                    batch: y.len() / geometry.channels[1],
+                    ..tiles
+                },
+                y,
                 layout,
             });
         },
@@ -86,37 +53,19 @@ pub(in crate::nn) fn convolve_by_tiles(
     y
 }
 
-/// Whether tiles need at most two thirds of the products, transforms of kernels and unfilled vectors counted, and kernels stay
-/// near.
-fn tiles_win(geometry: &Geometry, width: usize) -> bool {
-    let [channels_in, channels_out] = geometry.channels;
-    let [rows, columns] = geometry.size_out();
-    let fill = |pixels: usize| geometry.batch * pixels.div_ceil(width) * width;
-    let tiles = PLACES * fill(rows.div_ceil(2) * columns.div_ceil(2));
-    (geometry.kernel, geometry.stride) == (3, 1)
-        && channels_in.min(channels_out) >= FEW
-        && PLACES * channels_in * channels_out <= FAR
-        && 3 * (tiles + TRANSFORM) <= 2 * 9 * fill(rows * columns)
-}
-
-/// The windows that tiles see: 4 × 4 pixels, two apart.
-fn tiles_of(geometry: &Geometry) -> Geometry {
-    let [rows, columns] = geometry.size_out();
-    let [top, left, bottom, right] = geometry.border;
-    Geometry {
-        kernel: 4,
-        stride: 2,
-        border: [top, left, bottom + rows % 2, right + columns % 2],
-        ..*geometry
-    }
-}
-
-/// Rows of tiles that are one task: a full panel at least, and as many more as stay near and leave every core its share.
-fn rows_of_a_task(tiles: &Geometry, width: usize) -> usize {
+/// Images and rows of tiles that are one task: a full panel at least, and as many more as stay near and leave every core its share.
+/// Several images are whole.
+fn task(tiles: &Geometry, width: usize) -> (usize, usize) {
     let [rows, columns] = tiles.size_out();
     let near = NEAR / (PLACES * tiles.channels[0]) / columns;
     let share = rows * tiles.batch / (4 * rayon::current_num_threads());
-    near.min(share).max(width.div_ceil(columns)).min(rows)
+    let least = width.div_ceil(columns);
+    let of_a_task = near.min(share).max(least);
+    if of_a_task < 2 * rows {
+        (least.div_ceil(rows), of_a_task.min(rows))
+    } else {
+        (of_a_task / rows, rows)
+    }
 }
 
 /// The kernels `G w Gᵀ`: `[place, channels out, channels in]`.
@@ -176,7 +125,7 @@ fn transformed_kernels(w: &[[f32; LANES]; 9]) -> [[f32; LANES]; PLACES] {
     out
 }
 
-/// Some rows of tiles of all channels of one image.
+/// Some rows of tiles of all channels of one image, or of some images all rows.
 struct Block<'a> {
     planes: &'a [f32],
     /// `[place, channels out, channels in]`.
@@ -184,11 +133,12 @@ struct Block<'a> {
     bias: Option<&'a [f32]>,
     /// The first tile.
     first: usize,
-    /// Whole rows of pixels, by channel.
+    /// Whole rows of pixels, by image and channel.
     y: Vec<&'a mut [f32]>,
     /// Pixels of a row.
     columns: usize,
-    tiles: &'a Geometry,
+    /// Of these images.
+    tiles: Geometry,
     layout: Layout,
 }
 
@@ -200,33 +150,23 @@ impl WithSimd for Block<'_> {
         let width = tile::width::<S>();
         let channels = self.tiles.channels[0];
         let rows = (self.y[0].len() / self.columns).div_ceil(2);
-        let panels = (rows * self.tiles.size_out()[1]).div_ceil(width);
+        let windows = self.tiles.batch * rows * self.tiles.size_out()[1];
+        let panels = windows.div_ceil(width);
         let mut image = vec![0.0; panels * PLACES * channels * width];
         let mut window = vec![0.0; PLACES * width];
         for (i, panel) in image
             .chunks_exact_mut(PLACES * channels * width)
             .enumerate()
         {
-            let gather = Gather::new::<S>(&self.layout, self.tiles, self.first + i * width);
-            let planes = self.planes.chunks_exact(self.layout.plane());
-            for (channel, plane) in planes.enumerate() {
-                gather.read::<S>(plane, &mut window);
+            let gather = Gather::new::<S>(&self.layout, &self.tiles, self.first + i * width);
+            for channel in 0..channels {
+                let planes = &self.planes[channel * self.layout.plane()..];
+                gather.read::<S>(planes, &mut window);
                 transform_window(simd, &window, channel, panel);
             }
         }
         self.multiply(simd, &image);
     }
-}
-
-/// `Bᵀ` times four numbers.
-#[inline(always)]
-fn differences<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [S::f32s; 4] {
-    [
-        simd.sub_f32s(a, c),
-        simd.add_f32s(b, c),
-        simd.sub_f32s(c, b),
-        simd.sub_f32s(b, d),
-    ]
 }
 
 /// `Aᵀ` times four numbers.
@@ -288,16 +228,15 @@ impl Block<'_> {
                 }
             }
             for (i, products) in products.chunks_exact(ROWS * PLACES * width).enumerate() {
-                let rows = self.y[first..]
-                    .iter_mut()
-                    .zip(products.chunks_exact(PLACES * width));
-                for (r, (y, products)) in rows.take(ROWS).enumerate() {
-                    let bias = self.bias.map_or(0.0, |bias| bias[first + r]);
+                let channels = first..channels_out.min(first + ROWS);
+                for (channel, products) in channels.zip(products.chunks_exact(PLACES * width)) {
+                    let bias = self.bias.map_or(0.0, |bias| bias[channel]);
                     let tiles = Run {
                         first: i * width,
                         columns: self.columns,
+                        images: channels_out,
                     };
-                    tiles.write(simd, products, bias, y);
+                    tiles.write(simd, products, bias, &mut self.y[channel..]);
                 }
             }
         }
@@ -310,12 +249,15 @@ struct Run {
     first: usize,
     /// Pixels of a row.
     columns: usize,
+    /// From the plane of one image to that of the next.
+    images: usize,
 }
 
 impl Run {
-    /// Writes `Aᵀ m A` of the products `[place, tile]` and a bias to their pixels.
+    /// Writes `Aᵀ m A` of the products `[place, tile]` and a bias to their pixels, of which the first plane is that of the first
+    /// image.
     #[inline(always)]
-    fn write<S: Simd>(&self, simd: S, products: &[f32], bias: f32, y: &mut [f32]) {
+    fn write<S: Simd>(&self, simd: S, products: &[f32], bias: f32, planes: &mut [&mut [f32]]) {
         let width = tile::width::<S>();
         let (m, _) = S::as_simd_f32s(products);
         let bias = simd.splat_f32s(bias);
@@ -336,22 +278,29 @@ impl Run {
             }
         }
         let in_a_row = self.columns.div_ceil(2);
+        let in_a_plane = (planes[0].len() / self.columns).div_ceil(2);
         let mut done = 0;
         while done < width {
             let (row, column) = (
                 (self.first + done) / in_a_row,
                 (self.first + done) % in_a_row,
             );
+            // Beyond the last image there is nothing to write.
+            let Some(plane) = planes.get_mut(row / in_a_plane * self.images) else {
+                return;
+            };
             let count = (in_a_row - column).min(width - done);
             let end = self.columns.min(2 * (column + count));
-            let rows = y.chunks_exact_mut(self.columns).skip(2 * row);
-            for ([even, odd], y) in pixels.iter().zip(rows) {
+            let rows = plane
+                .chunks_exact_mut(self.columns)
+                .skip(row % in_a_plane * 2);
+            for ([even, odd], row) in pixels.iter().zip(rows) {
                 let even: &[f32] = pulp::bytemuck::cast_slice(even);
                 let odd: &[f32] = pulp::bytemuck::cast_slice(odd);
                 alternate(
                     &even[done..done + count],
                     &odd[done..done + count],
-                    &mut y[2 * column..end],
+                    &mut row[2 * column..end],
                 );
             }
             done += count;
