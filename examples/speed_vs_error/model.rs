@@ -12,7 +12,7 @@ use wake_physics::{Field, Scene};
 /// Steps of the reference.
 pub(crate) const REFERENCE: usize = 100;
 /// Numbers of steps; each image alone, weights as they ship.
-pub(crate) const STEPS: [usize; 5] = [1, 2, 4, 8, 16];
+pub(crate) const STEPS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 /// Images at a time, at the sampler's own number of steps.
 const BATCHES: [usize; 2] = [4, 16];
 

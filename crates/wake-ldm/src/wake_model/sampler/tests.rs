@@ -101,9 +101,15 @@ fn grey_is_that_of_the_models_mapping() {
 }
 
 #[test]
-fn levels_fall_from_all_noise_in_equal_steps() {
-    assert_eq!(levels(4).collect::<Vec<_>>(), [1.0, 0.75, 0.5, 0.25]);
-    assert_eq!(levels(1).collect::<Vec<_>>(), [1.0]);
+fn levels_fall_from_all_noise_to_none_step_after_step() {
+    assert_eq!(levels(1).collect::<Vec<_>>(), [[1.0, 0.0]]);
+    let levels: Vec<_> = levels(4).collect();
+    assert_eq!((levels[0][0], levels[3][1]), (1.0, 0.0));
+    for pair in levels.windows(2) {
+        assert_eq!(pair[0][1], pair[1][0]);
+        let [before, after] = [pair[0], pair[1]].map(|[from, to]| from - to);
+        assert!(0.0 < before && before < after);
+    }
 }
 
 /// A velocity b everywhere carries the noise by −b π/2 over the quarter circle, in any number of steps.

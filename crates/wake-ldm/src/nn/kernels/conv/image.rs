@@ -24,7 +24,7 @@ pub(in crate::nn) fn image_gradient(dy: &[f32], weight: &[f32], geometry: &Geome
     if geometry.stride == 1 {
         gradient
     } else {
-        interleave(&gradient, &phases, geometry)
+        join(&gradient, &phases, geometry)
     }
 }
 
@@ -84,7 +84,7 @@ pub(super) fn turn(weight: &[f32], geometry: &Geometry) -> Vec<f32> {
 }
 
 /// Puts the pixels of all phases in their places.
-fn interleave(gradient: &[f32], phases: &Geometry, geometry: &Geometry) -> Vec<f32> {
+fn join(gradient: &[f32], phases: &Geometry, geometry: &Geometry) -> Vec<f32> {
     let Geometry {
         size: [rows, columns],
         stride,

@@ -330,3 +330,47 @@ fn bias_is_added_to_every_pixel_and_its_gradient_is_their_sum() {
         assert!((f64::from(*ours) - exact).abs() < 90.0 * 45.0 * 6e-8);
     }
 }
+
+/// Milliseconds on one core, of `cargo test --release -p wake-ldm --features train --lib conv::tests::times -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints times and checks nothing"]
+fn times() {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let time = |f: &(dyn Fn() -> Vec<f32> + Sync)| {
+        let once = |_| {
+            let begin = std::time::Instant::now();
+            std::hint::black_box(f());
+            begin.elapsed().as_secs_f64() * 1e3
+        };
+        (0..15).map(once).fold(f64::MAX, f64::min)
+    };
+    one.unwrap().install(|| {
+        for [batch, width, side] in [
+            [16, 64, 32],
+            [16, 96, 16],
+            [16, 128, 16],
+            [16, 192, 8],
+            [1, 320, 64],
+        ] {
+            let g = Geometry {
+                batch,
+                channels: [width; 2],
+                size: [side; 2],
+                kernel: 3,
+                stride: 1,
+                border: [1; 4],
+            };
+            let x = noise(batch * width * side * side, 1);
+            let weight = noise(width * g.patch(), 2);
+            let y = [
+                time(&|| direct::convolve(&x, &weight, None, &g)),
+                time(&|| tiles::convolve(&x, &weight, None, &g)),
+            ];
+            let dweight = [
+                time(&|| weights::weight_gradient(&x, &x, &g)),
+                time(&|| tiles::weight_gradient(&x, &x, &g)),
+            ];
+            println!("{batch} x {width} x {side}²: forward {y:.2?}, weights {dweight:.2?}");
+        }
+    });
+}

@@ -45,8 +45,12 @@ const FEW: usize = 16;
 /// Below so many channels tiles do not pay for gradients to weights, where both factors of every product are transformed.
 const FEW_FOR_WEIGHTS: usize = 96;
 
-/// Products that take as long as the transform of one kernel, memory included.
+/// Products that take as long as the transform of one kernel, memory included, in tiles that are as wide as [`WIDE`]; fewer where
+/// products take longer, in narrower ones.
 const TRANSFORM: usize = 1500;
+
+/// Width of a tile of AVX-512.
+const WIDE: usize = 32;
 
 /// Whether tiles need at most two thirds of the products, transforms of kernels and unfilled vectors counted, and kernels stay
 /// near.
@@ -56,10 +60,11 @@ pub(super) fn win(geometry: &Geometry) -> bool {
     let [rows, columns] = geometry.size_out();
     let windows = geometry.batch * rows.div_ceil(2) * columns.div_ceil(2);
     let tiles = PLACES * windows.next_multiple_of(width);
+    let transform = TRANSFORM * width / WIDE;
     (geometry.kernel, geometry.stride) == (3, 1)
         && channels_in.min(channels_out) >= FEW
         && PLACES * channels_in * channels_out <= FAR
-        && 3 * (tiles + TRANSFORM) <= 2 * 9 * geometry.batch * rows * columns
+        && 3 * (tiles + transform) <= 2 * 9 * geometry.batch * rows * columns
 }
 
 /// The same for gradients to weights.
