@@ -4,8 +4,10 @@ use super::recipe::{Draw, Recipe};
 use super::scenes::{PAPER_SCENES, Simulated};
 use super::shuffle::shuffled;
 use crate::error::{Error, Result, check_range};
+use crate::files::read_text;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wake_physics::Plan;
@@ -175,12 +177,12 @@ impl Manifest {
 
 /// Reads a JSON file; `None` if there is none.
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
-    match std::fs::read_to_string(path) {
+    match read_text(path) {
         Ok(text) => serde_json::from_str(&text)
             .map(Some)
             .map_err(|e| broken(path, e.line(), e.to_string())),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(cannot("read", path, e)),
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(e),
     }
 }
 

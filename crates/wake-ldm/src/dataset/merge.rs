@@ -4,6 +4,7 @@ use super::layout::{Layout, Manifest, Shard, broken, cannot};
 use super::metadata::{Rows, parse};
 use super::write::{claim, finish, is_text};
 use crate::error::Result;
+use crate::files::read_text;
 use std::path::{Path, PathBuf};
 use wake_physics::output;
 
@@ -59,8 +60,7 @@ fn merged_before(folder: &Path) -> Result<Option<Manifest>> {
 
 /// The content of a `dataset.json`.
 fn manifest_text(folder: &Path) -> Result<String> {
-    let path = Layout(folder).manifest();
-    std::fs::read_to_string(&path).map_err(|e| cannot("read", &path, e))
+    read_text(&Layout(folder).manifest())
 }
 
 /// Folder and manifest of every shard, in order; at least one.

@@ -122,7 +122,7 @@ impl Checkpoint {
     /// As [`newest`](Self::newest).
     pub fn read(path: &Path) -> Result<Self> {
         let file = path.join("state.json");
-        let text = fs::read_to_string(&file).map_err(|source| io("read", &file, source))?;
+        let text = crate::files::read_text(&file)?;
         let mut state: Value = serde_json::from_str(&text).map_err(|source| Error::Json {
             path: file.clone(),
             source,

@@ -16,6 +16,7 @@ use super::super::trainer::TrainerOptions;
 use super::{FineTune, FineTuneOptions, Frozen, PromptedBatches};
 use crate::dataset::Folder;
 use crate::error::{Error, Result};
+use crate::files::read_text;
 use crate::fingerprint;
 use crate::pipeline::{Pipeline, PipelineParts};
 use crate::scheduler::Prediction;
@@ -194,7 +195,7 @@ fn check_size(data: &Folder, down: usize) -> Result<()> {
 
 /// After how many steps the model in a folder was written.
 fn written_after(folder: &Path) -> Option<u64> {
-    let text = std::fs::read_to_string(folder.join(RECORD)).ok()?;
+    let text = read_text(&folder.join(RECORD)).ok()?;
     let record: Value = serde_json::from_str(&text).ok()?;
     record["results_after"].as_u64()
 }
