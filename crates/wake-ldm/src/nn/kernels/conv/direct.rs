@@ -3,7 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::Geometry;
+use super::geometry::Geometry;
 use super::layout::{Gather, Layout};
 use crate::nn::kernels::tile::{self, ROWS};
 

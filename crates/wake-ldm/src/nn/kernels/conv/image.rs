@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{Geometry, convolve};
+use super::convolve;
+use super::geometry::Geometry;
 
 /// Gradient to the image.
 ///

@@ -4,8 +4,8 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::{PLACES, differences, tiles_of};
-use crate::nn::kernels::conv::Geometry;
 use crate::nn::kernels::conv::direct::{by_blocks, columns};
+use crate::nn::kernels::conv::geometry::Geometry;
 use crate::nn::kernels::conv::layout::{Gather, Layout};
 use crate::nn::kernels::tile::{self, ROWS};
 

@@ -24,7 +24,7 @@
 
 use pulp::{Arch, Simd};
 
-use super::Geometry;
+use super::geometry::Geometry;
 use crate::nn::kernels::tile;
 
 mod forward;

@@ -4,7 +4,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::{PLACES, differences, tiles_of};
-use crate::nn::kernels::conv::Geometry;
+use crate::nn::kernels::conv::geometry::Geometry;
 use crate::nn::kernels::conv::weights::interleave;
 use crate::nn::kernels::tile::{self, ROWS};
 
