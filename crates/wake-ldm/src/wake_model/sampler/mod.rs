@@ -353,7 +353,8 @@ impl WakeSampler {
     }
 }
 
-/// Levels of noise that each step begins and ends at, 1 − (k/n)^1.2: from 1 down to 0, first in shorter steps, where the flow bends most.
+/// Levels of noise that each step begins and ends at, 1 − (k/n)^1.2: from 1 down to 0, first in shorter steps, where the flow bends
+/// most. The exponent is chosen.
 fn levels(steps: usize) -> impl Iterator<Item = [f64; 2]> {
     let level = move |k: usize| 1.0 - (k as f64 / steps as f64).powf(1.2);
     (0..steps).map(move |k| [level(k), level(k + 1)])

@@ -333,7 +333,7 @@ fn bias_is_added_to_every_pixel_and_its_gradient_is_their_sum() {
 
 /// Milliseconds on one core, of `cargo test --release -p wake-ldm --features train --lib conv::tests::times -- --ignored --nocapture`.
 #[test]
-#[ignore = "prints times and checks nothing"]
+#[ignore = "prints the milliseconds of docs/performance.md, wants an idle machine, and has nothing to check"]
 #[expect(clippy::print_stdout, reason = "what it is for")]
 fn times() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();

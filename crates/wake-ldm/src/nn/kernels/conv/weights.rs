@@ -75,15 +75,6 @@ pub(super) fn interleave(
             let count = width.min(channels - tile * width);
             let from = (image * channels + tile * width) * rows * columns;
             let planes = &images[from..][..count * rows * columns];
-            if row == columns * width {
-                interleave_rows(
-                    planes,
-                    rows * columns,
-                    &mut out[top * row..][..rows * row],
-                    width,
-                );
-                return;
-            }
             let out = out.chunks_exact_mut(row).skip(top);
             for (i, out) in out.take(rows).enumerate() {
                 let out = &mut out[left * width..][..columns * width];

@@ -3,7 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::{PLACES, differences, tiles_of};
+use super::{LANES, PLACES, differences, tiles_of};
 use crate::nn::kernels::conv::direct::{by_blocks, columns};
 use crate::nn::kernels::conv::geometry::Geometry;
 use crate::nn::kernels::conv::layout::{Gather, Layout};
@@ -93,9 +93,6 @@ fn transformed(weight: &[f32], geometry: &Geometry) -> Vec<f32> {
         });
     out
 }
-
-/// Kernels that are transformed side by side.
-const LANES: usize = 16;
 
 fn transformed_kernels(w: &[[f32; LANES]; 9]) -> [[f32; LANES]; PLACES] {
     let mut rows = [[0.0; LANES]; 12];

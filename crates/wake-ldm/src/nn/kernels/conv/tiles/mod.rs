@@ -36,6 +36,9 @@ pub(super) use weights::weight_gradient;
 /// Places of a transformed tile.
 const PLACES: usize = 16;
 
+/// Kernels that are transformed side by side.
+const LANES: usize = 16;
+
 /// Most numbers of transformed kernels, which all tasks read: 20 MiB, a share of the cores' last cache.
 const FAR: usize = 5 * 1024 * 1024;
 

@@ -3,7 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::{PLACES, differences, tiles_of};
+use super::{LANES, PLACES, differences, tiles_of};
 use crate::nn::kernels::conv::geometry::Geometry;
 use crate::nn::kernels::conv::weights::interleave;
 use crate::nn::kernels::tile::{self, ROWS};
@@ -189,9 +189,6 @@ impl Share<'_> {
         }
     }
 }
-
-/// Kernels that are transformed side by side.
-const LANES: usize = 16;
 
 /// `Gᵀ u G` of the gradients `[row][column, channel out, channel in]` for one channel out: `[channel in, tap]`.
 fn kernels(gradients: &[Vec<f32>], channel: usize, width: usize, out: &mut [f32]) {
