@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use wake_ldm::weights::{Layout, load, load_bytes};
+use wake_nn::weights::{Layout, load, load_bytes};
 
 use crate::error::{Result, check_range};
 use crate::image::GreyImage;

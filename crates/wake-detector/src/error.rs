@@ -12,7 +12,7 @@ pub(crate) const MOST_MEMORY: u64 = 1_800_000_000;
 /// What a fallible function of this crate returns.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why an image could not be read, or a network not be loaded or trained.
+/// An image that could not be read, or a network that could not be loaded.
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
@@ -31,10 +31,6 @@ pub enum Error {
     /// Two images whose results nothing would tell apart.
     #[error("two images are called {name:?}; search them one after the other")]
     SameName { name: String },
-
-    /// Labels of another form than that of `labels.json`.
-    #[error("{}: {message}", path.display())]
-    Labels { path: PathBuf, message: String },
 
     /// A file that is no image.
     #[error(
@@ -84,9 +80,9 @@ pub enum Error {
         max: f64,
     },
 
-    /// What loading weights, making images and training find wrong.
+    /// Weights or a device that the network cannot take.
     #[error(transparent)]
-    Model(#[from] wake_ldm::Error),
+    Model(#[from] wake_nn::Error),
 }
 
 /// Checks a number against a closed range; what is not a number lies outside.

@@ -4,11 +4,11 @@
 mod error;
 mod files;
 mod image;
-mod normalize;
+pub mod normalize;
 mod scaling;
 mod wake;
 
-mod network;
+pub mod network;
 
 mod maps;
 mod search;
@@ -21,15 +21,10 @@ pub mod score;
 
 mod finder;
 
-#[cfg(feature = "train")]
-pub mod judging;
-#[cfg(feature = "train")]
-pub mod train;
-
 pub use burn;
 pub use detector::Detector;
 pub use error::{Error, Result};
 pub use files::image_files;
 pub use finder::Finder;
 pub use image::GreyImage;
-pub use wake::{Detection, Wake};
+pub use wake::{Detection, Wake, angle_of, direction};

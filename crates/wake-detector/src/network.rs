@@ -3,22 +3,22 @@
 use burn::module::{Module, Param};
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
-use wake_ldm::nn::conv::{conv1x1, conv3x3, convolve};
-use wake_ldm::nn::norm::GroupNorm;
-use wake_ldm::nn::resample::{Downsample, Upsample};
+use wake_nn::conv::{conv1x1, conv3x3, convolve};
+use wake_nn::norm::GroupNorm;
+use wake_nn::resample::{Downsample, Upsample};
 
 /// Pixels of the image for one cell of the maps, in each direction.
-pub(crate) const STRIDE: usize = 4;
+pub const STRIDE: usize = 4;
 /// Both sizes of an input are multiples of this: 16 pixels for a cell of the coarsest level, times the largest dilation.
-pub(crate) const MULTIPLE: usize = 64;
+pub const MULTIPLE: usize = 64;
 /// Maps that come in: bounded contrast and logarithm of brightness.
-pub(crate) const INPUTS: usize = 2;
+pub const INPUTS: usize = 2;
 /// Maps that come out, see [`Map`].
-pub(crate) const OUTPUTS: usize = 8;
+pub const OUTPUTS: usize = 8;
 
 /// Channels of what comes out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Map {
+pub enum Map {
     /// Logit: a wake begins here.
     Tip = 0,
     /// Logit: the line of a wake passes here.
@@ -36,9 +36,9 @@ pub(crate) enum Map {
 }
 
 /// Unit of the visible length \[pixels\].
-pub(crate) const LENGTH_UNIT: f32 = 150.0;
+pub const LENGTH_UNIT: f32 = 150.0;
 /// Unit of the half-angle \[deg\].
-pub(crate) const ANGLE_UNIT: f32 = 10.0;
+pub const ANGLE_UNIT: f32 = 10.0;
 
 /// Channels at a quarter, an eighth and a sixteenth of the image's size.
 const WIDTHS: [usize; 3] = [24, 48, 96];
@@ -114,7 +114,7 @@ fn dilated(conv: &Conv2d, x: Tensor<4>, dilation: usize) -> Tensor<4> {
 ///
 /// Ronneberger, Fischer & Brox (2015), "U-Net"; Zhou, Wang & Krähenbühl (2019), "Objects as Points" (maps of centres).
 #[derive(Module, Debug)]
-pub(crate) struct Network {
+pub struct Network {
     stem: Conv2d,
     fine: Block,
     down1: Downsample,
@@ -135,7 +135,7 @@ pub(crate) struct Network {
 
 impl Network {
     /// A network with random weights.
-    pub(crate) fn new(device: &Device) -> Self {
+    pub fn new(device: &Device) -> Self {
         let [fine, middle, coarse] = WIDTHS;
         let mut head = conv3x3(fine, OUTPUTS, device);
         let rare = (RARE / (1.0 - RARE)).ln();
@@ -168,7 +168,7 @@ impl Network {
     ///
     /// `[batch, INPUTS, rows, columns]` to `[batch, OUTPUTS, rows / STRIDE, columns / STRIDE]`; rows and columns are
     /// multiples of [`MULTIPLE`].
-    pub(crate) fn forward(&self, images: Tensor<4>) -> Tensor<4> {
+    pub fn forward(&self, images: Tensor<4>) -> Tensor<4> {
         let fine = self.fine.forward(convolve(&self.stem, patches(images)));
         let middle = convolve(&self.widen1, self.down1.forward(fine.clone()));
         let middle = self.middle.forward(middle);

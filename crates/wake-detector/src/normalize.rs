@@ -112,12 +112,12 @@ fn median(numbers: &mut [f32]) -> f32 {
 /// # Shapes
 ///
 /// `rows · columns` numbers, row by row, in and out; none may be missing.
-pub(crate) fn contrast(pixels: &[f32], rows: usize, columns: usize) -> Vec<f32> {
+pub fn contrast(pixels: &[f32], rows: usize, columns: usize) -> Vec<f32> {
     Background::of(pixels, rows, columns).contrast(pixels, columns)
 }
 
 /// What the network sees of a contrast: itself within bounds, and the logarithm of what is far above them.
-pub(crate) fn inputs(contrast: f32) -> [f32; 2] {
+pub fn inputs(contrast: f32) -> [f32; 2] {
     let [low, high] = BOUNDS;
     [
         0.7 * contrast.clamp(low, high),

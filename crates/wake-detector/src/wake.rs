@@ -65,13 +65,13 @@ pub struct Detection {
 }
 
 /// The unit vector (right, down) of an angle clockwise from the image's up.
-pub(crate) fn direction(degrees: f32) -> [f32; 2] {
+pub fn direction(degrees: f32) -> [f32; 2] {
     let (sin, cos) = degrees.to_radians().sin_cos();
     [sin, -cos]
 }
 
 /// The angle of a vector (right, down), clockwise from the image's up, 0 to 360.
-pub(crate) fn angle_of([right, down]: [f32; 2]) -> f32 {
+pub fn angle_of([right, down]: [f32; 2]) -> f32 {
     right.atan2(-down).to_degrees().rem_euclid(360.0)
 }
 

@@ -1,131 +1,30 @@
-//! The one error type of this crate.
+//! The one error of this crate.
 
-use std::path::PathBuf;
-use wake_physics::{quoted, sentence};
+use whole_files::quoted;
 
 /// What a fallible function of this crate returns.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a model could not be built, read, written or run.
+/// A model that could not be built, read, written or run.
 ///
-/// Wrong shapes handed to a model are mistakes of the program and panic; files, options and numbers
-/// that a user chose are reported here.
+/// Wrong shapes handed to a model are mistakes of the program and panic; files, options and numbers that a user chose are
+/// reported here.
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message names every field")]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// An option that would change the numbers, and that this crate does not implement.
-    #[error(
-        "{} = {} is not supported; supported: {supported}",
-        quoted(option),
-        quoted(value)
-    )]
-    Unsupported {
-        option: String,
-        value: String,
-        supported: String,
-    },
+    /// Weights, options, numbers or a device that a network cannot take.
+    #[error(transparent)]
+    Model(#[from] wake_nn::Error),
 
-    /// A number outside the closed range in which it means something.
-    #[error("{name} is {value}, outside [{min}, {max}]")]
-    OutOfRange {
-        name: String,
-        value: f64,
-        min: f64,
-        max: f64,
-    },
-
-    /// An option of the wrong kind, or at odds with another one.
-    #[error("{} is {}, expected {expected}", quoted(option), sentence(value))]
-    InvalidOption {
-        option: String,
-        value: String,
-        expected: String,
-    },
-
-    /// A file or folder could not be read or written.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        action: &'static str,
-        path: PathBuf,
-        source: std::io::Error,
-    },
-
-    /// None of the file names that a folder may hold was found.
-    #[error("{} holds none of: {}", folder.display(), expected.join(", "))]
-    MissingFile {
-        folder: PathBuf,
-        expected: Vec<String>,
-    },
-
-    /// A file that should hold JSON does not.
-    #[error("{} is not valid JSON: {}", path.display(), sentence(&source.to_string()))]
-    Json {
-        path: PathBuf,
-        source: serde_json::Error,
-    },
-
-    /// A weight file breaks the safetensors format, so nothing in it is trusted.
-    #[error("{} is not a valid safetensors file: {}", path.display(), sentence(&reason.to_string()))]
-    InvalidSafetensors {
-        path: PathBuf,
-        #[source]
-        reason: Box<dyn std::error::Error + Send + Sync>,
-    },
-
-    /// A weight that no training gives.
-    #[error("{} is damaged: tensor {} holds {value}; all weights must be finite", path.display(), quoted(tensor))]
-    InvalidWeight {
-        path: PathBuf,
-        tensor: String,
-        value: f64,
-    },
-
-    /// The tensors of a file are not those of the model; nothing was loaded.
-    #[error("{} does not fit the model: {mismatch}", path.display())]
-    WeightsMismatch {
-        path: PathBuf,
-        mismatch: Box<Mismatch>,
-    },
-
-    /// The device cannot hold or compute this kind of number.
-    #[error("device {device} cannot compute in {precision}; use f32")]
-    UnsupportedPrecision {
-        device: String,
-        precision: &'static str,
-    },
-
-    /// No backend of this build has a device of this name.
-    #[error(
-        "there is no device '{}' in this build: it has {}; the features flex, ndarray, wgpu and cuda add others, \
-         and a GPU's number may follow, as in cuda:1",
-        quoted(name),
-        compiled.join(", ")
-    )]
-    UnknownDevice {
-        name: String,
-        compiled: Vec<&'static str>,
-    },
-
-    /// A vocabulary could not be read.
+    /// A vocabulary could not be read, or a prompt not be understood.
     #[error(transparent)]
     Text(#[from] wake_text::Error),
 
-    /// A scene is not valid, or could not be simulated or written.
+    /// A scene is not valid, or could not be simulated.
+    #[cfg(feature = "wake-model")]
     #[error(transparent)]
     Scene(#[from] wake_physics::Error),
-
-    /// The recipe of a data set is not understood.
-    #[error("cannot read the recipe: {}", sentence(message))]
-    Recipe { message: String },
-
-    /// A folder is no data set, or not the one it should be; line 0 is the file or folder as a whole.
-    #[error("{}{}: {}", path.display(), if *line > 0 { format!(", line {line}") } else { String::new() }, sentence(message))]
-    Dataset {
-        path: PathBuf,
-        line: usize,
-        message: String,
-    },
 
     /// A prompt from which no scene follows.
     #[error(
@@ -134,213 +33,22 @@ pub enum Error {
         quoted(prompt)
     )]
     NothingStated { prompt: String },
-
-    /// A model's numbers have overflowed, or are none.
-    #[error("{what} holds numbers that are not finite: the weights do not fit, or are damaged")]
-    NotFinite { what: String },
-
-    /// The system gave no thread.
-    #[error("cannot start a thread: {source}; use fewer threads")]
-    Threads { source: std::io::Error },
-
-    /// Training went astray.
-    #[error("training diverged at step {step}: {what}; lower the rate, or look at the data")]
-    Diverged { step: usize, what: String },
-
-    /// A device computes other numbers than the reference backend.
-    #[error(
-        "device {device} computes wrong numbers: {stage} differs by {difference:e} of its largest \
-         value, allowed {allowed:e}; use another device or driver"
-    )]
-    WrongNumbers {
-        device: String,
-        stage: &'static str,
-        difference: f64,
-        allowed: f64,
-    },
 }
 
-/// Which tensors of a weight file do not fit a model.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Mismatch {
-    /// Tensors that the model has and the file lacks.
-    pub missing: Vec<String>,
-    /// Tensors that the file has and the model does not know.
-    pub unexpected: Vec<String>,
-    /// Tensors that both have, in different shapes or as a kind of number that is no weight.
-    pub misshapen: Vec<Misshapen>,
-}
-
-/// One tensor whose shape or element type in the file is not the model's.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Misshapen {
-    /// Name of the tensor in the file.
-    pub name: String,
-    /// What the model needs, for example `float [320, 4, 3, 3]`.
-    pub expected: String,
-    /// What the file holds, for example `I64 [1, 77]`.
-    pub found: String,
-}
-
-impl Mismatch {
-    /// Whether file and model agree.
-    pub fn is_empty(&self) -> bool {
-        self.missing.is_empty() && self.unexpected.is_empty() && self.misshapen.is_empty()
+impl From<whole_files::Error> for Error {
+    fn from(error: whole_files::Error) -> Self {
+        Self::Model(error.into())
     }
 }
 
-/// How many names of each kind a message spells out; the fields hold all of them.
-const SHOWN: usize = 6;
-
-impl std::fmt::Display for Mismatch {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let misshapen: Vec<String> = self.misshapen.iter().map(ToString::to_string).collect();
-        let parts: Vec<String> = [
-            ("missing", &self.missing),
-            ("unexpected", &self.unexpected),
-            ("misshapen", &misshapen),
-        ]
-        .into_iter()
-        .filter(|(_, names)| !names.is_empty())
-        .map(|(kind, names)| format!("{} {kind} ({})", names.len(), shorten(names)))
-        .collect();
-        write!(f, "{}", parts.join("; "))
-    }
-}
-
-impl std::fmt::Display for Misshapen {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{}: expected {}, found {}",
-            quoted(&self.name),
-            self.expected,
-            quoted(&self.found)
-        )
-    }
-}
-
-fn shorten(names: &[String]) -> String {
-    let shown: Vec<String> = names
-        .iter()
-        .take(SHOWN)
-        .map(|name| sentence(name))
-        .collect();
-    let mut text = shown.join(", ");
-    if names.len() > SHOWN {
-        text.push_str(&format!(" and {} more", names.len() - SHOWN));
-    }
-    text
-}
-
-/// Checks that a number lies in a closed range.
-///
-/// # Errors
-///
-/// [`Error::OutOfRange`] when it does not, or is not a number.
-pub(crate) fn check_range(name: &str, value: f64, min: f64, max: f64) -> Result<()> {
-    if (min..=max).contains(&value) {
-        return Ok(());
-    }
-    Err(Error::OutOfRange {
-        name: name.to_owned(),
-        value,
-        min,
-        max,
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What others wrote reaches a terminal in short lines without control characters.
-    #[test]
-    fn foreign_text_is_escaped_and_cut() {
-        let foreign = format!("\u{1b}[31m\0\u{7}\n{}", "x".repeat(100_000));
-        let path = || PathBuf::from("weights.safetensors");
-        let json = format!("[\"{}\"]", "y\\u001b".repeat(10_000));
-        let mismatch = Mismatch {
-            missing: vec![foreign.clone()],
-            unexpected: vec![foreign.clone(); 3],
-            misshapen: vec![Misshapen {
-                name: foreign.clone(),
-                expected: "float [1]".to_owned(),
-                found: foreign.clone(),
-            }],
-        };
-        let errors = [
-            Error::Unsupported {
-                option: foreign.clone(),
-                value: foreign.clone(),
-                supported: "none".to_owned(),
-            },
-            Error::InvalidOption {
-                option: foreign.clone(),
-                value: foreign.clone(),
-                expected: "a number".to_owned(),
-            },
-            Error::Json {
-                path: path(),
-                source: serde_json::from_str::<Vec<u8>>(&json).unwrap_err(),
-            },
-            Error::InvalidSafetensors {
-                path: path(),
-                reason: foreign.clone().into(),
-            },
-            Error::InvalidWeight {
-                path: path(),
-                tensor: foreign.clone(),
-                value: f64::NAN,
-            },
-            Error::WeightsMismatch {
-                path: path(),
-                mismatch: Box::new(mismatch),
-            },
-            Error::UnknownDevice {
-                name: foreign.clone(),
-                compiled: vec!["flex"],
-            },
-            Error::Recipe {
-                message: foreign.clone(),
-            },
-            Error::Dataset {
-                path: path(),
-                line: 3,
-                message: foreign.clone(),
-            },
-            Error::NothingStated { prompt: foreign },
-        ];
-        for error in errors {
-            let text = error.to_string();
-            assert!(!text.chars().any(char::is_control), "{text}");
-            assert!(text.len() < 5000, "{}: {}", text.len(), &text[..200]);
+#[cfg(feature = "dataset")]
+impl From<Error> for wake_dataset::Error {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Model(error) => Self::Value(error),
+            Error::Text(error) => Self::Text(error),
+            Error::Scene(error) => Self::Scene(error),
+            other => Self::Source(Box::new(other)),
         }
-    }
-
-    #[test]
-    fn a_mismatch_names_its_tensors_and_counts_the_rest() {
-        let mismatch = Mismatch {
-            missing: (0..9).map(|i| format!("a.{i}")).collect(),
-            unexpected: vec!["b".to_owned()],
-            misshapen: vec![],
-        };
-        let text = mismatch.to_string();
-        assert_eq!(
-            text,
-            "9 missing (a.0, a.1, a.2, a.3, a.4, a.5 and 3 more); 1 unexpected (b)"
-        );
-        assert!(!mismatch.is_empty());
-        assert!(Mismatch::default().is_empty());
-    }
-
-    #[test]
-    fn ranges_are_closed_and_refuse_nan() {
-        assert!(check_range("x", 1.0, 1.0, 2.0).is_ok());
-        assert!(check_range("x", 2.0, 1.0, 2.0).is_ok());
-        let refused = check_range("x", f64::NAN, 1.0, 2.0);
-        assert!(matches!(refused, Err(Error::OutOfRange { .. })));
-        let text = check_range("steps", 0.0, 1.0, 1000.0).map_err(|e| e.to_string());
-        assert_eq!(text, Err("steps is 0, outside [1, 1000]".to_owned()));
     }
 }

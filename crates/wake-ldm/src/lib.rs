@@ -1,35 +1,38 @@
-#![doc = include_str!("../README.md")]
+#![cfg_attr(
+    all(feature = "flex", feature = "dataset"),
+    doc = include_str!("../README.md")
+)]
+#![cfg_attr(
+    not(all(feature = "flex", feature = "dataset")),
+    doc = "Latent diffusion of ship-wake radar images on burn."
+)]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-mod device;
 mod error;
-mod files;
 mod options;
+pub mod streams;
 
-pub mod metrics;
-pub mod nn;
-pub mod noise;
 pub mod unet;
-pub mod weights;
 
 mod stable_diffusion;
-mod wake_model;
 
-#[cfg(feature = "dataset")]
-pub mod dataset;
-#[cfg(feature = "train")]
-pub mod evaluation;
-#[cfg(feature = "train")]
-pub mod train;
 #[cfg(feature = "flex")]
 mod self_check;
 
-pub use burn;
-pub use device::device_named;
-pub use error::{Error, Mismatch, Misshapen, Result};
-pub use files::{fingerprint, read_text};
+#[cfg(feature = "wake-model")]
+mod wake_model;
+
+#[cfg(feature = "dataset")]
+mod sampled;
+
+pub use error::{Error, Result};
+#[cfg(feature = "dataset")]
+pub use sampled::Sampled;
 #[cfg(feature = "flex")]
 pub use self_check::self_check;
 pub use stable_diffusion::{autoencoder, lora, pipeline, scheduler, text};
+#[cfg(feature = "wake-model")]
 pub use wake_model::sampler::WakeSampler;
+#[cfg(feature = "wake-model")]
 pub use wake_model::{conditioning, network, sampler, sea_texture};
+pub use wake_nn::{burn, device_named};

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use crate::error::{Error, Result};
+use wake_nn::{Error, Result};
 
 /// The options of one component that nobody has looked at yet.
 #[derive(Debug)]

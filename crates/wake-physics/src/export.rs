@@ -10,7 +10,7 @@
 //! ```
 
 use crate::error::Result;
-use crate::output::write_atomically;
+use whole_files::write_atomically;
 use crate::raster::Field;
 use image::{ImageBuffer, Luma};
 use std::path::Path;
@@ -24,7 +24,7 @@ const NPY_ALIGNMENT: usize = 64;
 ///
 /// [`Error::File`](crate::Error::File).
 pub fn write_npy(path: &Path, field: &Field) -> Result<()> {
-    write_atomically(path, &npy(field))
+    Ok(write_atomically(path, &npy(field))?)
 }
 
 fn npy(field: &Field) -> Vec<u8> {
@@ -65,7 +65,7 @@ pub fn write_tiff(path: &Path, raster: &crate::Raster, field: &Field) -> Result<
         path: path.to_owned(),
         message: e.to_string(),
     })?;
-    write_atomically(path, &bytes)
+    Ok(write_atomically(path, &bytes)?)
 }
 
 #[cfg(feature = "tiff")]

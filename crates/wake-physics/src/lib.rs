@@ -95,7 +95,7 @@ pub mod picture;
 mod simulate;
 pub mod measure;
 
-pub use error::{Error, Result, quoted, sentence};
+pub use error::{Error, Result};
 pub use labels::labels_of;
 pub use memory::available as available_memory;
 pub use plan::{Cost, Plan, PlannedTerm, Sizes};

@@ -1,7 +1,4 @@
-//! Files of a simulation, each written whole or not at all, and folders that belong to one process.
-//!
-//! A file is written under another name, `.NAME.PROCESS-NUMBER.tmp`, and locked while it is; then it takes its own name.
-//! What a killed process left is not locked: the next run that makes or takes the folder removes it.
+//! Files of a simulation, each written whole or not at all.
 
 use crate::error::{Error, Result};
 use crate::raster::Field;
@@ -10,146 +7,13 @@ use image::{ExtendedColorType, ImageEncoder};
 use num_complex::Complex32;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::path::Path;
+use whole_files::{write_atomically, write_with};
 
 /// Numbers that are turned into bytes at once.
 const PIECE: usize = 1 << 16;
-
-/// Tells apart the files that one process writes at the same time.
-static COUNTER: AtomicU64 = AtomicU64::new(0);
-
-/// Makes a folder and the folders above it, checks that files can be written there, and [`sweep`]s it.
-///
-/// # Errors
-///
-/// [`Error::File`] if it cannot be made or written to.
-pub fn make_folder(folder: &Path) -> Result<()> {
-    let fail = |e: std::io::Error| file_error("write to the folder", folder, &e);
-    std::fs::create_dir_all(folder).map_err(fail)?;
-    let (probe, _lock) = temporary(&folder.join("probe")).map_err(fail)?;
-    std::fs::remove_file(&probe).map_err(fail)?;
-    sweep(folder)
-}
-
-/// A folder that only one process works in, until this is dropped.
-#[derive(Debug)]
-pub struct FolderLock {
-    _folder: Option<File>,
-}
-
-/// Makes a folder, and takes it for this process alone.
-///
-/// Where the system cannot lock a folder nothing is locked.
-///
-/// # Errors
-///
-/// [`Error::File`] if another process has it, or as [`make_folder`].
-pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
-    make_folder(folder)?;
-    let Ok(handle) = File::open(folder) else {
-        return Ok(FolderLock { _folder: None });
-    };
-    match handle.try_lock() {
-        Ok(()) => Ok(FolderLock {
-            _folder: Some(handle),
-        }),
-        Err(TryLockError::WouldBlock) => {
-            let message = "another process works there; wait for it, or choose another folder";
-            Err(file_error("take the folder", folder, &message))
-        }
-        Err(TryLockError::Error(_)) => Ok(FolderLock { _folder: None }),
-    }
-}
-
-/// Removes what killed processes left half-written in a folder, and nothing that a living one writes.
-///
-/// # Errors
-///
-/// [`Error::File`] if the folder cannot be read.
-pub fn sweep(folder: &Path) -> Result<()> {
-    let entries = std::fs::read_dir(folder).map_err(|e| file_error("read", folder, &e))?;
-    for entry in entries {
-        let path = entry.map_err(|e| file_error("read", folder, &e))?.path();
-        // Without write access to what another left, it stays.
-        if is_temporary(&path) && path.is_file() && is_abandoned(&path) {
-            let _ = std::fs::remove_file(&path);
-        }
-    }
-    Ok(())
-}
-
-/// Whether a name is one of a file that is being written.
-pub fn is_temporary(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.starts_with('.') && name.ends_with(".tmp")
-}
-
-/// Whether nobody writes a file any more.
-fn is_abandoned(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| file.try_lock().is_ok())
-}
-
-/// Writes bytes to a temporary neighbour and renames it: the file is whole, or as it was before.
-///
-/// # Errors
-///
-/// [`Error::File`]; the neighbour is removed.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_with(path, |file| file.write_all(bytes)).map_err(|e| file_error("write", path, &e))
-}
-
-/// Writes a file piece by piece, whole or not at all: it takes its name when all of it is on disk.
-///
-/// # Errors
-///
-/// Those of the system and of `write`; what was written is removed.
-pub fn write_with(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let (neighbour, file) = temporary(path)?;
-    let mut writer = BufWriter::with_capacity(1 << 20, file);
-    let written = write(&mut writer)
-        .and_then(|()| {
-            writer
-                .into_inner()
-                .map_err(std::io::IntoInnerError::into_error)
-        })
-        .and_then(|file| {
-            std::fs::rename(&neighbour, path)?;
-            // Locked up to here.
-            drop(file);
-            Ok(())
-        });
-    if written.is_err() {
-        // The write failed already; what is left of it is the lesser trouble.
-        let _ = std::fs::remove_file(&neighbour);
-    }
-    written
-}
-
-/// A new file beside `path`, locked; the lock ends with the file.
-fn temporary(path: &Path) -> std::io::Result<(PathBuf, File)> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    loop {
-        let number = COUNTER.fetch_add(1, Ordering::Relaxed);
-        let neighbour = path.with_file_name(format!(".{name}.{}-{number}.tmp", std::process::id()));
-        let file = match File::create_new(&neighbour) {
-            // Left by a process that had this number.
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => continue,
-            other => other?,
-        };
-        // Where the system has no locks, nothing is swept either.
-        let _ = file.lock();
-        // Between its making and its lock another process may have swept it.
-        if neighbour.exists() {
-            return Ok((neighbour, file));
-        }
-    }
-}
 
 fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) -> Error {
     Error::File {
@@ -177,7 +41,7 @@ pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Res
     PngEncoder::new(&mut bytes)
         .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::L8)
         .map_err(|e| file_error("encode", path, &e))?;
-    write_atomically(path, &bytes)
+    Ok(write_atomically(path, &bytes)?)
 }
 
 /// Writes a PNG of red, green and blue, 8 bits each: `[rows, columns, 3]`; one without colours as a grey one, which is smaller
@@ -194,7 +58,7 @@ pub(crate) fn write_rgb_png(path: &Path, pixels: &[u8], rows: usize, columns: us
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter)
         .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::Rgb8)
         .map_err(|e| file_error("encode", path, &e))?;
-    write_atomically(path, &bytes)
+    Ok(write_atomically(path, &bytes)?)
 }
 
 /// Writes fields as `f32` tensors `[rows, columns]` of a safetensors file, and a complex image as `[rows, columns, 2]`, row by
@@ -289,18 +153,6 @@ impl<'a> Tensor<'a> {
     }
 }
 
-/// Writes a value as indented JSON.
-///
-/// # Errors
-///
-/// [`Error::File`].
-pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut text =
-        serde_json::to_string_pretty(value).map_err(|e| file_error("encode", path, &e))?;
-    text.push('\n');
-    write_atomically(path, text.as_bytes())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -358,53 +210,4 @@ mod tests {
         }
     }
 
-    #[test]
-    fn failures_name_the_path_and_leave_nothing() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("file");
-        std::fs::write(&file, "here").unwrap();
-        for result in [
-            make_folder(&file.join("below")),
-            write_atomically(&file.join("below/x"), b"x"),
-            write_png(&folder.path().join("no/bad.png"), &[0; 6], 2, 3),
-        ] {
-            let message = result.unwrap_err().to_string();
-            assert!(message.starts_with("cannot "), "{message}");
-        }
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), "here");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
-
-    /// What is locked is being written; the rest of that name is what a kill left.
-    #[test]
-    fn a_good_run_sweeps_what_dead_ones_left_and_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = |name: &str| folder.path().join(name);
-        for name in [
-            ".fields.safetensors.99.tmp",
-            ".image.png.1-7.tmp",
-            "notes.tmp",
-            ".profile",
-        ] {
-            std::fs::write(path(name), "here").unwrap();
-        }
-        let (alive, lock) = temporary(&path("labels.json")).unwrap();
-        make_folder(folder.path()).unwrap();
-        let left = |name: &str| path(name).exists();
-        assert!(!left(".fields.safetensors.99.tmp") && !left(".image.png.1-7.tmp"));
-        assert!(left("notes.tmp") && left(".profile") && alive.exists());
-        drop(lock);
-        sweep(folder.path()).unwrap();
-        assert!(!alive.exists());
-    }
-
-    #[test]
-    fn a_folder_belongs_to_one_at_a_time() {
-        let folder = tempfile::tempdir().unwrap();
-        let lock = lock_folder(folder.path()).unwrap();
-        let refused = lock_folder(folder.path()).unwrap_err().to_string();
-        assert!(refused.contains("another process"), "{refused}");
-        drop(lock);
-        lock_folder(folder.path()).unwrap();
-    }
 }

@@ -1,7 +1,7 @@
 //! What can go wrong, by whose fault it is.
 
 use std::path::PathBuf;
-use wake_physics::{quoted, sentence};
+use whole_files::{quoted, sentence};
 
 /// Why a prompt could not be written or read, or a vocabulary not be loaded.
 #[non_exhaustive]
@@ -9,9 +9,11 @@ use wake_physics::{quoted, sentence};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The scene is not valid, so there is no prompt for it.
+    #[cfg(feature = "scene")]
     #[error(transparent)]
     Scene(#[from] wake_physics::Error),
     /// A prompt states a value that no scene can have.
+    #[cfg(feature = "scene")]
     #[error("the prompt says '{}', but {source}", quoted(words))]
     Impossible {
         words: String,
@@ -49,7 +51,7 @@ pub enum Error {
 /// Result of this crate's fallible functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
-#[cfg(test)]
+#[cfg(all(test, feature = "scene"))]
 mod tests {
     use super::*;
 

@@ -1,4 +1,5 @@
-#![doc = include_str!("../README.md")]
+#![cfg_attr(feature = "scene", doc = include_str!("../README.md"))]
+#![cfg_attr(not(feature = "scene"), doc = "CLIP tokens of prompts.")]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(not(test), warn(unused_crate_dependencies))]
 
@@ -6,13 +7,21 @@ mod error;
 
 // Scene → prompt → what it states.
 mod cleaning;
+#[cfg(feature = "scene")]
 mod pieces;
+#[cfg(feature = "scene")]
 mod amounts;
+#[cfg(feature = "scene")]
 mod compass;
+#[cfg(feature = "scene")]
 mod subjects;
+#[cfg(feature = "scene")]
 mod statement;
+#[cfg(feature = "scene")]
 mod wording;
+#[cfg(feature = "scene")]
 mod sentence;
+#[cfg(feature = "scene")]
 mod reading;
 
 // Prompt → tokens.
@@ -21,7 +30,10 @@ mod vocabulary;
 mod tokenizer;
 
 pub use error::{Error, Result};
+#[cfg(feature = "scene")]
 pub use reading::{Reading, Unread};
+#[cfg(feature = "scene")]
 pub use statement::PartialScene;
 pub use tokenizer::{TOKENS, Tokenizer, Tokens};
+#[cfg(feature = "scene")]
 pub use wording::{Wording, prompt};

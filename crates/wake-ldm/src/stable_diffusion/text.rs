@@ -9,11 +9,11 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Int, Tensor};
 use serde_json::{Value, json};
 
-use crate::error::{Error, Result, check_range};
-use crate::nn::activation::Activation;
-use crate::nn::attention::attention;
+use wake_nn::{Error, Result, check_range};
+use wake_nn::activation::Activation;
+use wake_nn::attention::attention;
 use crate::options::Options;
-use crate::weights::{Layout, load};
+use wake_nn::weights::{Layout, load};
 
 /// Widths and options of a [`ClipText`]; the defaults are those of Stable Diffusion v1.4.
 #[derive(Config, Debug, PartialEq)]
@@ -58,7 +58,7 @@ impl ClipTextConfig {
     /// [`Error::Unsupported`] for an option that would change the numbers and that we lack, and what
     /// [`validate`](Self::validate) finds; [`Error::Io`], [`Error::Json`] for a bad file.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::from_json(&crate::files::read_text(path)?, path)
+        Self::from_json(&whole_files::read_text(path)?, path)
     }
 
     /// Reads the text of a `config.json`; `path` only serves messages.

@@ -4,9 +4,9 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
 use super::config::UNetConfig;
-use crate::nn::resample::{Downsample, Upsample};
-use crate::nn::resnet::{ResnetBlock, ResnetShape};
-use crate::nn::transformer::{Transformer2d, TransformerShape};
+use wake_nn::resample::{Downsample, Upsample};
+use wake_nn::resnet::{ResnetBlock, ResnetShape};
+use wake_nn::transformer::{Transformer2d, TransformerShape};
 
 /// Residual blocks (each with its transformer, if any), then half the size.
 #[derive(Module, Debug)]

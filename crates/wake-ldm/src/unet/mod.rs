@@ -9,13 +9,13 @@ use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
 
-use crate::error::Result;
-use crate::nn::activation::silu;
-use crate::nn::cast_to;
-use crate::nn::conv::{conv3x3, convolve};
-use crate::nn::norm::GroupNorm;
-use crate::nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
-use crate::weights::{Layout, load};
+use wake_nn::Result;
+use wake_nn::activation::silu;
+use wake_nn::cast_to;
+use wake_nn::conv::{conv3x3, convolve};
+use wake_nn::norm::GroupNorm;
+use wake_nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
+use wake_nn::weights::{Layout, load};
 use blocks::{DownBlock, Levels, MidBlock, UpBlock};
 
 pub use config::UNetConfig;
@@ -108,7 +108,7 @@ impl UNet {
     }
 
     /// Length of the condition vector, if the model has one.
-    pub(crate) fn condition_channels(&self) -> Option<usize> {
+    pub fn condition_channels(&self) -> Option<usize> {
         self.config.condition_channels
     }
 

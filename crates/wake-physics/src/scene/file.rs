@@ -2,7 +2,8 @@
 
 use super::Scene;
 use super::keys::SET_BY_SENSOR;
-use crate::error::{Error, Result, quoted, sentence};
+use crate::error::{Error, Result};
+use whole_files::{quoted, sentence};
 use std::io::Read;
 use std::path::Path;
 

@@ -72,7 +72,7 @@ pub(super) mod seed {
             Seed::Digits(digits) => digits.parse().map_err(|_| {
                 D::Error::custom(format!(
                     "{} is no whole number from 0 to {}",
-                    crate::error::quoted(&digits),
+                    whole_files::quoted(&digits),
                     u64::MAX
                 ))
             }),

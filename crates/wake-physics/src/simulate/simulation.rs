@@ -142,14 +142,14 @@ impl Simulation {
     ///
     /// As [`Self::write`].
     pub fn write_in(&self, folder: &Path, grey: &GreyScale) -> Result<Value> {
-        output::make_folder(folder)?;
+        whole_files::make_folder(folder)?;
         let path = |name: &str| folder.join(name);
         let [rows, columns] = [self.raster.rows, self.raster.columns];
         output::write_png(&path("image.png"), &self.levels(grey), rows, columns)?;
         let size = [self.raster.rows, self.raster.columns];
         let slc = self.slc.as_deref().map(|slc| (slc, size));
         output::write_fields(&path("fields.safetensors"), &self.named_fields(), slc)?;
-        output::write_json(&path("labels.json"), &self.labels)?;
+        whole_files::write_json(&path("labels.json"), &self.labels)?;
         let names = [
             "image.png",
             "fields.safetensors",
@@ -167,7 +167,7 @@ impl Simulation {
             "files": names.map(|name| path(name).display().to_string()),
             "scene": self.scene,
         });
-        output::write_json(&path("report.json"), &report)?;
+        whole_files::write_json(&path("report.json"), &report)?;
         Ok(report)
     }
 }

@@ -5,11 +5,11 @@ use burn::nn::conv::Conv2d;
 use burn::tensor::{DType, Device, Tensor};
 
 use super::config::AutoencoderKlConfig;
-use crate::nn::attention::CrossAttention;
-use crate::nn::conv::{conv3x3, convolve};
-use crate::nn::norm::GroupNorm;
-use crate::nn::resample::{Downsample, Upsample};
-use crate::nn::resnet::{ResnetBlock, ResnetShape};
+use wake_nn::attention::CrossAttention;
+use wake_nn::conv::{conv3x3, convolve};
+use wake_nn::norm::GroupNorm;
+use wake_nn::resample::{Downsample, Upsample};
+use wake_nn::resnet::{ResnetBlock, ResnetShape};
 
 /// ε of every normalisation in an autoencoder.
 const EPSILON: f64 = 1e-6;

@@ -5,7 +5,7 @@ use std::path::Path;
 use burn::config::Config;
 use serde_json::{Value, json};
 
-use crate::error::{Error, Result, check_range};
+use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
 
 /// Widths and options of an [`AutoencoderKl`](super::AutoencoderKl); the defaults are those of
@@ -94,7 +94,7 @@ impl AutoencoderKlConfig {
     /// [`Error::Unsupported`] for an option that would change the numbers and that we lack, and what
     /// [`validate`](Self::validate) finds; [`Error::Io`], [`Error::Json`] for a bad file.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::from_json(&crate::files::read_text(path)?, path)
+        Self::from_json(&whole_files::read_text(path)?, path)
     }
 
     /// Reads the text of a `config.json`; `path` only serves messages.

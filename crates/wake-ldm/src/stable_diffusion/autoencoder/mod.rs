@@ -11,11 +11,11 @@ use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
 
-use crate::error::Result;
-use crate::nn::cast_to;
-use crate::nn::conv::{conv1x1, convolve};
-use crate::nn::patch::{depth_to_space, space_to_depth};
-use crate::weights::{Layout, load};
+use wake_nn::Result;
+use wake_nn::cast_to;
+use wake_nn::conv::{conv1x1, convolve};
+use wake_nn::patch::{depth_to_space, space_to_depth};
+use wake_nn::weights::{Layout, load};
 use blocks::{Decoder, Encoder};
 
 pub use config::AutoencoderKlConfig;
@@ -197,8 +197,8 @@ impl AutoencoderKl {
     }
 
     /// The same with another shift and scale of latents, as [`to_latents`](Self::to_latents) has them.
-    #[cfg(feature = "train")]
-    pub(crate) fn with_latents(mut self, shift: f64, scale: f64) -> Self {
+    #[cfg(feature = "autodiff")]
+    pub fn with_latents(mut self, shift: f64, scale: f64) -> Self {
         self.config = self
             .config
             .with_shift_factor(shift)

@@ -8,11 +8,11 @@ use burn::module::{Initializer, Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{DType, Tensor};
 use safetensors::tensor::{Dtype, TensorView};
 
-use crate::error::{Result, check_range};
-use crate::files::write_atomically;
-use crate::nn::cast_to;
-use crate::weights::Layout;
-use crate::weights::names::ModulePath;
+use wake_nn::{Result, check_range};
+use whole_files::write_synced;
+use wake_nn::cast_to;
+use wake_nn::weights::Layout;
+use wake_nn::weights::names::ModulePath;
 
 /// Low-rank changes of some linear layers of a model.
 ///
@@ -42,7 +42,7 @@ impl LowRank {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for a rank of 0 or above 1024.
+    /// [`Error::OutOfRange`](wake_nn::Error::OutOfRange) for a rank of 0 or above 1024.
     pub fn of_attentions<M: Module>(model: &M, layout: Layout, rank: usize) -> Result<Self> {
         check_range("rank", rank as f64, 1.0, 1024.0)?;
         let mut finder = Finder {
@@ -80,7 +80,7 @@ impl LowRank {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`](crate::Error::Io) when it cannot be written.
+    /// [`Error::Io`](wake_nn::Error::Io) when it cannot be written.
     pub fn save(&self, prefix: &str, path: &Path) -> Result<()> {
         let factors = (self.layers.iter().enumerate()).flat_map(|(i, layer)| {
             let both = [("lora_A", &self.down[i]), ("lora_B", &self.up[i])];
@@ -194,7 +194,7 @@ mod tests {
     use burn::tensor::Device;
 
     use super::*;
-    use crate::nn::attention::CrossAttention;
+    use wake_nn::attention::CrossAttention;
     use crate::stable_diffusion::lora::merge_lora;
 
     #[derive(Module, Debug)]

@@ -9,11 +9,11 @@ use std::path::Path;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
-use crate::error::{Error, Mismatch, Misshapen, Result};
-use crate::nn::cast_to;
-use crate::weights::files::{Stored, WeightFiles};
-use crate::weights::names::ModulePath;
-use crate::weights::{Layout, shapes};
+use wake_nn::{Error, Mismatch, Misshapen, Result};
+use wake_nn::cast_to;
+use wake_nn::weights::files::{Stored, WeightFiles};
+use wake_nn::weights::names::ModulePath;
+use wake_nn::weights::{Layout, shapes};
 use strength::{NOTE, Strength};
 
 pub use low_rank::LowRank;
@@ -70,7 +70,7 @@ impl Factors<'_> {
 ///
 /// # Errors
 ///
-/// As [`load`](crate::weights::load); a layer that the model does not have, or whose factors do not fit it, is a
+/// As [`load`](wake_nn::weights::load); a layer that the model does not have, or whose factors do not fit it, is a
 /// [`Error::WeightsMismatch`], and so is a file without any layer of this prefix.
 /// [`Error::Unsupported`] for a file trained with an option that changes the sum, such as `use_dora`.
 ///

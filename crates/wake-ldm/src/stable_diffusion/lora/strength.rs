@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use crate::error::{Error, Result, check_range};
+use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
 
 /// Entry of a file's header in which diffusers writes how an adaptation was trained.

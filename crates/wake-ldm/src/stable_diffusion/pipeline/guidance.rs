@@ -41,7 +41,7 @@ fn deviation(x: Tensor<4>) -> Tensor<4> {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
-    use crate::noise::{NoiseSource, normal_batch};
+    use wake_nn::noise::{NoiseSource, normal_batch};
     use burn::tensor::Device;
 
     fn batch(seeds: [u64; 2]) -> Tensor<4> {

@@ -8,7 +8,7 @@ use wake_text::{TOKENS, Tokenizer};
 
 use super::{Pipeline, PipelineParts};
 use crate::error::{Error, Result, check_range};
-use crate::files::read_text;
+use whole_files::read_text;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
 use crate::stable_diffusion::text::ClipText;
@@ -81,19 +81,19 @@ fn check_index(path: &Path) -> Result<()> {
     if !path.exists() {
         return Ok(());
     }
-    let index: Value = serde_json::from_str(&read_text(path)?).map_err(|source| Error::Json {
+    let index: Value = serde_json::from_str(&read_text(path)?).map_err(|source| Error::Model(wake_nn::Error::Json {
         path: path.to_owned(),
         source,
-    })?;
+    }))?;
     let class = &index["_class_name"];
     if class.as_str().is_some_and(|class| CLASSES.contains(&class)) {
         return Ok(());
     }
-    Err(Error::Unsupported {
+    Err(Error::Model(wake_nn::Error::Unsupported {
         option: "_class_name of model_index.json".to_owned(),
         value: class.to_string(),
         supported: CLASSES.join(", "),
-    })
+    }))
 }
 
 /// The folder's tokenizer, or CLIP's where there is none.
@@ -110,9 +110,9 @@ fn must_agree(option: &str, value: usize, expected: usize) -> Result<()> {
     if value == expected {
         return Ok(());
     }
-    Err(Error::InvalidOption {
+    Err(Error::Model(wake_nn::Error::InvalidOption {
         option: format!("{option} of the U-Net"),
         value: value.to_string(),
         expected: format!("{expected}, as the other models have it"),
-    })
+    }))
 }

@@ -26,7 +26,7 @@ use crate::stable_diffusion::lora::merge_lora;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
 use crate::stable_diffusion::text::ClipText;
 use crate::unet::UNet;
-use crate::weights::{self, Layout};
+use wake_nn::weights::{self, Layout};
 
 use request::invalid;
 pub use request::{Prompts, Request, StartImage};
@@ -90,7 +90,7 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// [`Error::WrongNumbers`](crate::Error::WrongNumbers) for a device that is no CPU and fails
+    /// [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
     /// [`self_check`](crate::self_check).
     pub fn new(parts: PipelineParts, device: &Device) -> Result<Self> {
         #[cfg(feature = "flex")]
@@ -319,7 +319,7 @@ impl Pipeline {
 }
 
 /// The ids of a prompt, marks and padding included; without a tokenizer those of CLIP's own.
-pub(crate) fn token_ids(tokenizer: Option<&Tokenizer>, prompt: &str) -> Vec<i32> {
+pub fn token_ids(tokenizer: Option<&Tokenizer>, prompt: &str) -> Vec<i32> {
     let tokenizer = tokenizer.unwrap_or_else(|| Tokenizer::clip());
     let tokens = tokenizer.encode(prompt);
     tokens.ids.iter().map(|&id| id as i32).collect()

@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 
 use crate::error::{Error, Result, check_range};
-use crate::noise::NoiseSource;
+use wake_nn::noise::NoiseSource;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
 
 /// Words, or what the text encoder made of them.
@@ -272,9 +272,9 @@ pub(super) fn invalid(
     value: impl std::fmt::Display,
     expected: impl Into<String>,
 ) -> Error {
-    Error::InvalidOption {
+    Error::Model(wake_nn::Error::InvalidOption {
         option: option.to_owned(),
         value: value.to_string(),
         expected: expected.into(),
-    }
+    })
 }

@@ -8,8 +8,9 @@ use super::Pipeline;
 use super::guidance::Guidance;
 use super::request::{Request, StartImage, invalid};
 use crate::error::Result;
-use crate::nn::check_finite;
-use crate::noise::{INITIAL_STREAM, NoiseSource, POSTERIOR_STREAM, STEP_STREAM, normal_batch};
+use wake_nn::check_finite;
+use wake_nn::noise::{NoiseSource, normal_batch};
+use crate::streams::{INITIAL_STREAM, POSTERIOR_STREAM, STEP_STREAM};
 use crate::stable_diffusion::scheduler::{Scheduler, StepInput};
 use crate::unet::UNetInput;
 
@@ -53,8 +54,8 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`](crate::Error::OutOfRange) or
-    /// [`Error::InvalidOption`](crate::Error::InvalidOption) for a request that makes no sense, or
+    /// [`wake_nn::Error::OutOfRange`] or
+    /// [`wake_nn::Error::InvalidOption`] for a request that makes no sense, or
     /// not to these models, and what [`SchedulerConfig::scheduler`](crate::scheduler::SchedulerConfig::scheduler) reports.
     pub fn sample(&self, request: &Request) -> Result<Sampling<'_>> {
         Sampling::new(self, request)
@@ -64,7 +65,7 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// As [`sample`](Self::sample), and [`Error::NotFinite`](crate::Error::NotFinite) for a model whose numbers overflow.
+    /// As [`sample`](Self::sample), and [`wake_nn::Error::NotFinite`] for a model whose numbers overflow.
     pub fn generate(&self, request: &Request) -> Result<Tensor<4>> {
         let latents = self.sample(request)?.finish();
         check_finite("the latents of the image", &latents)?;

@@ -7,8 +7,8 @@ use wake_text::Tokenizer;
 
 use super::Pipeline;
 use crate::error::Result;
-use crate::files::write_text;
-use crate::weights::{Layout, Precision, save_folder};
+use whole_files::write_atomically;
+use wake_nn::weights::{Layout, Precision, save_folder};
 
 impl Pipeline {
     /// Writes a folder that [`load`](Self::load) and diffusers' `StableDiffusionPipeline` read:
@@ -19,7 +19,7 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`](crate::Error::Io) and [`Error::Text`](crate::Error::Text) when a file cannot be
+    /// [`wake_nn::Error::Io`] and [`Error::Text`](crate::Error::Text) when a file cannot be
     /// written.
     pub fn save(&self, folder: &Path, precision: Precision) -> Result<()> {
         let tokenizer = self.tokenizer.as_ref().unwrap_or_else(|| Tokenizer::clip());

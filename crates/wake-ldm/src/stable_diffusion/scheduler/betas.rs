@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::error::{Result, check_range};
+use wake_nn::{Result, check_range};
 use crate::options::Options;
 
 /// The shape of the noise added per training step, βₜ.

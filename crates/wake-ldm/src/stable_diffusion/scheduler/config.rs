@@ -19,7 +19,7 @@ use super::pndm::PndmConfig;
 use super::sigma_sampler::SigmaConfig;
 use super::unipc::UniPcConfig;
 use super::{Method, NoiseSchedule, Scheduler, SchedulerOption};
-use crate::error::{Error, Result};
+use wake_nn::{Error, Result};
 use crate::options::Options;
 
 /// A method by its short name and its class name in diffusers, and how its options are read.
@@ -110,7 +110,7 @@ impl SchedulerConfig {
     ///
     /// [`Error::Io`] and [`Error::Json`] for a bad file, otherwise as [`with`](Self::with).
     pub fn read(path: &Path) -> Result<Self> {
-        Self::from_json(&crate::files::read_text(path)?, path)
+        Self::from_json(&whole_files::read_text(path)?, path)
     }
 
     /// Reads the text of a `scheduler_config.json`; `path` only serves messages.

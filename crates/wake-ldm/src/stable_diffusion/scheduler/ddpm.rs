@@ -10,7 +10,7 @@ use super::whole_path::WholePath;
 use super::{
     Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
 };
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// How much fresh noise a step adds.

@@ -8,7 +8,7 @@ use super::log_snr_path::{LogSnrPath, PathOptions};
 use super::sigmas::{SigmaOptions, Spread, take_final_zero};
 use super::spacing::{Spacing, Steps};
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// Runs shorter than this end at lower order.

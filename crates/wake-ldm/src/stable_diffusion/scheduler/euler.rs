@@ -7,7 +7,7 @@ use super::betas::DEFAULTS;
 use super::prediction::Prediction;
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use super::sigmas::{SigmaOptions, SigmaPath, Spread, round, take_final_zero};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// Follows dx/dσ = (x − x₀)/σ by straight lines.

@@ -6,7 +6,7 @@ use super::betas::DEFAULTS;
 use super::prediction::Prediction;
 use super::required;
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// Steps further down than the next level, and adds noise to come back up to it.

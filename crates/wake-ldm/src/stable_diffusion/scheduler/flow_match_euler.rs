@@ -4,7 +4,7 @@ use super::prediction::{Clipping, Prediction};
 use super::sigmas::{SigmaOptions, Spread, check_positive, round};
 use super::spacing::linspace;
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
-use crate::error::{Result, check_range};
+use wake_nn::{Result, check_range};
 use crate::options::Options;
 
 /// Options of [`FlowMatchEuler`].

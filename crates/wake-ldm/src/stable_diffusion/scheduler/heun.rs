@@ -6,7 +6,7 @@ use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::{Clipping, Prediction};
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use super::sigmas::{SigmaOptions, SigmaPath, Spread};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// A trial step to the next level, then the same step with the mean of both slopes.

@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use super::prediction::{Clipping, Prediction};
 use super::sigmas::Spread;
 use super::{NoiseLevel, StepInput};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// Options of every exponential integrator.

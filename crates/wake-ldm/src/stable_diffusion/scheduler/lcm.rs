@@ -6,7 +6,7 @@ use super::whole_path::WholePath;
 use super::{
     Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
 };
-use crate::error::{Result, check_range};
+use wake_nn::{Result, check_range};
 use crate::options::Options;
 
 /// The standard deviation of the data that the boundary condition assumes.

@@ -6,7 +6,7 @@ use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::Prediction;
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use super::sigmas::{SigmaOptions, Spread};
-use crate::error::{Result, check_range};
+use wake_nn::{Result, check_range};
 use crate::options::Options;
 
 /// A polynomial through the slopes of the last four levels, integrated to the next.

@@ -3,7 +3,7 @@
 use super::sigmas::{SigmaOptions, SigmaTable, Spread, check_positive, round};
 use super::spacing::{Steps, linspace};
 use super::{NoiseLevel, NoiseSchedule};
-use crate::error::Result;
+use wake_nn::Result;
 
 /// What an exponential integrator visits.
 #[derive(Debug, Clone)]

@@ -38,7 +38,7 @@ mod whole_path;
 
 use burn::tensor::Tensor;
 
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 pub use betas::{BetaCurve, TerminalSnr};

@@ -7,7 +7,7 @@ use super::prediction::Prediction;
 use super::spacing::{Steps, steps_out_of_range};
 use super::whole_path::WholePath;
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// Steps that the Runge-Kutta start needs.

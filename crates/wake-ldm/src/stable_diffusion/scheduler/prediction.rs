@@ -2,7 +2,7 @@
 
 use burn::tensor::Tensor;
 
-use crate::error::{Error, Result, check_range};
+use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
 
 /// How much of the clean image and how much noise a noisy image holds.

@@ -2,7 +2,7 @@
 
 use super::betas::{BetaCurve, ScheduleDefaults, TerminalSnr};
 use super::prediction::NoiseLevel;
-use crate::error::{Result, check_range};
+use wake_nn::{Result, check_range};
 use crate::options::Options;
 
 /// The signal that is left after each training step.
@@ -30,7 +30,7 @@ impl NoiseSchedule {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for fewer than 2 or more than 100,000 steps, for a first or last β
+    /// [`Error::OutOfRange`](wake_nn::Error::OutOfRange) for fewer than 2 or more than 100,000 steps, for a first or last β
     /// outside [1e-8, 0.9999], or for a β given one by one outside [0, 1] (excluding 0 first).
     pub fn new(curve: &BetaCurve, steps: usize, terminal: TerminalSnr) -> Result<Self> {
         check_range("num_train_timesteps", steps as f64, 2.0, 1e5)?;
@@ -76,7 +76,7 @@ impl NoiseSchedule {
     /// # Panics
     ///
     /// When there are not that many steps.
-    pub(crate) fn alpha_cumprod(&self, t: usize) -> f64 {
+    pub fn alpha_cumprod(&self, t: usize) -> f64 {
         f64::from(self.alphas_cumprod[t])
     }
 

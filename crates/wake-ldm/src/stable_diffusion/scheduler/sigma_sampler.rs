@@ -7,7 +7,7 @@ use super::prediction::{Clipping, Prediction};
 use super::sigmas::{SigmaOptions, SigmaPath};
 use super::spacing::Steps;
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// One way to move along the slope.

@@ -2,7 +2,7 @@
 
 use super::spacing::{Spacing, Steps, linspace};
 use super::{NoiseLevel, NoiseSchedule};
-use crate::error::{Error, Result};
+use wake_nn::{Error, Result};
 use crate::options::Options;
 
 /// How noise levels are spread.

@@ -1,6 +1,6 @@
 //! Which training steps a sampler visits.
 
-use crate::error::{Error, Result, check_range};
+use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
 
 /// How the visited steps are spread over the training steps.

@@ -11,7 +11,7 @@ use super::sigmas::{SigmaOptions, Spread, take_final_zero};
 use super::spacing::Steps;
 use super::unipc_weights::{moments, solve};
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
-use crate::error::Result;
+use wake_nn::Result;
 use crate::options::Options;
 
 /// Options of [`UniPc`].

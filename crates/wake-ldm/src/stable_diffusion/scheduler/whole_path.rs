@@ -2,7 +2,7 @@
 
 use super::prediction::Prediction;
 use super::{NoiseLevel, NoiseSchedule};
-use crate::error::{Error, Result};
+use wake_nn::{Error, Result};
 
 /// The training steps that such a method asks the model at.
 #[derive(Debug)]

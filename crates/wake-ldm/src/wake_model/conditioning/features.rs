@@ -72,7 +72,7 @@ const NUMBERS: usize = 16;
 const DIRECTIONS: usize = 3;
 
 /// Length of [`features`].
-pub(crate) const FEATURES: usize =
+pub const FEATURES: usize =
     FLAGS + NUMBERS * (2 + 2 * WAVES_PER_NUMBER) + DIRECTIONS * (1 + 2 * HARMONICS);
 
 /// The numbers of a scene as a vector; what the scene has not is 0.
@@ -85,7 +85,7 @@ pub(crate) const FEATURES: usize =
 /// Of the ship, if it is the only one: speed, place, log₁₀ of its length, heading; of the sea: wind, log₁₀ of fetch and
 /// depth, swell; of the radar: incidence, frequency, R/V, resolutions, noise floor; the pixel. Values beyond a range repeat
 /// those within for the shorter waves. Gusts, slicks and echoes are in the expected image.
-pub(crate) fn features(scene: &Scene) -> Vec<f32> {
+pub fn features(scene: &Scene) -> Vec<f32> {
     let (sea, radar, spacing) = (&scene.sea, &scene.radar, scene.grid.spacing);
     let mut out = Vec::with_capacity(FEATURES);
     let hh = radar.polarization == Polarization::HH;

@@ -17,12 +17,10 @@ mod statement;
 mod vocabulary;
 
 pub use conditions::Conditions;
-pub(crate) use features::{FEATURES, features};
+pub use features::{FEATURES, features};
 pub use position_maps::MapGrid;
-#[cfg(feature = "train")]
-pub(crate) use position_maps::WEDGE;
-pub(crate) use position_maps::{PATCH, PLACES, places};
-pub(crate) use statement::QUANTITIES;
-#[cfg(feature = "train")]
-pub(crate) use statement::statement;
+pub use position_maps::WEDGE;
+pub use position_maps::{PATCH, PLACES, places};
+pub use statement::QUANTITIES;
+pub use statement::statement;
 pub use vocabulary::{Vocabulary, tokens};

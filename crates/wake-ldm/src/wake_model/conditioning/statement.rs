@@ -5,7 +5,7 @@ use super::features::{INCIDENCE, LOG_FETCH, Range, SHIP_SPEED, WIND_SPEED};
 
 /// Quantities that a prompt can state: ship or not, its speed and heading, wind speed and direction, fetch,
 /// incidence.
-pub(crate) const QUANTITIES: usize = 7;
+pub const QUANTITIES: usize = 7;
 
 /// Whether each quantity is stated, and its value.
 ///
@@ -20,7 +20,7 @@ pub(crate) const QUANTITIES: usize = 7;
 ///
 /// `[QUANTITIES, 3]`
 #[cfg(any(test, feature = "train"))]
-pub(crate) fn statement(conditions: &Conditions) -> Vec<f32> {
+pub fn statement(conditions: &Conditions) -> Vec<f32> {
     let number = |value: Option<f64>, range: Range| value.map(|v| [range.scaled(v), 0.0]);
     let direction = |degrees: Option<f64>| {
         degrees.map(|degrees| <[f64; 2]>::from(degrees.to_radians().sin_cos()))
@@ -48,7 +48,7 @@ impl Conditions {
     /// # Panics
     ///
     /// When `statement` has other than `3 · QUANTITIES` numbers.
-    pub(crate) fn of_statement(statement: &[f32]) -> Self {
+    pub fn of_statement(statement: &[f32]) -> Self {
         assert_eq!(statement.len(), 3 * QUANTITIES, "numbers of a statement");
         let value = |quantity: usize| -> Option<[f64; 2]> {
             let [stated, a, b] = [0, 1, 2].map(|i| f64::from(statement[3 * quantity + i]));

@@ -58,7 +58,7 @@ impl Vocabulary {
     }
 
     /// The compact id of one of CLIP's.
-    pub(crate) fn compact(&self, id: u32) -> usize {
+    pub fn compact(&self, id: u32) -> usize {
         self.known.binary_search(&id).map_or(0, |at| at + 1)
     }
 }

@@ -73,13 +73,13 @@ impl WakeModelConfig {
     ///
     /// # Errors
     ///
-    /// [`Error::Json`] with `path` for text that is no such configuration, and what
+    /// [`wake_nn::Error::Json`] with `path` for text that is no such configuration, and what
     /// [`validate`](Self::validate) finds.
     pub fn from_json(text: &str, path: &Path) -> Result<Self> {
-        let config: Self = serde_json::from_str(text).map_err(|source| Error::Json {
+        let config: Self = serde_json::from_str(text).map_err(|source| Error::Model(wake_nn::Error::Json {
             path: path.to_owned(),
             source,
-        })?;
+        }))?;
         config.validate()?;
         Ok(config)
     }
@@ -88,26 +88,26 @@ impl WakeModelConfig {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] if it cannot be read, else as [`from_json`](Self::from_json).
+    /// [`wake_nn::Error::Io`] if it cannot be read, else as [`from_json`](Self::from_json).
     pub fn read(path: &Path) -> Result<Self> {
-        Self::from_json(&crate::files::read_text(path)?, path)
+        Self::from_json(&whole_files::read_text(path)?, path)
     }
 
     /// Checks that a model of this shape can be built.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] or [`Error::InvalidOption`] with the option at fault.
+    /// [`wake_nn::Error::OutOfRange`] or [`wake_nn::Error::InvalidOption`] with the option at fault.
     pub fn validate(&self) -> Result<()> {
         check_range("image_size", self.image_size as f64, 32.0, 4096.0)?;
         if !self.image_size.is_multiple_of(32)
             || !self.latent_size().is_multiple_of(self.fold.max(1))
         {
-            return Err(Error::InvalidOption {
+            return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "image_size".to_owned(),
                 value: self.image_size.to_string(),
                 expected: "a multiple of 32 and of 8 fold".to_owned(),
-            });
+            }));
         }
         self.grey.validate()?;
         check_range("fold", self.fold as f64, 1.0, 4.0)?;
@@ -118,11 +118,11 @@ impl WakeModelConfig {
         check_range("prior_width", self.prior_width as f64, 1.0, 4096.0)?;
         check_range("vocabulary", self.vocabulary.len() as f64, 1.0, 65536.0)?;
         if !self.text_width.is_multiple_of(2) {
-            return Err(Error::InvalidOption {
+            return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "text_width".to_owned(),
                 value: self.text_width.to_string(),
                 expected: "an even number".to_owned(),
-            });
+            }));
         }
         self.unet().validate()
     }
@@ -141,17 +141,17 @@ impl WakeModelConfig {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for other numbers of pixels, or with the first value that no training image had, named as in
+    /// [`wake_nn::Error::InvalidOption`] for other numbers of pixels, or with the first value that no training image had, named as in
     /// a scene file.
     pub fn check_scene(&self, scene: &Scene) -> Result<()> {
         let (grid, size) = (&scene.grid, self.image_size);
         if [grid.rows, grid.columns] != [size, size] {
             let [rows, columns] = [grid.rows, grid.columns];
-            return Err(Error::InvalidOption {
+            return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "grid".to_owned(),
                 value: format!("{rows} × {columns} pixels of {} m", grid.spacing),
                 expected: format!("{size} × {size} pixels, as the model draws them"),
-            });
+            }));
         }
         self.domain.check(scene)
     }

@@ -49,7 +49,7 @@ impl Domain {
     ///
     /// # Errors
     ///
-    /// [`Error::Json`] for a scene that cannot be written.
+    /// [`wake_nn::Error::Json`] for a scene that cannot be written.
     pub fn of<'a>(scenes: impl IntoIterator<Item = &'a Scene>) -> Result<Self> {
         let mut domain = Self::default();
         for scene in scenes {
@@ -64,7 +64,7 @@ impl Domain {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] with the first one that was not, named as in a scene file.
+    /// [`wake_nn::Error::InvalidOption`] with the first one that was not, named as in a scene file.
     pub fn check(&self, scene: &Scene) -> Result<()> {
         if self.0.is_empty() {
             return Ok(());
@@ -72,11 +72,11 @@ impl Domain {
         for (option, value) in leaves(scene)? {
             let seen = self.0.get(&option).cloned().unwrap_or_default();
             if !seen.holds(&value) {
-                return Err(Error::InvalidOption {
+                return Err(Error::Model(wake_nn::Error::InvalidOption {
                     option,
                     value: value.to_string(),
                     expected: format!("{seen}, as in the images that the model was trained with"),
-                });
+                }));
             }
         }
         Ok(())
@@ -129,10 +129,10 @@ impl std::fmt::Display for Seen {
 
 /// All values of a scene by their keys; those of every ship under the same ones. An infinite depth is a word.
 fn leaves(scene: &Scene) -> Result<Vec<(String, Value)>> {
-    let json = |source| Error::Json {
+    let json = |source| Error::Model(wake_nn::Error::Json {
         path: "scene".into(),
         source,
-    };
+    });
     let mut shared = scene.clone();
     let ships = std::mem::take(&mut shared.ships);
     let mut found = vec![(SHIPS.to_owned(), Value::from(ships.len()))];

@@ -6,10 +6,10 @@ use burn::tensor::{DType, Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::known::Known;
-use crate::nn::activation::silu;
-use crate::nn::cast_to;
-use crate::nn::conv::{conv3x3, convolve};
-use crate::nn::patch::{depth_to_space, space_to_depth};
+use wake_nn::activation::silu;
+use wake_nn::cast_to;
+use wake_nn::conv::{conv3x3, convolve};
+use wake_nn::patch::{depth_to_space, space_to_depth};
 use crate::unet::{UNet, UNetInput};
 use crate::wake_model::conditioning::PLACES;
 

@@ -40,7 +40,7 @@ impl Known {
     ///
     /// - `cells`: which, for each scene
     /// - `wake`: at these pixels, `[batch, channels, rows, columns]`
-    pub(crate) fn of_cells(
+    pub fn of_cells(
         scenes: &[Scene],
         cells: &[Vec<usize>],
         wake: Tensor<4>,
@@ -101,7 +101,7 @@ impl Foreseen {
 }
 
 /// Change of the grey by the relative intensity where an image has its mean grey.
-pub(crate) fn slope_of(grey: &[f32], scale: &GreyScale) -> f64 {
+pub fn slope_of(grey: &[f32], scale: &GreyScale) -> f64 {
     let mean = grey.iter().map(|&g| f64::from(g)).sum::<f64>() / grey.len().max(1) as f64;
     scale.slope(scale.sigma0(mean))
 }
@@ -140,12 +140,12 @@ fn is_drawn(scene: &Scene) -> bool {
 /// # Errors
 ///
 /// As [`expected_grey`].
-pub(crate) fn expected_greys(scenes: &[Scene], scale: &GreyScale) -> Result<Vec<Vec<f32>>> {
+pub fn expected_greys(scenes: &[Scene], scale: &GreyScale) -> Result<Vec<Vec<f32>>> {
     runs_of_equals(scenes, |scene| expected_grey(scene, scale))
 }
 
 /// An image of each scene, all of one size, `[scenes, 1, rows, columns]` on the device of `patches`.
-pub(crate) fn images_of(
+pub fn images_of(
     scenes: &[Scene],
     images: &[Vec<f32>],
     patches: &PatchTransform,

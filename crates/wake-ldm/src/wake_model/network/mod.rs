@@ -16,12 +16,11 @@ pub use config::WakeModelConfig;
 pub use domain::Domain;
 pub use flow::{Flow, Prepared};
 pub use known::{Foreseen, Known, expected_grey};
-pub(crate) use known::{expected_greys, images_of, slope_of};
+pub use known::{expected_greys, images_of, slope_of};
 pub use model::WakeModel;
 pub use patches::{PatchTransform, Shares};
 pub use prior::{Expected, Prior};
 pub use prompt_parser::PromptParser;
-#[cfg(feature = "train")]
-pub(crate) use prompt_parser::windows;
-pub(crate) use sea::SeaFields;
-pub(crate) use windows::ChannelWindows;
+pub use prompt_parser::windows;
+pub use sea::SeaFields;
+pub use windows::ChannelWindows;

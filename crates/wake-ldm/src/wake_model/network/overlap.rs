@@ -4,8 +4,8 @@ use std::f64::consts::{PI, SQRT_2};
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::nn::cast_to;
-use crate::nn::patch::{depth_to_space, space_to_depth};
+use wake_nn::cast_to;
+use wake_nn::patch::{depth_to_space, space_to_depth};
 use crate::wake_model::conditioning::PATCH;
 
 /// Pixels on each side of a border that are filtered.
@@ -103,7 +103,7 @@ fn across_a_border() -> [[f64; PATCH]; PATCH] {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
-    use crate::noise::NoiseSource;
+    use wake_nn::noise::NoiseSource;
     use burn::tensor::Device;
 
     fn image(rows: usize, columns: usize) -> Tensor<4> {

@@ -4,7 +4,7 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::overlap::{self, PIXELS, REACH};
-use crate::nn::patch::{depth_to_space, space_to_depth};
+use wake_nn::patch::{depth_to_space, space_to_depth};
 use crate::wake_model::conditioning::PATCH;
 
 /// Rows and columns of pixels that one square of latents reaches.
@@ -106,7 +106,7 @@ impl PatchTransform {
     }
 
     /// What each channel weighs the pixels of a square and of half its neighbours with, `[channels, 16 × 16]` in rows.
-    pub(crate) fn windows(&self) -> Vec<f32> {
+    pub fn windows(&self) -> Vec<f32> {
         let analysis = self.analysis.val();
         let [channels, _] = analysis.dims();
         let square = analysis.reshape([channels, PIXELS, 1, 1]);
@@ -237,7 +237,7 @@ fn rotate(a: &mut [Vec<f64>], vectors: &mut [Vec<f64>], p: usize, q: usize) {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
-    use crate::noise::NoiseSource;
+    use wake_nn::noise::NoiseSource;
     use wake_physics::Field;
     use wake_physics::measure::seams;
 

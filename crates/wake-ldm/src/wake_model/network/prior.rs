@@ -7,9 +7,9 @@ use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::known::Known;
-use crate::nn::activation::silu;
-use crate::nn::cast_to;
-use crate::nn::conv::{conv1x1, convolve};
+use wake_nn::activation::silu;
+use wake_nn::cast_to;
+use wake_nn::conv::{conv1x1, convolve};
 use crate::wake_model::conditioning::{FEATURES, PLACES};
 
 /// Largest |c|.

@@ -6,8 +6,8 @@ use burn::tensor::activation::gelu;
 use burn::tensor::{DType, Device, Int, Tensor, TensorData};
 
 use super::config::WakeModelConfig;
-use crate::nn::attention::CrossAttention;
-use crate::nn::cast_to;
+use wake_nn::attention::CrossAttention;
+use wake_nn::cast_to;
 use crate::wake_model::conditioning::{QUANTITIES, Vocabulary};
 
 /// Tokens on each side that a token sees at once.
@@ -66,7 +66,7 @@ impl PromptParser {
     /// # Shapes
     ///
     /// `windows`: as [`windows`] gives them; result `[batch, 3 · QUANTITIES]`.
-    pub(crate) fn forward(&self, windows: Tensor<2, Int>, tokens: usize) -> Tensor<2> {
+    pub fn forward(&self, windows: Tensor<2, Int>, tokens: usize) -> Tensor<2> {
         let batch = windows.dims()[0] / tokens;
         let seen = self.embedding.forward(windows);
         let [_, _, width] = seen.dims();
@@ -84,7 +84,7 @@ impl PromptParser {
 /// # Shapes
 ///
 /// `prompts`: CLIP's ids, each of the same number of tokens; result `[prompts · tokens, 13]` and that number.
-pub(crate) fn windows(
+pub fn windows(
     prompts: &[Vec<u32>],
     vocabulary: &Vocabulary,
     device: &Device,

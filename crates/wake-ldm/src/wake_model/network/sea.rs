@@ -8,7 +8,8 @@ use super::known::{images_of, runs_of_equals};
 use super::patches::PatchTransform;
 use super::windows::ChannelWindows;
 use crate::error::Result;
-use crate::noise::{INITIAL_STREAM, NoiseSource, WHITE_STREAM, normal_batch};
+use wake_nn::noise::{NoiseSource, normal_batch};
+use crate::streams::{INITIAL_STREAM, WHITE_STREAM};
 
 /// Share of the noise that is white in every channel: what the image has beyond the first order needs some to start from.
 const WHITE: f64 = 0.05;
@@ -63,7 +64,7 @@ impl SeaNoise {
 }
 
 /// Seas of some scenes, each from its own source, before they are encoded.
-pub(crate) struct SeaFields {
+pub struct SeaFields {
     seas: Vec<SeaNoise>,
     fields: Vec<Vec<f32>>,
 }
@@ -74,7 +75,7 @@ impl SeaFields {
     /// # Errors
     ///
     /// As [`SeaNoise::new`].
-    pub(crate) fn new(
+    pub fn new(
         scenes: &[Scene],
         sources: &[NoiseSource],
         channels: &ChannelWindows,
@@ -88,7 +89,7 @@ impl SeaFields {
     /// What [`Foreseen::log_deviations`](super::Foreseen::log_deviations) is of each scene, one after the other.
     ///
     /// - `slopes`: change of the grey by the relative intensity, of each scene
-    pub(crate) fn log_deviations(&self, channels: &ChannelWindows, slopes: &[f64]) -> Vec<f32> {
+    pub fn log_deviations(&self, channels: &ChannelWindows, slopes: &[f64]) -> Vec<f32> {
         let scenes = self.seas.iter().zip(slopes);
         scenes
             .flat_map(|(sea, &slope)| channels.of_variances(&sea.variances, slope))
@@ -100,7 +101,7 @@ impl SeaFields {
     /// # Shapes
     ///
     /// `[scenes, channels, rows / 8, columns / 8]`, on the device of `patches`
-    pub(crate) fn noise(
+    pub fn noise(
         self,
         scenes: &[Scene],
         sources: &[NoiseSource],

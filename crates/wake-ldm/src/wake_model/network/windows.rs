@@ -17,14 +17,14 @@ const LEAST_GREY: f64 = 1e-3;
 
 /// What the channels of latents weigh pixels with, as far as their variance asks for it.
 #[derive(Debug, Clone)]
-pub(crate) struct ChannelWindows {
+pub struct ChannelWindows {
     /// Sums of w(p) w(p + d) over all pixels p of a window, by the distance d in rows and columns; of each channel.
     correlations: Vec<Vec<f64>>,
 }
 
 impl ChannelWindows {
     /// Those of a transform.
-    pub(crate) fn new(patches: &PatchTransform) -> Self {
+    pub fn new(patches: &PatchTransform) -> Self {
         let windows = patches.windows();
         let correlation = |window: &[f32]| {
             let mut sums = vec![0.0; LAGS * LAGS];

@@ -41,7 +41,7 @@ pub struct WakeImage {
 }
 
 /// An intensity times the speckle of its scene's radar.
-pub(crate) fn speckled(intensity: &Field, scene: &Scene) -> Result<Field> {
+pub fn speckled(intensity: &Field, scene: &Scene) -> Result<Field> {
     let mut speckled = unit_speckle(scene)?;
     let pixels = speckled.values.iter_mut().zip(&intensity.values);
     pixels.for_each(|(speckle, value)| *speckle *= value);

@@ -15,8 +15,8 @@ use wake_physics::{Field, Scene, labels_of};
 use wake_text::{Reading, Wording};
 
 use crate::error::{Error, Result, check_range};
-use crate::nn::check_finite;
-use crate::noise::NoiseSource;
+use wake_nn::check_finite;
+use wake_nn::noise::NoiseSource;
 #[cfg(feature = "flex")]
 use crate::self_check::check_once;
 use crate::wake_model::conditioning::{Conditions, Vocabulary};
@@ -25,8 +25,7 @@ use crate::wake_model::network::{
     images_of, slope_of,
 };
 use crate::wake_model::sea_texture::SeaTexture;
-#[cfg(feature = "train")]
-pub(crate) use image::speckled;
+pub use image::speckled;
 pub use image::{SampleSeconds, WakeImage};
 
 /// Steps from noise to image, unless others are asked for.
@@ -73,11 +72,11 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// As [`WakeModelConfig::validate`]; [`Error::WrongNumbers`] for a device that is no CPU and fails
+    /// As [`WakeModelConfig::validate`]; [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
     /// [`self_check`](crate::self_check).
     pub fn new(model: WakeModel, config: WakeModelConfig) -> Result<Self> {
         config.validate()?;
-        #[cfg(feature = "train")]
+        #[cfg(feature = "autodiff")]
         let model = model.valid();
         let device = model.devices().into_iter().next().unwrap_or_default();
         #[cfg(feature = "flex")]
@@ -98,7 +97,7 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] for another number.
+    /// [`wake_nn::Error::OutOfRange`] for another number.
     pub fn with_steps(self, steps: usize) -> Result<Self> {
         check_range("steps", steps as f64, 1.0, 1000.0)?;
         Ok(Self { steps, ..self })
@@ -156,7 +155,7 @@ impl WakeSampler {
     ///
     /// [`Error::NothingStated`] for a prompt that states nothing of a scene, [`Error::Text`] for one whose numbers
     /// contradict each other or are out of range, [`Error::Scene`] for a scene that physics refuses,
-    /// [`Error::NotFinite`] for a model whose numbers overflow.
+    /// [`wake_nn::Error::NotFinite`] for a model whose numbers overflow.
     pub fn sample(&self, prompt: &str, seed: u64) -> Result<WakeImage> {
         let mut images = self.sample_many(&[prompt], seed)?;
         Ok(images.swap_remove(0))
@@ -169,7 +168,7 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// As [`sample`](Self::sample), and [`Error::InvalidOption`] for no prompt.
+    /// As [`sample`](Self::sample), and [`wake_nn::Error::InvalidOption`] for no prompt.
     pub fn sample_many(&self, prompts: &[&str], seed: u64) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
         let input = |(k, prompt): (u64, &&str)| -> Result<Input> {
@@ -213,8 +212,8 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for no scene, or one that the model was not trained for, see
-    /// [`WakeModelConfig::check_scene`]; [`Error::Text`] for one that is not valid; [`Error::NotFinite`] for a model
+    /// [`wake_nn::Error::InvalidOption`] for no scene, or one that the model was not trained for, see
+    /// [`WakeModelConfig::check_scene`]; [`Error::Text`] for one that is not valid; [`wake_nn::Error::NotFinite`] for a model
     /// whose numbers overflow.
     pub fn sample_batch(&self, scenes: &[Scene]) -> Result<(Tensor<4>, Vec<Labels>)> {
         let drawn = self.run(&self.inputs(scenes)?, Instant::now())?;
@@ -239,11 +238,11 @@ impl WakeSampler {
     /// From noise to grey, all images at once.
     fn run(&self, inputs: &[Input], begin: Instant) -> Result<Drawn> {
         if inputs.is_empty() {
-            return Err(Error::InvalidOption {
+            return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "images".to_owned(),
                 value: "0".to_owned(),
                 expected: "at least one prompt or scene".to_owned(),
-            });
+            }));
         }
         let mut seconds = SampleSeconds::default();
         let mut last = begin;

@@ -7,7 +7,7 @@ use burn::tensor::Device;
 use super::WakeSampler;
 use crate::error::Result;
 use crate::wake_model::network::{WakeModel, WakeModelConfig};
-use crate::weights::{Layout, load, load_bytes};
+use wake_nn::weights::{Layout, load, load_bytes};
 
 /// Files of a small model.
 const CONFIG: &str = "config.json";
@@ -51,7 +51,7 @@ impl WakeSampler {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`](crate::Error::Io), [`Error::Json`](crate::Error::Json) or what
+    /// [`wake_nn::Error::Io`], [`wake_nn::Error::Json`] or what
     /// [`load`] finds for files that are not there or do not fit.
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
         let file = folder.join(CONFIG);

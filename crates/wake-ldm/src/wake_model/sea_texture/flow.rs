@@ -6,14 +6,14 @@ use burn::tensor::{DType, Device, Tensor};
 use serde_json::{Value, json};
 
 use super::style::FEATURES;
-use crate::nn::activation::silu;
-use crate::nn::cast_to;
-use crate::nn::conv::{conv3x3, convolve};
-use crate::nn::norm::GroupNorm;
-use crate::nn::patch::{depth_to_space, space_to_depth};
-use crate::nn::resample::{Downsample, Upsample};
-use crate::nn::resnet::{ResnetBlock, ResnetShape};
-use crate::nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
+use wake_nn::activation::silu;
+use wake_nn::cast_to;
+use wake_nn::conv::{conv3x3, convolve};
+use wake_nn::norm::GroupNorm;
+use wake_nn::patch::{depth_to_space, space_to_depth};
+use wake_nn::resample::{Downsample, Upsample};
+use wake_nn::resnet::{ResnetBlock, ResnetShape};
+use wake_nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
 
 /// Side of the squares of pixels that are one pixel of many channels to the network.
 const FOLD: usize = 4;
@@ -101,7 +101,7 @@ impl SeaFlow {
     /// # Shapes
     ///
     /// `x` and result: `[batch, 1, rows, columns]`, multiples of 8; `sigma`: 0 to 1, `[batch]`.
-    pub(crate) fn velocity(
+    pub fn velocity(
         &self,
         x: Tensor<4>,
         sigma: Tensor<1>,

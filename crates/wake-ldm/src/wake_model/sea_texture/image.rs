@@ -20,16 +20,16 @@ impl SeaImage {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for a mask of another size.
+    /// [`wake_nn::Error::InvalidOption`] for a mask of another size.
     pub fn new(amplitude: Field, mask: Option<Field>) -> Result<Self> {
         if let Some(mask) = &mask
             && [mask.rows, mask.columns] != [amplitude.rows, amplitude.columns]
         {
-            return Err(Error::InvalidOption {
+            return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "mask".to_owned(),
                 value: format!("{} x {} pixels", mask.rows, mask.columns),
                 expected: format!("{} x {}, as its image", amplitude.rows, amplitude.columns),
-            });
+            }));
         }
         Ok(Self {
             amplitude,
@@ -80,7 +80,7 @@ fn cut(field: &Field, [top, left]: [usize; 2]) -> Option<Field> {
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
-    use crate::noise::NoiseSource;
+    use wake_nn::noise::NoiseSource;
 
     /// White noise of mean 100 and spread 10.
     fn rough(rows: usize, columns: usize) -> Field {

@@ -13,6 +13,5 @@ mod texture;
 pub use flow::SeaFlow;
 pub use image::{PATCH, SeaImage};
 pub use style::SeaStyle;
-#[cfg(feature = "train")]
-pub(crate) use style::median;
+pub use style::median;
 pub use texture::SeaTexture;

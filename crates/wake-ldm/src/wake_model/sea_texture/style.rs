@@ -5,7 +5,8 @@ use wake_physics::correlated::{CorrelatedNoise, Correlation};
 use wake_physics::measure::{Texture, texture};
 
 use crate::error::{Error, Result, check_range};
-use crate::noise::{NoiseSource, SEA_TEXTURE_STREAM};
+use wake_nn::noise::NoiseSource;
+use crate::streams::SEA_TEXTURE_STREAM;
 
 /// Largest distance of pixels whose correlation a style keeps.
 pub(super) const LAGS: usize = 32;
@@ -16,7 +17,7 @@ const MOST_SKEWED: f64 = 1.0;
 /// Means of blocks of 32 pixels of a sea vary by less: chosen, above the gusts of real images and below most coasts.
 const MOST_VARIED: f64 = 0.2;
 /// Numbers that the flow is told of a style.
-pub(crate) const FEATURES: usize = 8;
+pub const FEATURES: usize = 8;
 /// Numbers of a style in a file: those and the mean.
 pub(super) const NUMBERS: usize = FEATURES + 1;
 /// Names and ranges of the numbers of a style in a file.
@@ -75,7 +76,7 @@ impl SeaStyle {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] with the first number that no sea has.
+    /// [`wake_nn::Error::OutOfRange`] with the first number that no sea has.
     pub(super) fn new(numbers: [f32; NUMBERS], correlation: Correlation) -> Result<Self> {
         for (number, (name, min, max)) in numbers.iter().zip(RANGES) {
             check_range(name, f64::from(*number), min, max)?;
@@ -90,14 +91,14 @@ impl SeaStyle {
     ///
     /// # Errors
     ///
-    /// As [`new`](Self::new), and [`Error::InvalidOption`] for what is no correlation.
+    /// As [`new`](Self::new), and [`wake_nn::Error::InvalidOption`] for what is no correlation.
     pub(super) fn of_rows(numbers: &[f32], correlation: &[f32]) -> Result<Self> {
         let Some(correlation) = Correlation::new(LAGS, correlation.to_vec()) else {
-            return Err(Error::InvalidOption {
+            return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "correlation".to_owned(),
                 value: "beyond -1 to 1, or not 1 of a pixel with itself".to_owned(),
                 expected: "what `train -- sea` writes".to_owned(),
-            });
+            }));
         };
         let numbers = std::array::from_fn(|n| numbers.get(n).copied().unwrap_or(f32::NAN));
         Self::new(numbers, correlation)
@@ -124,7 +125,7 @@ impl SeaStyle {
     }
 
     /// What the flow is told: every number near 0, of order 1.
-    pub(crate) fn features(&self) -> [f32; FEATURES] {
+    pub fn features(&self) -> [f32; FEATURES] {
         let [_, spread, skewness, ref rest @ ..] = self.numbers;
         let [along @ .., fine, coarse] = rest;
         // Logarithms of what is positive; the smallest block variation that 8 bits of grey show is some 1e-3.
@@ -155,7 +156,7 @@ fn numbers(mean: f64, spread: f64, texture: &Texture) -> [f32; NUMBERS] {
 }
 
 /// The middle value; 0 of no pixel.
-pub(crate) fn median(field: &Field) -> f32 {
+pub fn median(field: &Field) -> f32 {
     let mut sorted = field.values.clone();
     let middle = sorted.len() / 2;
     match sorted.is_empty() {

@@ -6,12 +6,12 @@ use wake_physics::kelvin::half_angle;
 use wake_physics::scene::{Grid, Ship};
 
 /// Side of the squares of pixels that become one latent pixel.
-pub(crate) const PATCH: usize = 8;
+pub const PATCH: usize = 8;
 /// Maps at the size of the latents.
-pub(crate) const PLACES: usize = 8;
+pub const PLACES: usize = 8;
 /// Which of them says whether a place is in the wedge.
 #[cfg(any(test, feature = "train"))]
-pub(crate) const WEDGE: usize = 5;
+pub const WEDGE: usize = 5;
 /// Half-width of the band behind the stern \[m\], on pixels of 4 m as all lengths here.
 const BAND: f64 = 40.0;
 
@@ -50,7 +50,7 @@ struct Frame {
 /// # References
 ///
 /// Kelvin (1887), "On Ship Waves": the wedge.
-pub(crate) fn places(scene: &Scene, cells: &[usize]) -> Vec<f32> {
+pub fn places(scene: &Scene, cells: &[usize]) -> Vec<f32> {
     let mut maps = vec![0.0; PLACES * cells.len()];
     let grid = MapGrid::of(&scene.grid);
     let frames = scene.ships.iter().filter_map(|ship| Frame::of(ship, scene));

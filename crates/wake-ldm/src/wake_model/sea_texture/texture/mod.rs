@@ -10,9 +10,10 @@ use wake_physics::{Field, Scene, available_memory, expected_intensity};
 use super::flow::{MULTIPLE, SeaFlow};
 use super::style::{LAGS, NUMBERS, SeaStyle};
 use crate::error::{Error, Result, check_range};
-use crate::noise::{NoiseSource, uniform};
-use crate::weights::files::WeightFiles;
-use crate::weights::{Layout, Precision, load, save_noted};
+use wake_nn::noise::NoiseSource;
+use crate::streams;
+use wake_nn::weights::files::WeightFiles;
+use wake_nn::weights::{Layout, Precision, load, save_noted};
 
 /// Styles of a learnt sea.
 const STYLES: usize = 64;
@@ -55,19 +56,19 @@ impl SeaTexture {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for no style, [`Error::OutOfRange`] for a pixel below 0.1 or above 1000 m.
+    /// [`wake_nn::Error::InvalidOption`] for no style, [`wake_nn::Error::OutOfRange`] for a pixel below 0.1 or above 1000 m.
     pub fn new(flow: SeaFlow, styles: &[SeaStyle], spacing: Option<f64>) -> Result<Self> {
         if let Some(spacing) = spacing {
             check_range("spacing", spacing, 0.1, 1000.0)?;
         }
         if styles.is_empty() {
-            return Err(Error::InvalidOption {
+            return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "styles".to_owned(),
                 value: "an empty list".to_owned(),
                 expected: "the style of at least one patch of open sea".to_owned(),
-            });
+            }));
         }
-        #[cfg(feature = "train")]
+        #[cfg(feature = "autodiff")]
         let flow = flow.valid();
         // Spread over all of them, and again from the first where they are fewer.
         let at = |n: usize| match styles.len() {
@@ -85,7 +86,7 @@ impl SeaTexture {
     ///
     /// # Errors
     ///
-    /// As [`load`] for a file that is not there, broken or of another model; [`Error::InvalidOption`] with the
+    /// As [`load`] for a file that is not there, broken or of another model; [`wake_nn::Error::InvalidOption`] with the
     /// number for a style or a pixel that no sea has.
     pub fn load(path: &Path, device: &Device) -> Result<Self> {
         let empty = Stored {
@@ -102,11 +103,11 @@ impl SeaTexture {
         let correlations: Vec<f32> = correlations.iter::<f32>().collect();
         let rows = numbers.chunks(NUMBERS);
         let rows = rows.zip(correlations.chunks((LAGS + 1) * (2 * LAGS + 1)));
-        let broken = |what: String| Error::InvalidOption {
+        let broken = |what: String| Error::Model(wake_nn::Error::InvalidOption {
             option: path.display().to_string(),
             value: format!("no learnt sea: {what}"),
             expected: "a file that `train -- sea` wrote".to_owned(),
-        };
+        });
         let style = |(n, (numbers, correlation)): (usize, (&[f32], &[f32]))| {
             SeaStyle::of_rows(numbers, correlation).map_err(|e| broken(format!("style {n}: {e}")))
         };
@@ -121,7 +122,7 @@ impl SeaTexture {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] when it cannot be written.
+    /// [`wake_nn::Error::Io`] when it cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let device = self.flow.devices().into_iter().next().unwrap_or_default();
         let numbers: Vec<f32> = self.styles.iter().flat_map(|s| *s.numbers()).collect();
@@ -153,18 +154,18 @@ impl SeaTexture {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidOption`] for others.
+    /// [`wake_nn::Error::InvalidOption`] for others.
     pub fn check_spacing(&self, spacing: f64) -> Result<()> {
         match self.spacing {
             Some(learnt) if (spacing / learnt).max(learnt / spacing) > LARGEST_RATIO => {
-                Err(Error::InvalidOption {
+                Err(Error::Model(wake_nn::Error::InvalidOption {
                     option: "grid.spacing".to_owned(),
                     value: format!("{spacing} m"),
                     expected: format!(
                         "{learnt} m, the pixels of the learnt sea, to a quarter; learn from images of such pixels, or \
                          without telling their size"
                     ),
-                })
+                }))
             }
             _ => Ok(()),
         }
@@ -176,10 +177,10 @@ impl SeaTexture {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`] for no rows or columns, [`Error::InvalidOption`] for an image that does not fit in memory,
-    /// [`Error::NotFinite`] for weights whose numbers overflow.
+    /// [`wake_nn::Error::OutOfRange`] for no rows or columns, [`wake_nn::Error::InvalidOption`] for an image that does not fit in memory,
+    /// [`wake_nn::Error::NotFinite`] for weights whose numbers overflow.
     pub fn sample(&self, seed: u64, rows: usize, columns: usize) -> Result<Field> {
-        let draw = NoiseSource::new(seed).uniform(uniform::STYLES, 0);
+        let draw = NoiseSource::new(seed).uniform(streams::STYLES, 0);
         let style = &self.styles[(draw * STYLES as f64) as usize];
         let mut sea = self.amplitude(style, seed, rows, columns)?;
         sea.values.iter_mut().for_each(|a| *a *= *a);
@@ -230,9 +231,9 @@ impl SeaTexture {
                 columns,
                 values,
             }),
-            false => Err(Error::NotFinite {
+            false => Err(Error::Model(wake_nn::Error::NotFinite {
                 what: "the learnt sea".to_owned(),
-            }),
+            })),
         }
     }
 
@@ -280,13 +281,13 @@ fn check_size(rows: usize, columns: usize) -> Result<()> {
         None => Ok(()),
         Some(free) => {
             let [needed, free] = [needed, free].map(|bytes| bytes as f64 / (1u64 << 30) as f64);
-            Err(Error::InvalidOption {
+            Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "image".to_owned(),
                 value: format!("{rows} x {columns} pixels, a learnt sea of {needed:.1} GiB"),
                 expected: format!(
                     "no more than the {free:.1} GiB of free memory; draw smaller images"
                 ),
-            })
+            }))
         }
     }
 }

@@ -1,0 +1,427 @@
+//! Scenes whose values are drawn, each on its own, keyed by their path in a scene file.
+
+use super::distribution::{Distribution, Value, choose, refused};
+use crate::error::{Error, Result};
+use wake_nn::noise::NoiseSource;
+use crate::streams;
+use serde::de::Error as _;
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
+use wake_physics::scene::Ship;
+use wake_physics::Scene;
+use whole_files::sentence;
+
+/// Distributions by the path of their value, such as `ship.speed`.
+type Values = BTreeMap<String, Distribution>;
+
+/// What is drawn, and how.
+///
+/// ```toml
+/// count = [0, 5]                                     # ships, each drawn on its own
+/// "ship.length" = { log = [30, 350] }                # beam and draft keep their proportion
+/// "ship.position" = "anywhere"                       # midship in the image
+/// "radar.looks" = [1, 8]
+/// "sea.swell_height" = { one_of = [0, [0.5, 3]], weights = [2, 1] }
+/// together = [                                       # values that belong together, a table in so many
+///     { weight = 2, "radar.sensor" = "sentinel-1-iw", "grid.spacing" = 10 },
+///     { "radar.sensor" = "ers-2-pri", "grid.spacing" = 12.5 },
+/// ]
+/// ```
+///
+/// A key's values depend on seed, index and key alone, not on which other keys there are.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Draws {
+    values: Values,
+    together: Vec<(f64, Values)>,
+}
+
+/// Number of ships.
+const COUNT: &str = "count";
+/// Grey of the sea's median amplitude, and of no amplitude: see [`Draws::quick_look`].
+const GAIN: &str = "quick_look.gain";
+const OFFSET: &str = "quick_look.offset";
+/// Keys that are none of a scene.
+const OWN: [&str; 3] = [COUNT, GAIN, OFFSET];
+const SENSOR: &str = "radar.sensor";
+const POSITION: &str = "ship.position";
+/// The position that is drawn in the image.
+const ANYWHERE: &str = "anywhere";
+/// Keys that cannot be drawn, and why.
+const REFUSED: [(&str, &str); 3] = [
+    ("seed", "no key: every scene has a seed of its own"),
+    (
+        "grid.rows",
+        "no key: the images of a set have one size, scene.grid.rows",
+    ),
+    (
+        "grid.columns",
+        "no key: the images of a set have one size, scene.grid.columns",
+    ),
+];
+
+impl Draws {
+    /// The span of the paper's grid, all directions, one ship size, the ship anywhere, a fifth open sea.
+    pub(super) fn ranges() -> Self {
+        let even = |path: &str, low, high| (path.to_owned(), Distribution::Even([low, high]));
+        let number = |n| Distribution::Fixed(Value::Number(n));
+        let count = Distribution::OneOf {
+            one_of: vec![number(0.0), number(1.0)],
+            weights: Some(vec![1.0, 4.0]),
+        };
+        let fetch = Distribution::Logarithmic { log: [10e3, 70e3] };
+        let anywhere = Distribution::Fixed(Value::Word(ANYWHERE.to_owned()));
+        let values = [
+            (COUNT.to_owned(), count),
+            (POSITION.to_owned(), anywhere),
+            even("ship.speed", 6.0, 12.0),
+            even("ship.heading", 0.0, 360.0),
+            even("sea.wind_speed", 3.0, 7.0),
+            even("sea.wind_toward", 0.0, 360.0),
+            ("sea.fetch".to_owned(), fetch),
+            even("radar.incidence", 16.0, 32.0),
+        ];
+        Self {
+            values: values.into(),
+            together: Vec::new(),
+        }
+    }
+
+    /// These draws with those of a table of a recipe in their place.
+    pub(super) fn with(mut self, table: &toml::Table) -> Result<Self> {
+        for (key, value) in table {
+            if key == "together" {
+                self.together = together(value)?;
+            } else {
+                read(&mut self.values, key, value)?;
+            }
+        }
+        Ok(self)
+    }
+
+    /// What is drawn for scene number `index`: the values of all scenes, and those of one table of `together`.
+    fn chosen(&self, random: NoiseSource, index: u64) -> BTreeMap<&str, &Distribution> {
+        let weight = |i: usize| self.together[i].0;
+        let place = random.uniform(stream("together"), index);
+        let (case, _) = choose(self.together.len(), weight, place);
+        self.case(case)
+    }
+
+    fn case(&self, case: usize) -> BTreeMap<&str, &Distribution> {
+        let values = self.together.get(case).map(|(_, values)| values);
+        let all = self.values.iter().chain(values.into_iter().flatten());
+        all.map(|(path, distribution)| (path.as_str(), distribution))
+            .collect()
+    }
+
+    /// Scene number `index`: `base` with the drawn values in place of its own, not yet rounded.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Recipe`] for values that no scene can have together.
+    pub(super) fn scene(&self, base: &Scene, random: NoiseSource, index: u64) -> Result<Scene> {
+        let chosen = self.chosen(random, index);
+        scene(base, &chosen, |path| random.uniform(stream(path), index))
+    }
+
+    /// Gain and offset of image number `index` as a quick-look, if they are drawn.
+    pub(super) fn quick_look(&self, random: NoiseSource, index: u64) -> Option<[f64; 2]> {
+        let chosen = self.chosen(random, index);
+        let number = |path: &str| match chosen
+            .get(path)?
+            .at(random.uniform(stream(path), index), false)
+        {
+            Value::Number(number) => Some(number),
+            _ => None,
+        };
+        Some([number(GAIN)?, number(OFFSET).unwrap_or(0.0)])
+    }
+
+    /// Checks every range against the scene's own, on `base`, and all of them at both ends together.
+    pub(super) fn validate(&self, base: &Scene) -> Result<()> {
+        for case in 0..self.together.len().max(1) {
+            let chosen = self.case(case);
+            // What all scenes have is looked at once, with the first table of `together`.
+            let own = |path: &str| case == 0 || self.together[case].1.contains_key(path);
+            for (&path, distribution) in chosen.iter().filter(|(path, _)| own(path)) {
+                self.own(path, distribution)?;
+                for value in distribution.extremes() {
+                    let fixed = Distribution::Fixed(value);
+                    let mut alone = BTreeMap::from([(path, &fixed)]);
+                    if let Some(sensor) = chosen.get(SENSOR).filter(|_| path != SENSOR) {
+                        alone.insert(SENSOR, sensor);
+                    }
+                    let one = Distribution::Fixed(Value::Number(1.0));
+                    if path.starts_with("ship.") {
+                        alone.insert(COUNT, &one);
+                    }
+                    scene(base, &alone, |_| 0.0)?.validate()?;
+                }
+            }
+            for end in [0.0, 1.0] {
+                scene(base, &chosen, |_| end)?.validate()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks what is no key of a scene.
+    fn own(&self, path: &str, distribution: &Distribution) -> Result<()> {
+        let [low, high] = match path {
+            GAIN => [1e-3, 1.0],
+            OFFSET => [-1.0, 1.0],
+            COUNT => [0.0, 100.0],
+            _ => return Ok(()),
+        };
+        for value in distribution.extremes() {
+            match value {
+                Value::Number(n)
+                    if (low..=high).contains(&n) && (path != COUNT || n.fract() == 0.0) => {}
+                value => {
+                    let kind = if path == COUNT {
+                        "whole numbers"
+                    } else {
+                        "numbers"
+                    };
+                    return Err(Error::Value(wake_nn::Error::InvalidOption {
+                        option: format!("draw.{path}"),
+                        value: format!("{value:?}"),
+                        expected: format!("{kind} from {low} to {high}"),
+                    }));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads a key, or the keys of a table below it.
+fn read(values: &mut Values, key: &str, value: &toml::Value) -> Result<()> {
+    match value {
+        toml::Value::Table(table) if !Distribution::is(table) && !table.is_empty() => {
+            for (inner, value) in table {
+                read(values, &format!("{key}.{inner}"), value)?;
+            }
+        }
+        _ => {
+            if let Some((_, expected)) = REFUSED.iter().find(|(path, _)| *path == key) {
+                return Err(refused(key, value, expected));
+            }
+            values.insert(key.to_owned(), Distribution::parse(key, value)?);
+        }
+    }
+    Ok(())
+}
+
+/// Reads the tables of `together`.
+fn together(value: &toml::Value) -> Result<Vec<(f64, Values)>> {
+    let expected = "tables of keys with their distributions; weight: a number above 0, 1 if absent";
+    let fail = || refused("together", value, expected);
+    let table = |value: &toml::Value| {
+        let mut table = value.as_table().ok_or_else(fail)?.clone();
+        let weight = table.remove("weight").unwrap_or(1.into());
+        let weight = weight.as_float().or(weight.as_integer().map(|w| w as f64));
+        let weight = weight
+            .filter(|w| w.is_finite() && *w > 0.0)
+            .ok_or_else(fail)?;
+        let mut values = Values::new();
+        for (key, value) in &table {
+            read(&mut values, key, value)?;
+        }
+        Ok((weight, values))
+    };
+    value
+        .as_array()
+        .ok_or_else(fail)?
+        .iter()
+        .map(table)
+        .collect()
+}
+
+/// The stream of random numbers of a key: FNV-1a of its text (Fowler, Noll & Vo), in the upper half of all streams.
+fn stream(path: &str) -> u32 {
+    let step = |hash: u32, byte: u8| (hash ^ u32::from(byte)).wrapping_mul(16_777_619);
+    streams::VALUES | path.bytes().fold(2_166_136_261, step)
+}
+
+/// `base` with values at the places 0…1 of their distributions that `at` says.
+fn scene(
+    base: &Scene,
+    drawn: &BTreeMap<&str, &Distribution>,
+    at: impl Fn(&str) -> f64,
+) -> Result<Scene> {
+    let told = |e: &dyn std::fmt::Display| Error::Recipe {
+        message: sentence(&e.to_string()),
+    };
+    let mut table = toml::Table::try_from(base).map_err(|e| told(&e))?;
+    let ships = table.remove("ship");
+    if drawn.contains_key(SENSOR) {
+        replace_radar(&mut table);
+    }
+    for (path, distribution) in drawn {
+        if !OWN.contains(path) && !path.starts_with("ship.") {
+            let value = distribution.at(at(path), is_whole(path));
+            set(&mut table, path, toml(&value, is_whole(path))).map_err(|e| told(&e))?;
+        }
+    }
+    let sea: Scene = table
+        .clone()
+        .try_into()
+        .map_err(|e: toml::de::Error| told(&e.to_string().trim().replace('\n', ", ")))?;
+    let (first, of_base) = match ships {
+        Some(toml::Value::Array(several)) => (several.first().cloned(), several.len()),
+        one => (one.clone(), usize::from(one.is_some())),
+    };
+    let count = match drawn.get(COUNT).map(|count| count.at(at(COUNT), true)) {
+        Some(Value::Number(count)) => count as usize,
+        _ => of_base,
+    };
+    if count == 0 {
+        return Ok(sea);
+    }
+    let default = || toml::Table::try_from(Ship::default()).map(toml::Value::Table);
+    let own = first.map_or_else(default, Ok).map_err(|e| told(&e))?;
+    let mut ships = Vec::with_capacity(count);
+    for number in 1..=count {
+        let place = |key: &str| at(&format!("ship.{number}.{key}"));
+        let ship = ship(&own, drawn, &sea, place).map_err(|e| told(&e))?;
+        ships.push(ship);
+    }
+    let ships = match ships.len() {
+        1 => ships.swap_remove(0),
+        _ => toml::Value::Array(ships),
+    };
+    table.insert("ship".to_owned(), ships);
+    table
+        .try_into()
+        .map_err(|e: toml::de::Error| told(&e.to_string().trim().replace('\n', ", ")))
+}
+
+/// A ship with the values that are drawn of it.
+fn ship(
+    own: &toml::Value,
+    drawn: &BTreeMap<&str, &Distribution>,
+    sea: &Scene,
+    at: impl Fn(&str) -> f64,
+) -> Result<toml::Value, String> {
+    let mut ship = own.as_table().cloned().unwrap_or_default();
+    for (path, distribution) in drawn {
+        let Some(key) = path.strip_prefix("ship.") else {
+            continue;
+        };
+        let value = distribution.at(at(key), false);
+        match (*path, &value) {
+            (POSITION, Value::Word(word)) if word == ANYWHERE => {
+                let grid = &sea.grid;
+                let x = place(grid.columns, grid.spacing, at("x"));
+                let y = -place(grid.rows, grid.spacing, at("y"));
+                ship.insert("position".to_owned(), vec![x, y].into());
+            }
+            ("ship.length", Value::Number(length)) => with_length(&mut ship, tenths(*length)),
+            _ => set(&mut ship, key, toml(&value, false))?,
+        }
+    }
+    Ok(ship.into())
+}
+
+/// Takes away what a sensor sets: all of the radar but what no sensor sets, and the spacing.
+fn replace_radar(table: &mut toml::Table) {
+    let mut of = |name: &str, keep: &dyn Fn(&str) -> bool| {
+        if let Some(table) = table.get_mut(name).and_then(toml::Value::as_table_mut) {
+            table.retain(|key, _| keep(key));
+        }
+    };
+    of("radar", &|key| key == "relaxation_rate");
+    of("grid", &|key| key != "spacing");
+}
+
+/// Whether a value of a scene is a whole number.
+fn is_whole(path: &str) -> bool {
+    ["radar.looks", "grid.oversampling"].contains(&path)
+}
+
+fn toml(value: &Value, whole: bool) -> toml::Value {
+    match value {
+        Value::Flag(flag) => (*flag).into(),
+        Value::Word(word) => word.as_str().into(),
+        Value::Number(number) if whole => (*number as i64).into(),
+        Value::Number(number) => (*number).into(),
+    }
+}
+
+/// Sets the value at a path of tables.
+fn set(table: &mut toml::Table, path: &str, value: toml::Value) -> Result<(), String> {
+    let (tables, last) = path.rsplit_once('.').unwrap_or(("", path));
+    let mut table = table;
+    for name in tables.split('.').filter(|name| !name.is_empty()) {
+        let entry = table
+            .entry(name.to_owned())
+            .or_insert_with(|| toml::Table::new().into());
+        table = entry
+            .as_table_mut()
+            .ok_or_else(|| format!("draw.{path}: {name} is no table"))?;
+    }
+    table.insert(last.to_owned(), value);
+    Ok(())
+}
+
+fn tenths(value: f64) -> f64 {
+    (10.0 * value).round() / 10.0
+}
+
+/// A coordinate \[m\] between the first pixel's centre and the last one's, in steps of 0.1 m.
+fn place(pixels: usize, spacing: f64, at: f64) -> f64 {
+    let first = -((pixels / 2) as f64);
+    let pixel = first + at * pixels.saturating_sub(1) as f64;
+    tenths(spacing * pixel)
+}
+
+/// Another length; beam and draft keep their proportion to it, in steps of 0.1 mm, so that every reader of JSON gets the
+/// same numbers.
+fn with_length(ship: &mut toml::Table, length: f64) {
+    let number = |ship: &toml::Table, key: &str, default: f64| {
+        ship.get(key)
+            .and_then(toml::Value::as_float)
+            .unwrap_or(default)
+    };
+    let default = Ship::default();
+    let before = number(ship, "length", default.length);
+    for (key, size) in [("beam", default.beam), ("draft", default.draft)] {
+        let scaled = (1e4 * number(ship, key, size) * length / before).round() / 1e4;
+        ship.insert(key.to_owned(), scaled.into());
+    }
+    ship.insert("length".to_owned(), length.into());
+}
+
+impl Serialize for Draws {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Case<'a> {
+            weight: f64,
+            #[serde(flatten)]
+            values: &'a Values,
+        }
+        let mut map = serializer.serialize_map(None)?;
+        for (path, distribution) in &self.values {
+            map.serialize_entry(path, distribution)?;
+        }
+        if !self.together.is_empty() {
+            let cases = self.together.iter();
+            let cases: Vec<Case<'_>> = cases
+                .map(|(weight, values)| Case {
+                    weight: *weight,
+                    values,
+                })
+                .collect();
+            map.serialize_entry("together", &cases)?;
+        }
+        map.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Draws {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let table = toml::Table::deserialize(deserializer)?;
+        Self::default().with(&table).map_err(D::Error::custom)
+    }
+}

@@ -1,0 +1,257 @@
+//! Where the files of a data set lie, and what it says of itself.
+
+use super::recipe::{Draw, Recipe};
+use super::scenes::{PAPER_SCENES, Simulated};
+use super::shuffle::shuffled;
+use crate::error::{Error, Result};
+use wake_nn::check_range;
+use whole_files::read_text;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use wake_physics::Plan;
+use wake_physics::grey::GreyScale;
+
+/// Version of the layout; a reader refuses others.
+const FORMAT: u32 = 4;
+/// Share of the images that are for validation, unless another is asked for.
+const VAL_SHARE: f64 = 0.1;
+/// Scenes that are planned to tell what a set costs.
+const PLANNED: u64 = 8;
+
+/// What a data set is: the content of its `dataset.json`, from which every other file follows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of the layout.
+    pub format: u32,
+    /// Seed of the whole set.
+    pub seed: u64,
+    /// Number of pairs of the whole set.
+    pub count: u64,
+    /// The mapping from σ⁰ to grey, that of the recipe.
+    pub grey: GreyScale,
+    /// Share of the images that are for validation, 0 to 1.
+    pub val_share: f64,
+    /// Which scenes.
+    pub recipe: Recipe,
+    /// [Fingerprint](whole_files::fingerprint) of the file of the learnt sea that the images show, if any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sea: Option<String>,
+    /// Which share of the set this folder holds, if not all: the content of `shard.json`.
+    #[serde(skip)]
+    pub shard: Option<Shard>,
+}
+
+/// Share `number` of `of` equal ones, counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shard {
+    /// Number of the share, 0 up to `of`.
+    pub number: u64,
+    /// How many shares there are.
+    pub of: u64,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let whole = |part: &str| part.trim().parse::<u64>().ok();
+        let parts = text.split_once('/').map(|(i, n)| (whole(i), whole(n)));
+        match parts {
+            Some((Some(number), Some(of))) if number < of => Ok(Self { number, of }),
+            _ => Err("a shard is i/n with i from 0 to n − 1, such as 0/4".to_owned()),
+        }
+    }
+}
+
+impl Manifest {
+    /// The whole set of `count` pairs of a recipe and a seed.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recipe::validate`].
+    pub fn new(recipe: Recipe, seed: u64, count: u64) -> Result<Self> {
+        recipe.validate()?;
+        Ok(Self {
+            format: FORMAT,
+            seed,
+            count,
+            shard: None,
+            grey: recipe.grey,
+            val_share: VAL_SHARE,
+            recipe,
+            sea: None,
+        })
+    }
+
+    /// The same set with another share for validation.
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::OutOfRange`] for a share outside 0 to 1.
+    pub fn with_val_share(self, val_share: f64) -> Result<Self> {
+        check_range("val_share", val_share, 0.0, 1.0)?;
+        Ok(Self { val_share, ..self })
+    }
+
+    /// Whether image `index` is for validation: the share of all, chosen by the seed. The images of one scene of the
+    /// paper's grid, which differ in their seas alone, stay together.
+    pub(super) fn is_val(&self, index: u64) -> bool {
+        let scenes = match self.recipe.draw {
+            Draw::PaperGrid => self.count.min(PAPER_SCENES),
+            Draw::Values(_) => self.count,
+        };
+        let scenes = scenes.max(1);
+        let val = (self.val_share * scenes as f64).round() as u64;
+        shuffled(index % scenes, scenes, self.seed) < val
+    }
+
+    /// The pairs that it makes, without the learnt sea.
+    ///
+    /// # Errors
+    ///
+    /// As [`Simulated::new`].
+    pub fn source(&self) -> Result<Simulated> {
+        Simulated::new(self.recipe.clone(), self.seed)
+    }
+
+    /// What an image of this folder costs, by the plans of its first eight scenes: seconds of a core.
+    ///
+    /// # Errors
+    ///
+    /// As [`Simulated::scene`] and [`Plan::new`].
+    pub fn core_seconds(&self) -> Result<f64> {
+        let (source, indices) = (self.source()?, self.indices());
+        let planned = PLANNED.min(indices.end - indices.start).max(1);
+        let mut seconds = 0.0;
+        for index in indices.start..indices.start + planned {
+            seconds += Plan::new(&source.scene(index)?)?.cost().core_seconds;
+        }
+        Ok(seconds / planned as f64)
+    }
+
+    /// The indices of this folder: all, or one of nearly equal runs of neighbours.
+    pub fn indices(&self) -> Range<u64> {
+        let Some(Shard { number, of }) = self.shard else {
+            return 0..self.count;
+        };
+        let end = |share: u64| (u128::from(self.count) * u128::from(share) / u128::from(of)) as u64;
+        end(number)..end(number + 1)
+    }
+
+    /// The content of `dataset.json`, the same for a set and all its shards.
+    pub(super) fn text(&self) -> Result<String> {
+        let text = serde_json::to_string_pretty(self);
+        let text = text.map_err(|e| cannot("encode", Path::new("dataset.json"), e.into()))?;
+        Ok(text + "\n")
+    }
+
+    /// Reads the manifest of a folder; `None` if it has none.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dataset`] if it is not the manifest of this layout.
+    pub(super) fn read(folder: &Path) -> Result<Option<Self>> {
+        let path = Layout(folder).manifest();
+        let Some(mut manifest) = read_json::<Self>(&path)? else {
+            return Ok(None);
+        };
+        if manifest.format != FORMAT {
+            let message = format!(
+                "format {} is not {FORMAT}; make the set again with this version",
+                manifest.format
+            );
+            return Err(broken(&path, 1, message));
+        }
+        if manifest.grey != manifest.recipe.grey {
+            let message = "grey and recipe.grey differ; a set has one mapping".to_owned();
+            return Err(broken(&path, 1, message));
+        }
+        manifest.shard = read_json(&Layout(folder).shard_note())?;
+        Ok(Some(manifest))
+    }
+}
+
+/// Reads a JSON file; `None` if there is none.
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    match read_text(path) {
+        Ok(text) => serde_json::from_str(&text)
+            .map(Some)
+            .map_err(|e| broken(path, e.line(), e.to_string())),
+        Err(e) if e.source.kind() == ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(e.into()),
+    }
+}
+
+/// Paths of a data set in a folder.
+#[derive(Clone, Copy)]
+pub(super) struct Layout<'a>(pub(super) &'a Path);
+
+impl Layout<'_> {
+    pub(super) fn manifest(self) -> PathBuf {
+        self.0.join("dataset.json")
+    }
+
+    pub(super) fn shard_note(self) -> PathBuf {
+        self.0.join("shard.json")
+    }
+
+    pub(super) fn metadata(self) -> PathBuf {
+        self.0.join("metadata.jsonl")
+    }
+
+    pub(super) fn coco(self) -> PathBuf {
+        self.0.join("coco.json")
+    }
+
+    pub(super) fn yolo(self) -> PathBuf {
+        self.0.join("data.yaml")
+    }
+
+    /// Folders of the images and of their labels: YOLO, YOLO with oriented boxes, DOTA.
+    pub(super) fn folders(self) -> [PathBuf; 4] {
+        ["images", "labels", "labels-obb", "labelTxt"].map(|name| self.0.join(name))
+    }
+
+    /// The lists of images to train with, and to validate with. A name that has `train` or `val` as a word of its own would be
+    /// taken for the whole split by Hugging Face `datasets`, which then finds no image in it.
+    pub(super) fn lists(self) -> [PathBuf; 2] {
+        ["trainset.txt", "valset.txt"].map(|name| self.0.join(name))
+    }
+
+    /// The image of one pair and its labels, as in [`Self::folders`].
+    pub(super) fn files_of(self, index: u64) -> [PathBuf; 4] {
+        let [_, labels @ ..] = self.folders();
+        let [upright, oriented, dota] = labels.map(|folder| folder.join(format!("{index:06}.txt")));
+        [self.0.join(image_name(index)), upright, oriented, dota]
+    }
+
+    pub(super) fn shard(self, shard: Shard) -> PathBuf {
+        self.0.join(format!("shard-{}", shard.number))
+    }
+}
+
+/// `file_name` of a pair.
+pub(super) fn image_name(index: u64) -> String {
+    format!("images/{index:06}.png")
+}
+
+pub(super) fn cannot(action: &'static str, path: &Path, source: std::io::Error) -> Error {
+    Error::Value(wake_nn::Error::Io {
+        action,
+        path: path.to_owned(),
+        source,
+    })
+}
+
+pub(super) fn broken(path: &Path, line: usize, message: impl Into<String>) -> Error {
+    Error::Dataset {
+        path: path.to_owned(),
+        line,
+        message: message.into(),
+    }
+}

@@ -1,0 +1,60 @@
+#![doc = include_str!("../README.md")]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod error;
+pub mod streams;
+
+// Which scenes.
+mod distribution;
+mod draws;
+mod recipe;
+mod sea;
+mod shuffle;
+
+mod scenes;
+
+// Scene → pair.
+mod ordered;
+mod pair;
+
+// Pairs ⇄ folder.
+mod annotations;
+mod layout;
+mod metadata;
+
+mod folder;
+mod write;
+
+mod merge;
+
+// Pairs, position by position.
+mod source;
+
+mod mixture;
+
+// Pairs → tensors.
+#[cfg(feature = "burn")]
+mod finite;
+#[cfg(feature = "burn")]
+mod loader;
+
+pub use draws::Draws;
+pub use error::{Error, Result};
+#[cfg(feature = "burn")]
+pub use finite::Finite;
+pub use folder::{Epochs, Folder};
+pub use layout::{Manifest, Shard};
+#[cfg(feature = "burn")]
+pub use loader::{Batch, Batches, Loader, ToBatch};
+pub use merge::{merge, shard_folder};
+pub use mixture::Mixture;
+pub use pair::{Grey, Pair};
+pub use recipe::{Draw, Recipe};
+pub use scenes::{PAPER_SCENES, Simulated};
+pub use sea::Sea;
+pub use shuffle::shuffled;
+pub use source::Source;
+pub use write::{Progress, write};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! Joins the shards of a data set into the set that one run would have made.
+
+use super::layout::{Layout, Manifest, Shard, broken, cannot};
+use super::metadata::{Rows, parse};
+use super::write::{claim, finish, is_text};
+use crate::error::Result;
+use whole_files::read_text;
+use std::path::{Path, PathBuf};
+
+/// Folder of a shard below that of its set.
+pub fn shard_folder(folder: &Path, shard: Shard) -> PathBuf {
+    Layout(folder).shard(shard)
+}
+
+/// Joins the shards `shard-0`, `shard-1`, … of a folder into one set in the folder itself, byte for byte the one that
+/// would have been made without shards, and removes them. A merge that is killed can be started again.
+///
+/// # Errors
+///
+/// [`Error::Dataset`](crate::Error::Dataset) if a shard is missing, unfinished or of another set; nothing is changed
+/// then.
+pub fn merge(folder: &Path) -> Result<Manifest> {
+    if let Some(whole) = merged_before(folder)? {
+        remove_shards(folder)?;
+        return Ok(whole);
+    }
+    let shards = shards(folder)?;
+    let (mut lines, mut rows) = (Vec::new(), Rows::new());
+    for (path, manifest) in &shards {
+        let (text, its_rows) = finished_rows(folder, path, manifest)?;
+        lines.extend(text);
+        rows.extend(its_rows);
+    }
+    let whole = Manifest {
+        shard: None,
+        ..shards[0].1.clone()
+    };
+    let _lock = claim(folder, &manifest_text(&shards[0].0)?, None)?;
+    for (path, manifest) in &shards {
+        move_files(folder, path, manifest)?;
+    }
+    whole_files::write_atomically(&Layout(folder).metadata(), &lines)?;
+    finish(folder, &whole, &rows)?;
+    remove_shards(folder)?;
+    Ok(whole)
+}
+
+/// The set that an earlier merge finished but for removing the shards.
+fn merged_before(folder: &Path) -> Result<Option<Manifest>> {
+    let Some(whole) = Manifest::read(folder)? else {
+        return Ok(None);
+    };
+    let last = Layout(folder).yolo();
+    let metadata = std::fs::read(Layout(folder).metadata()).unwrap_or_default();
+    let lines = metadata.iter().filter(|&&b| b == b'\n').count();
+    let finished = last.is_file() && lines as u64 == whole.count;
+    Ok((finished && whole.shard.is_none()).then_some(whole))
+}
+
+/// The content of a `dataset.json`.
+fn manifest_text(folder: &Path) -> Result<String> {
+    Ok(read_text(&Layout(folder).manifest())?)
+}
+
+/// Folder and manifest of every shard, in order; at least one.
+fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>> {
+    let first = shard_at(folder, 0)?;
+    let of = first.1.shard.map_or(1, |shard| shard.of);
+    let text = manifest_text(&first.0)?;
+    let mut shards = vec![first];
+    for number in 1..of {
+        let (path, manifest) = shard_at(folder, number)?;
+        if manifest.shard != Some(Shard { number, of })
+            || !is_text(&Layout(&path).manifest(), &text)
+        {
+            let message = format!("not shard {number} of the same set as shard-0");
+            return Err(broken(&Layout(&path).manifest(), 1, message));
+        }
+        shards.push((path, manifest));
+    }
+    Ok(shards)
+}
+
+fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
+    let path = Layout(folder).shard(Shard { number, of: 0 });
+    match Manifest::read(&path)? {
+        Some(manifest) if manifest.shard.is_some_and(|shard| shard.number == number) => {
+            Ok((path, manifest))
+        }
+        Some(_) => Err(broken(&path, 0, format!("not shard {number}"))),
+        None => {
+            let message = format!("shard {number} is missing; make it with --shard {number}/n");
+            Err(broken(&path, 0, message))
+        }
+    }
+}
+
+/// The lines of a shard and their rows, all of them, with every file here or already moved.
+fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec<u8>, Rows)> {
+    let metadata = Layout(path).metadata();
+    let text = std::fs::read(&metadata).map_err(|e| cannot("read", &metadata, e))?;
+    let rows = parse(&metadata, &text, manifest)?;
+    let unfinished = |what: String| {
+        let message = format!("{what}; run the same --shard again to finish it");
+        broken(&metadata, rows.len(), message)
+    };
+    let count = manifest.indices().end - manifest.indices().start;
+    if rows.len() as u64 != count {
+        return Err(unfinished(format!("{} of {count} pairs", rows.len())));
+    }
+    for (index, _) in &rows {
+        let here = Layout(path).files_of(*index);
+        let moved = Layout(folder).files_of(*index);
+        for (here, moved) in here.iter().zip(&moved) {
+            if !here.is_file() && !moved.is_file() {
+                return Err(unfinished(format!("{} is missing", here.display())));
+            }
+        }
+    }
+    Ok((text, rows))
+}
+
+fn move_files(folder: &Path, path: &Path, manifest: &Manifest) -> Result<()> {
+    for index in manifest.indices() {
+        let from = Layout(path).files_of(index);
+        let to = Layout(folder).files_of(index);
+        for (from, to) in from.iter().zip(&to).filter(|(from, _)| from.is_file()) {
+            std::fs::rename(from, to).map_err(|e| cannot("move", from, e))?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes what is left of the shards of a set, and nothing else.
+fn remove_shards(folder: &Path) -> Result<()> {
+    let text = manifest_text(folder)?;
+    for entry in std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))? {
+        let path = entry.map_err(|e| cannot("read", folder, e))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let number = name
+            .strip_prefix("shard-")
+            .and_then(|n| n.parse::<u64>().ok());
+        let manifest = Layout(&path).manifest();
+        if number.is_some() && (is_text(&manifest, &text) || !manifest.exists()) {
+            remove(&path)?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes a shard without images: only files that a shard has.
+fn remove(path: &Path) -> Result<()> {
+    let layout = Layout(path);
+    let gone = |result: std::io::Result<()>| match result {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(cannot("remove", path, e)),
+        _ => Ok(()),
+    };
+    for inner in layout.folders() {
+        gone(std::fs::remove_dir(inner))?;
+    }
+    let [train, val] = layout.lists();
+    for file in [
+        layout.coco(),
+        train,
+        val,
+        layout.yolo(),
+        layout.metadata(),
+        layout.shard_note(),
+        layout.manifest(),
+    ] {
+        gone(std::fs::remove_file(file))?;
+    }
+    gone(std::fs::remove_dir(path))
+}

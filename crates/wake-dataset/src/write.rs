@@ -1,0 +1,200 @@
+//! Makes a data set in a folder, or what is missing of it.
+
+use super::annotations::{Coco, data_yaml, dota, yolo, yolo_oriented};
+use super::layout::{Layout, Manifest, Shard, broken, cannot};
+use super::metadata::{Log, Row, Rows};
+use super::ordered::Ordered;
+use super::scenes::Simulated;
+use crate::error::{Error, Result};
+use std::path::Path;
+use whole_files::FolderLock;
+
+/// How far a data set is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Pairs that are there.
+    pub done: u64,
+    /// Pairs that there will be.
+    pub total: u64,
+    /// Pairs made by this run.
+    pub made: u64,
+}
+
+/// Makes the data set of a manifest in a folder on `jobs` threads, continuing what an earlier run began.
+///
+/// The folder's content is a function of the manifest alone, byte for byte. A run that is killed leaves no
+/// half-written file; the next one continues. `watch` hears of every pair.
+///
+/// - `source`: the manifest's own, on its learnt sea where it names one
+///
+/// # Errors
+///
+/// [`Error::Dataset`] if the folder holds something else, [`wake_nn::Error::Io`] if it cannot be written,
+/// [`wake_nn::Error::InvalidOption`] for a source of another recipe or seed, or with a sea that the manifest does not name.
+pub fn write(
+    folder: &Path,
+    manifest: &Manifest,
+    source: &Simulated,
+    jobs: usize,
+    mut watch: impl FnMut(Progress),
+) -> Result<()> {
+    check_source(manifest, source)?;
+    let _lock = claim(folder, &manifest.text()?, manifest.shard)?;
+    let mut log = Log::open(folder, manifest)?;
+    let missing = missing(folder, manifest, log.rows.len());
+    let total = manifest.indices().end - manifest.indices().start;
+    let mut progress = Progress {
+        done: total - missing.len() as u64,
+        total,
+        made: 0,
+    };
+    watch(progress);
+    let next = manifest.indices().start + log.rows.len() as u64;
+    for made in make(folder, source, jobs, missing)? {
+        let (index, row) = made?;
+        if index >= next {
+            log.push(index, row)?;
+        }
+        progress.done += 1;
+        progress.made += 1;
+        watch(progress);
+    }
+    finish(folder, manifest, &log.finish()?)
+}
+
+/// Whether a source makes the pairs of a manifest.
+fn check_source(manifest: &Manifest, source: &Simulated) -> Result<()> {
+    let same = source.seed() == manifest.seed && *source.recipe() == manifest.recipe;
+    let refuse = |value: &str, expected: &str| Error::Value(wake_nn::Error::InvalidOption {
+        option: "source".to_owned(),
+        value: value.to_owned(),
+        expected: expected.to_owned(),
+    });
+    match (source.sea(), &manifest.sea) {
+        _ if !same => Err(refuse(
+            "of another recipe or seed",
+            "the manifest's own source",
+        )),
+        (Some(_), None) => Err(refuse(
+            "on a learnt sea",
+            "a manifest that names its file's fingerprint",
+        )),
+        (None, Some(_)) => Err(refuse(
+            "without a learnt sea",
+            "one, as the manifest names it",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Takes a folder that is empty, or that an earlier run began for the same `dataset.json` and shard.
+///
+/// The folder is this process's until the lock is dropped.
+pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Result<FolderLock> {
+    let lock = whole_files::lock_folder(folder)?;
+    let layout = Layout(folder);
+    let path = layout.manifest();
+    match Manifest::read(folder)? {
+        // Texts are compared: numbers that went through JSON may differ in their last bit.
+        Some(found) if found.shard == shard && is_text(&path, manifest) => {}
+        Some(_) => {
+            let message = "made with another recipe, seed, count or shard; choose another folder";
+            return Err(broken(&path, 1, message));
+        }
+        None if is_free(folder, shard)? => {
+            if let Some(shard) = shard {
+                whole_files::write_json(&layout.shard_note(), &shard)?;
+            }
+            whole_files::write_atomically(&path, manifest.as_bytes())?;
+        }
+        None => {
+            let message = "no data set, but not empty either; choose another folder";
+            return Err(broken(folder, 0, message));
+        }
+    }
+    for inner in layout.folders() {
+        whole_files::make_folder(&inner)?;
+    }
+    Ok(lock)
+}
+
+/// Whether a file has exactly this content.
+pub(super) fn is_text(path: &Path, text: &str) -> bool {
+    std::fs::read(path).is_ok_and(|found| found == text.as_bytes())
+}
+
+/// Whether a folder holds nothing but what a run may have left before its `dataset.json`: shards, the note of its own
+/// shard, files half-written.
+fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
+    let mut entries = std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))?;
+    Ok(entries.all(|entry| {
+        entry.is_ok_and(|e| {
+            let name = e.file_name();
+            let name = name.to_string_lossy();
+            let own_note = shard.is_some() && name == "shard.json";
+            own_note || name.starts_with("shard-") || whole_files::is_temporary(&e.path())
+        })
+    }))
+}
+
+/// Indices without a line, or without their files.
+fn missing(folder: &Path, manifest: &Manifest, lines: usize) -> Vec<u64> {
+    let start = manifest.indices().start;
+    let is_there = |index: u64| {
+        let [image, labels @ ..] = Layout(folder).files_of(index);
+        std::fs::metadata(image).is_ok_and(|file| file.len() > 0)
+            && labels.iter().all(|labels| labels.exists())
+    };
+    manifest
+        .indices()
+        .filter(|&index| index - start >= lines as u64 || !is_there(index))
+        .collect()
+}
+
+/// Makes pairs and writes their files on `jobs` threads; their rows come in order.
+fn make(
+    folder: &Path,
+    source: &Simulated,
+    jobs: usize,
+    indices: Vec<u64>,
+) -> Result<Ordered<(u64, Row)>> {
+    let (source, folder) = (source.clone(), folder.to_owned());
+    Ordered::new(indices.into_iter(), jobs, move |index| {
+        let pair = source.pair(index)?;
+        let row = Row::of(&pair);
+        let [image, labels @ ..] = Layout(&folder).files_of(index);
+        let size = [pair.image.rows, pair.image.columns];
+        wake_physics::output::write_png(&image, &pair.image.levels(), size[0], size[1])?;
+        let objects = &row.objects;
+        let texts = [
+            yolo(objects, size),
+            yolo_oriented(objects, size),
+            dota(objects),
+        ];
+        for (path, text) in labels.iter().zip(texts) {
+            whole_files::write_atomically(path, text.as_bytes())?;
+        }
+        Ok((index, row))
+    })
+}
+
+/// Writes what is known only at the end.
+pub(super) fn finish(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<()> {
+    let (layout, grid) = (Layout(folder), &manifest.recipe.scene.grid);
+    let images = rows
+        .iter()
+        .map(|(index, row)| (*index, row.file_name.as_str(), &row.objects));
+    let coco = Coco::of(images, [grid.rows, grid.columns]);
+    whole_files::write_json(&layout.coco(), &coco)?;
+    for (path, val) in layout.lists().iter().zip([false, true]) {
+        let of = rows
+            .iter()
+            .filter(|(index, _)| manifest.is_val(*index) == val);
+        let list: String = of
+            .map(|(_, row)| format!("./{}\n", row.file_name))
+            .collect();
+        whole_files::write_atomically(path, list.as_bytes())?;
+    }
+    whole_files::write_atomically(&layout.yolo(), data_yaml().as_bytes())?;
+    Ok(())
+}

@@ -1,0 +1,205 @@
+//! Attention forward: queries lie side by side in a tile, tokens pass by.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::super::product::Rows;
+use super::super::silu::exp;
+use super::super::tile::{self, ROWS};
+use super::Shape;
+
+/// Tokens whose scores are there at a time, a multiple of a tile's rows: those of 32 queries take 24 KiB of a core's first
+/// cache.
+pub(super) const TOKENS: usize = 32 * ROWS;
+
+/// Attends; see [`attention`](crate::attention::attention).
+///
+/// Keys and values are read where they lie: the scores are computed as `K Qᵀ`, one column a query, which is how the second
+/// product `Vᵀ P` wants them.
+///
+/// # Shapes
+///
+/// - `query`: `[batch, tokens, channels]`; `key`, `value`: `[batch, tokens seen, channels]`
+/// - result: as `query`
+///
+/// # References
+///
+/// Dao et al. (2022), "Fast and Memory-Efficient Exact Attention", algorithm 1 (the largest score so far, and sums that are
+/// scaled whenever it grows).
+pub(crate) fn attend(query: &[f32], key: &[f32], value: &[f32], shape: &Shape) -> Vec<f32> {
+    let arch = Arch::new();
+    let block = arch.dispatch(tile::Width);
+    let [asking, seen] = shape.tokens;
+    let mut out = vec![0.0; query.len()];
+    out.par_chunks_mut(asking * shape.channels)
+        .enumerate()
+        .for_each(|(n, out)| {
+            out.par_chunks_mut(block * shape.channels)
+                .enumerate()
+                .for_each(|(i, out)| {
+                    for head in 0..shape.heads {
+                        arch.dispatch(Forward {
+                            query: shape.head(query, asking, n, head).from(i * block, block),
+                            key: shape.head(key, seen, n, head),
+                            value: shape.head(value, seen, n, head),
+                            first: i * block,
+                            shape,
+                            out: &mut out[head * shape.depth()..],
+                        });
+                    }
+                });
+        });
+    out
+}
+
+/// At most a tile's width of queries of one head.
+struct Forward<'a> {
+    query: Rows<'a>,
+    key: Rows<'a>,
+    value: Rows<'a>,
+    /// Place of the first query in its sequence.
+    first: usize,
+    shape: &'a Shape,
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (width, depth) = (tile::width::<S>(), self.shape.depth());
+        let query = self.query.pack_transposed(depth, width);
+        let mut scores = vec![0.0; TOKENS.min(self.key.count) * width];
+        // Of each query: what it gets, the largest score, the sum of exponentials.
+        let mut sums = vec![0.0; depth * width];
+        let mut largest = vec![f32::NEG_INFINITY; width];
+        let mut totals = vec![0.0; width];
+        let last = self.first + self.query.count;
+        let seen = match self.shape.causal {
+            true => self.key.count.min(last),
+            false => self.key.count,
+        };
+        for first in (0..seen).step_by(TOKENS) {
+            let count = TOKENS.min(seen - first);
+            let scores = &mut scores[..count * width];
+            products::<S>(simd, &self.key.from(first, count), &query, scores);
+            if self.shape.causal {
+                hide(scores, width, first, self.first);
+            }
+            let shrunk = exponentials::<S>(scores, &mut largest, &mut totals, self.shape.scale());
+            for sums in sums.chunks_exact_mut(width) {
+                for (sum, shrunk) in sums.iter_mut().zip(&shrunk) {
+                    *sum *= shrunk;
+                }
+            }
+            add_values::<S>(
+                simd,
+                &self.value.from(first, count),
+                scores,
+                depth,
+                &mut sums,
+            );
+        }
+        let rows = self.out.chunks_mut(self.shape.channels);
+        for (j, (out, total)) in rows.zip(totals).take(self.query.count).enumerate() {
+            let sums = sums[j..].iter().step_by(width);
+            for (out, sum) in out[..depth].iter_mut().zip(sums) {
+                *out = sum / total;
+            }
+        }
+    }
+}
+
+/// `scores[k][j] = Σ_d key[k][d] · query[d][j]`
+#[inline(always)]
+pub(super) fn products<S: Simd>(simd: S, key: &Rows<'_>, query: &[f32], scores: &mut [f32]) {
+    let width = tile::width::<S>();
+    let depth = query.len() / width;
+    for (tile, scores) in scores.chunks_mut(ROWS * width).enumerate() {
+        let mut rows = [key.values; ROWS];
+        for (i, row) in rows.iter_mut().enumerate() {
+            *row = key.get(tile * ROWS + i, depth);
+        }
+        let mut sums = tile::start(simd, [0.0; ROWS]);
+        tile::multiply(simd, rows, 0, query, &mut sums);
+        for (sum, scores) in sums.into_iter().zip(scores.chunks_exact_mut(width)) {
+            tile::store::<S>(sum, scores);
+        }
+    }
+}
+
+/// Hides tokens after their query.
+pub(super) fn hide(scores: &mut [f32], width: usize, first_token: usize, first_query: usize) {
+    for (k, scores) in scores.chunks_exact_mut(width).enumerate() {
+        let before = (first_token + k).saturating_sub(first_query).min(width);
+        scores[..before].fill(f32::NEG_INFINITY);
+    }
+}
+
+/// Replaces each x by `e^(s (x − m))`, m the largest of its query so far; what the query had before has to be multiplied
+/// with what is returned.
+#[inline(always)]
+pub(super) fn exponentials<S: Simd>(
+    scores: &mut [f32],
+    largest: &mut [f32],
+    totals: &mut [f32],
+    scale: f32,
+) -> Vec<f32> {
+    let width = tile::width::<S>();
+    let mut shrunk = largest.to_vec();
+    for row in scores.chunks_exact(width) {
+        for (max, &x) in largest.iter_mut().zip(row) {
+            *max = if x > *max { x } else { *max };
+        }
+    }
+    for ((shrunk, total), max) in shrunk.iter_mut().zip(totals.iter_mut()).zip(&*largest) {
+        *shrunk = exp((*shrunk - max) * scale);
+        *total *= *shrunk;
+    }
+    // Block by block, so that no running sum is long.
+    for block in scores.chunks_mut(TOKENS * width) {
+        let mut sums = vec![0.0; width];
+        for row in block.chunks_exact_mut(width) {
+            for ((x, sum), max) in row.iter_mut().zip(&mut sums).zip(&*largest) {
+                *x = exp((*x - max) * scale);
+                *sum += *x;
+            }
+        }
+        for (total, sum) in totals.iter_mut().zip(sums) {
+            *total += sum;
+        }
+    }
+    shrunk
+}
+
+/// `sums[d][j] += Σ_k value[k][d] · weights[k][j]`
+#[inline(always)]
+pub(super) fn add_values<S: Simd>(
+    simd: S,
+    value: &Rows<'_>,
+    weights: &[f32],
+    depth: usize,
+    sums: &mut [f32],
+) {
+    let width = tile::width::<S>();
+    for first in (0..depth).step_by(ROWS) {
+        // The last tile begins earlier, where there is room, and keeps what is new alone.
+        let from = first.min(depth.saturating_sub(ROWS));
+        let mut tile = tile::start(simd, [0.0; ROWS]);
+        tile::multiply_columns(
+            simd,
+            value.values,
+            value.step,
+            from..depth,
+            weights,
+            &mut tile,
+        );
+        let rows = sums[first * width..].chunks_exact_mut(width);
+        for (tile, sums) in tile.into_iter().skip(first - from).zip(rows) {
+            let before = tile::load(simd, sums);
+            let sum = [0, 1].map(|half| simd.add_f32s(before[half], tile[half]));
+            tile::store::<S>(sum, sums);
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The convolution by the sum that defines it, for any kernel and stride.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::geometry::Geometry;
+use super::layout::{Gather, Layout};
+use crate::kernels::tile::{self, ROWS};
+
+/// Rows of a panel of patches that are multiplied at once: 16 columns of them are 32 KiB.
+const DEPTH: usize = 512;
+
+/// Most panels that share one pass over the weights.
+const PANELS: usize = 8;
+
+/// Convolves a batch of images, with shapes as of [`convolve`](super::convolve).
+pub(super) fn convolve(
+    x: &[f32],
+    weight: &[f32],
+    bias: Option<&[f32]>,
+    geometry: &Geometry,
+) -> Vec<f32> {
+    let layout = Layout::new(geometry);
+    let planes = layout.lay_out(x, geometry);
+    let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
+    let arch = Arch::new();
+    let block = block_width(geometry, arch.dispatch(tile::Width));
+    let one = Geometry {
+        batch: 1,
+        ..*geometry
+    };
+    by_blocks(&mut y, &planes, geometry, [1, block], |planes, i, y| {
+        arch.dispatch(Block {
+            planes,
+            weight,
+            bias,
+            first: i * block,
+            y,
+            geometry: &one,
+            layout,
+        });
+    });
+    y
+}
+
+/// Computes some images at a time in blocks of consecutive pixels of all their channels, on all cores.
+///
+/// - `planes`: the laid-out images
+/// - `images`, `block`: images at a time, and pixels of each in a block
+/// - `task`: given the planes of these images, the number of a block in them, and the block's part by image and channel
+pub(super) fn by_blocks(
+    y: &mut [f32],
+    planes: &[f32],
+    geometry: &Geometry,
+    [images, block]: [usize; 2],
+    task: impl Fn(&[f32], usize, Vec<&mut [f32]>) + Sync,
+) {
+    let (image, pixels) = (y.len() / geometry.batch, geometry.pixels_out());
+    y.par_chunks_mut(images * image)
+        .zip(planes.par_chunks(images * (planes.len() / geometry.batch)))
+        .for_each(|(y, planes)| {
+            columns(y, pixels, block)
+                .into_par_iter()
+                .enumerate()
+                .for_each(|(i, y)| task(planes, i, y));
+        });
+}
+
+/// Pixels of one task: few enough that every core has work, many enough to reuse the weights.
+fn block_width(geometry: &Geometry, width: usize) -> usize {
+    let panels = geometry.pixels_out().div_ceil(width);
+    let tasks = 4 * rayon::current_num_threads();
+    let share = (panels * geometry.batch).div_ceil(tasks);
+    width * share.clamp(1, PANELS).min(panels)
+}
+
+/// Cuts every row of a matrix at the same columns: for each block of columns, its part of each row.
+pub(super) fn columns(matrix: &mut [f32], row: usize, block: usize) -> Vec<Vec<&mut [f32]>> {
+    let rows = matrix.len() / row;
+    let mut blocks: Vec<Vec<&mut [f32]>> = (0..row.div_ceil(block))
+        .map(|_| Vec::with_capacity(rows))
+        .collect();
+    for row in matrix.chunks_mut(row) {
+        for (block, part) in blocks.iter_mut().zip(row.chunks_mut(block)) {
+            block.push(part);
+        }
+    }
+    blocks
+}
+
+/// Some consecutive pixels of all channels of one image.
+struct Block<'a> {
+    planes: &'a [f32],
+    weight: &'a [f32],
+    bias: Option<&'a [f32]>,
+    first: usize,
+    y: Vec<&'a mut [f32]>,
+    geometry: &'a Geometry,
+    layout: Layout,
+}
+
+impl WithSimd for Block<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let width = tile::width::<S>();
+        let taps = self.geometry.kernel * self.geometry.kernel;
+        let channels = self.geometry.channels[0];
+        let step = (DEPTH / taps).clamp(1, channels);
+        let panels = self.y[0].len().div_ceil(width);
+        let mut patches = vec![0.0; panels * step * taps * width];
+        for channel in (0..channels).step_by(step) {
+            let channels = channel..channels.min(channel + step);
+            let depth = channels.len() * taps;
+            let patches = &mut patches[..panels * depth * width];
+            for (i, panel) in patches.chunks_exact_mut(depth * width).enumerate() {
+                self.pack::<S>(channels.clone(), i * width, panel);
+            }
+            self.multiply(simd, channels.start * taps, patches, depth);
+        }
+    }
+}
+
+impl Block<'_> {
+    /// Writes the patches of one tile's pixels: for every channel and tap, a row of pixels.
+    #[inline(always)]
+    fn pack<S: Simd>(&self, channels: std::ops::Range<usize>, first: usize, panel: &mut [f32]) {
+        let gather = Gather::new::<S>(&self.layout, self.geometry, self.first + first);
+        let plane = self.layout.plane();
+        let planes = self.planes.chunks_exact(plane).skip(channels.start);
+        let rows = panel.chunks_exact_mut(panel.len() / channels.len());
+        for (plane, rows) in planes.zip(rows) {
+            gather.read::<S>(plane, rows);
+        }
+    }
+
+    /// Adds the product of `depth` columns of the weights, from `start` on, with the patches.
+    #[inline(always)]
+    fn multiply<S: Simd>(&mut self, simd: S, start: usize, patches: &[f32], depth: usize) {
+        let width = tile::width::<S>();
+        let patch = self.geometry.patch();
+        let last = self.y.len() - 1;
+        for (i, y) in self.y.chunks_mut(ROWS).enumerate() {
+            let mut weights = [&self.weight[..0]; ROWS];
+            let mut bias = [0.0; ROWS];
+            for (r, (weights, bias)) in weights.iter_mut().zip(&mut bias).enumerate() {
+                let row = (i * ROWS + r).min(last);
+                *weights = &self.weight[row * patch + start..][..depth];
+                *bias = self.bias.map_or(0.0, |bias| bias[row]);
+            }
+            for (panel, patches) in patches.chunks_exact(depth * width).enumerate() {
+                let mut sums = tile::start(simd, bias);
+                let part = |y: &[f32]| panel * width..y.len().min((panel + 1) * width);
+                if start > 0 {
+                    for (sum, y) in sums.iter_mut().zip(&*y) {
+                        *sum = tile::load(simd, &y[part(y)]);
+                    }
+                }
+                tile::multiply(simd, weights, 0, patches, &mut sums);
+                for (sum, y) in sums.into_iter().zip(&mut *y) {
+                    let part = part(y);
+                    tile::store::<S>(sum, &mut y[part]);
+                }
+            }
+        }
+    }
+}

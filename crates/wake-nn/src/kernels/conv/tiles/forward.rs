@@ -1,0 +1,318 @@
+//! The convolution itself by tiles.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::{LANES, PLACES, differences, tiles_of};
+use crate::kernels::conv::direct::{by_blocks, columns};
+use crate::kernels::conv::geometry::Geometry;
+use crate::kernels::conv::layout::{Gather, Layout};
+use crate::kernels::tile::{self, ROWS};
+
+/// Numbers of the transformed image that a task keeps in a core's second cache: 512 KiB.
+const NEAR: usize = 128 * 1024;
+
+/// Convolves a batch of images by tiles, with shapes as of [`convolve`](crate::kernels::conv::convolve).
+pub(in crate::kernels::conv) fn convolve(
+    x: &[f32],
+    weight: &[f32],
+    bias: Option<&[f32]>,
+    geometry: &Geometry,
+) -> Vec<f32> {
+    let arch = Arch::new();
+    let width = arch.dispatch(tile::Width);
+    let tiles = tiles_of(geometry);
+    let layout = Layout::new(&tiles);
+    let planes = layout.lay_out(x, &tiles);
+    let weight = &transformed(weight, geometry);
+    let (images, rows) = task(&tiles, width);
+    let columns = geometry.size_out()[1];
+    let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
+    let block = 2 * rows * columns;
+    by_blocks(
+        &mut y,
+        &planes,
+        geometry,
+        [images, block],
+        |planes, i, y| {
+            arch.dispatch(Block {
+                planes,
+                weight,
+                bias,
+                first: i * rows * tiles.size_out()[1],
+                columns,
+                tiles: Geometry {
+                    batch: y.len() / geometry.channels[1],
+                    ..tiles
+                },
+                y,
+                layout,
+            });
+        },
+    );
+    y
+}
+
+/// Images and rows of tiles that are one task: a full panel at least, and as many more as stay near and leave every core its share.
+/// Several images are whole.
+fn task(tiles: &Geometry, width: usize) -> (usize, usize) {
+    let [rows, columns] = tiles.size_out();
+    let near = NEAR / (PLACES * tiles.channels[0]) / columns;
+    let share = rows * tiles.batch / (4 * rayon::current_num_threads());
+    let least = width.div_ceil(columns);
+    let of_a_task = near.min(share).max(least);
+    if of_a_task < 2 * rows {
+        (least.div_ceil(rows), of_a_task.min(rows))
+    } else {
+        (of_a_task / rows, rows)
+    }
+}
+
+/// The kernels `G w Gᵀ`: `[place, channels out, channels in]`.
+fn transformed(weight: &[f32], geometry: &Geometry) -> Vec<f32> {
+    let [channels_in, channels_out] = geometry.channels;
+    let mut out = vec![0.0; PLACES * channels_out * channels_in];
+    columns(&mut out, channels_out * channels_in, channels_in)
+        .into_par_iter()
+        .zip(weight.par_chunks_exact(9 * channels_in))
+        .with_min_len(8)
+        .for_each(|(mut places, kernels)| {
+            for (i, kernels) in kernels.chunks(9 * LANES).enumerate() {
+                let mut taps = [[0.0; LANES]; 9];
+                for (lane, kernel) in kernels.as_chunks::<9>().0.iter().enumerate() {
+                    for (tap, value) in taps.iter_mut().zip(kernel) {
+                        tap[lane] = *value;
+                    }
+                }
+                let transformed = transformed_kernels(&taps);
+                let channels = i * LANES..i * LANES + kernels.len() / 9;
+                for (place, values) in places.iter_mut().zip(&transformed) {
+                    place[channels.clone()].copy_from_slice(&values[..channels.len()]);
+                }
+            }
+        });
+    out
+}
+
+fn transformed_kernels(w: &[[f32; LANES]; 9]) -> [[f32; LANES]; PLACES] {
+    let mut rows = [[0.0; LANES]; 12];
+    let mut out = [[0.0; LANES]; PLACES];
+    for j in 0..3 {
+        for lane in 0..LANES {
+            let [a, b, c] = [w[j][lane], w[3 + j][lane], w[6 + j][lane]];
+            rows[j][lane] = a;
+            rows[3 + j][lane] = 0.5 * (a + b + c);
+            rows[6 + j][lane] = 0.5 * (a - b + c);
+            rows[9 + j][lane] = c;
+        }
+    }
+    for i in 0..4 {
+        for lane in 0..LANES {
+            let [a, b, c] = [
+                rows[3 * i][lane],
+                rows[3 * i + 1][lane],
+                rows[3 * i + 2][lane],
+            ];
+            out[4 * i][lane] = a;
+            out[4 * i + 1][lane] = 0.5 * (a + b + c);
+            out[4 * i + 2][lane] = 0.5 * (a - b + c);
+            out[4 * i + 3][lane] = c;
+        }
+    }
+    out
+}
+
+/// Some rows of tiles of all channels of one image, or of some images all rows.
+struct Block<'a> {
+    planes: &'a [f32],
+    /// `[place, channels out, channels in]`.
+    weight: &'a [f32],
+    bias: Option<&'a [f32]>,
+    /// The first tile.
+    first: usize,
+    /// Whole rows of pixels, by image and channel.
+    y: Vec<&'a mut [f32]>,
+    /// Pixels of a row.
+    columns: usize,
+    /// Of these images.
+    tiles: Geometry,
+    layout: Layout,
+}
+
+impl WithSimd for Block<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let width = tile::width::<S>();
+        let channels = self.tiles.channels[0];
+        let rows = (self.y[0].len() / self.columns).div_ceil(2);
+        let windows = self.tiles.batch * rows * self.tiles.size_out()[1];
+        let panels = windows.div_ceil(width);
+        let mut image = vec![0.0; panels * PLACES * channels * width];
+        let mut window = vec![0.0; PLACES * width];
+        for (i, panel) in image
+            .chunks_exact_mut(PLACES * channels * width)
+            .enumerate()
+        {
+            let gather = Gather::new::<S>(&self.layout, &self.tiles, self.first + i * width);
+            for channel in 0..channels {
+                let planes = &self.planes[channel * self.layout.plane()..];
+                gather.read::<S>(planes, &mut window);
+                transform_window(simd, &window, channel, panel);
+            }
+        }
+        self.multiply(simd, &image);
+    }
+}
+
+/// `Aᵀ` times four numbers.
+#[inline(always)]
+fn sums<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [S::f32s; 2] {
+    [
+        simd.add_f32s(simd.add_f32s(a, b), c),
+        simd.sub_f32s(simd.sub_f32s(b, c), d),
+    ]
+}
+
+/// `Bᵀ d B` of a tile of windows `[place, window]`, written to `[place, channel, window]`.
+#[inline(always)]
+fn transform_window<S: Simd>(simd: S, window: &[f32], channel: usize, panel: &mut [f32]) {
+    let (d, _) = S::as_simd_f32s(window);
+    let (out, _) = S::as_mut_simd_f32s(panel);
+    let place = out.len() / PLACES;
+    for half in 0..2 {
+        let mut columns = [[simd.splat_f32s(0.0); 4]; 4];
+        for (j, column) in columns.iter_mut().enumerate() {
+            let d = &d[2 * j + half..][..25];
+            *column = differences(simd, [d[0], d[8], d[16], d[24]]);
+        }
+        let [a, b, c, d] = columns;
+        for i in 0..4 {
+            let row = differences(simd, [a[i], b[i], c[i], d[i]]);
+            for (j, value) in row.into_iter().enumerate() {
+                out[(4 * i + j) * place + 2 * channel + half] = value;
+            }
+        }
+    }
+}
+
+impl Block<'_> {
+    /// The sixteen products of kernels and windows, and the pixels that follow.
+    #[inline(always)]
+    fn multiply<S: Simd>(&mut self, simd: S, image: &[f32]) {
+        let width = tile::width::<S>();
+        let [channels, channels_out] = self.tiles.channels;
+        let panel = PLACES * channels * width;
+        // Of every panel: `[row, place, window]`.
+        let mut products = vec![0.0; image.len() / panel * ROWS * PLACES * width];
+        for first in (0..channels_out).step_by(ROWS) {
+            for place in 0..PLACES {
+                let mut weights = [&self.weight[..0]; ROWS];
+                for (r, weights) in weights.iter_mut().enumerate() {
+                    let row = place * channels_out + (first + r).min(channels_out - 1);
+                    *weights = &self.weight[row * channels..][..channels];
+                }
+                let products = products.chunks_exact_mut(ROWS * PLACES * width);
+                for (image, products) in image.chunks_exact(panel).zip(products) {
+                    let image = &image[place * channels * width..][..channels * width];
+                    let mut sums = tile::start(simd, [0.0; ROWS]);
+                    tile::multiply(simd, weights, 0, image, &mut sums);
+                    let rows = products.chunks_exact_mut(PLACES * width);
+                    for (sum, row) in sums.into_iter().zip(rows) {
+                        tile::store::<S>(sum, &mut row[place * width..][..width]);
+                    }
+                }
+            }
+            for (i, products) in products.chunks_exact(ROWS * PLACES * width).enumerate() {
+                let channels = first..channels_out.min(first + ROWS);
+                for (channel, products) in channels.zip(products.chunks_exact(PLACES * width)) {
+                    let bias = self.bias.map_or(0.0, |bias| bias[channel]);
+                    let tiles = Run {
+                        first: i * width,
+                        columns: self.columns,
+                        images: channels_out,
+                    };
+                    tiles.write(simd, products, bias, &mut self.y[channel..]);
+                }
+            }
+        }
+    }
+}
+
+/// Where the tiles of a panel lie.
+struct Run {
+    /// The panel's first tile, counted from the block's.
+    first: usize,
+    /// Pixels of a row.
+    columns: usize,
+    /// From the plane of one image to that of the next.
+    images: usize,
+}
+
+impl Run {
+    /// Writes `Aᵀ m A` of the products `[place, tile]` and a bias to their pixels, of which the first plane is that of the first
+    /// image.
+    #[inline(always)]
+    fn write<S: Simd>(&self, simd: S, products: &[f32], bias: f32, planes: &mut [&mut [f32]]) {
+        let width = tile::width::<S>();
+        let (m, _) = S::as_simd_f32s(products);
+        let bias = simd.splat_f32s(bias);
+        // By row and column in the tile, and half of the panel.
+        let mut pixels = [[[bias; 2]; 2]; 2];
+        for half in 0..2 {
+            let mut columns = [[bias; 2]; 4];
+            for (j, column) in columns.iter_mut().enumerate() {
+                let m = &m[2 * j + half..][..25];
+                *column = sums(simd, [m[0], m[8], m[16], m[24]]);
+            }
+            let [a, b, c, d] = columns;
+            for (row, pixels) in pixels.iter_mut().enumerate() {
+                let values = sums(simd, [a[row], b[row], c[row], d[row]]);
+                for (pixels, value) in pixels.iter_mut().zip(values) {
+                    pixels[half] = simd.add_f32s(value, pixels[half]);
+                }
+            }
+        }
+        let in_a_row = self.columns.div_ceil(2);
+        let in_a_plane = (planes[0].len() / self.columns).div_ceil(2);
+        let mut done = 0;
+        while done < width {
+            let (row, column) = (
+                (self.first + done) / in_a_row,
+                (self.first + done) % in_a_row,
+            );
+            // Beyond the last image there is nothing to write.
+            let Some(plane) = planes.get_mut(row / in_a_plane * self.images) else {
+                return;
+            };
+            let count = (in_a_row - column).min(width - done);
+            let end = self.columns.min(2 * (column + count));
+            let rows = plane
+                .chunks_exact_mut(self.columns)
+                .skip(row % in_a_plane * 2);
+            for ([even, odd], row) in pixels.iter().zip(rows) {
+                let even: &[f32] = pulp::bytemuck::cast_slice(even);
+                let odd: &[f32] = pulp::bytemuck::cast_slice(odd);
+                alternate(
+                    &even[done..done + count],
+                    &odd[done..done + count],
+                    &mut row[2 * column..end],
+                );
+            }
+            done += count;
+        }
+    }
+}
+
+/// Writes the even and the odd pixels of a row, which may end with an even one.
+#[inline(always)]
+fn alternate(even: &[f32], odd: &[f32], row: &mut [f32]) {
+    let (pairs, last) = row.as_chunks_mut::<2>();
+    for ((pair, even), odd) in pairs.iter_mut().zip(even).zip(odd) {
+        *pair = [*even, *odd];
+    }
+    if let ([last], [.., even]) = (last, even) {
+        *last = *even;
+    }
+}

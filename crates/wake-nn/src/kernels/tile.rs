@@ -1,0 +1,170 @@
+//! The register tile that every matrix product here is made of.
+
+use pulp::{Simd, WithSimd};
+
+/// Rows of a tile. With two vectors a row, the sums fill 12 of the 16 registers of AVX2.
+pub(super) const ROWS: usize = 6;
+
+/// The sums of one tile, kept in registers.
+pub(super) type Sums<S> = [[<S as Simd>::f32s; 2]; ROWS];
+
+/// Columns of a tile: two vectors.
+pub(super) const fn width<S: Simd>() -> usize {
+    2 * S::F32_LANES
+}
+
+/// Asks for the width of a tile on this machine.
+pub(super) struct Width;
+
+impl WithSimd for Width {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        width::<S>()
+    }
+}
+
+/// Adds the product of six rows with a panel that is one tile wide.
+///
+/// ```text
+/// sums[i][j] += Σ_k rows[i][start + k] · panel[k][j]
+/// ```
+///
+/// # Shapes
+///
+/// - `rows[i]`: as long as the panel from `start` on, or longer
+/// - `panel`: `[k, width]`
+#[inline(always)]
+pub(super) fn multiply<S: Simd>(
+    simd: S,
+    rows: [&[f32]; ROWS],
+    start: usize,
+    panel: &[f32],
+    sums: &mut Sums<S>,
+) {
+    let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<2>();
+    let [mut a, mut b, mut c, mut d, mut e, mut f] = rows;
+    for row in [&mut a, &mut b, &mut c, &mut d, &mut e, &mut f] {
+        *row = &row[start..start + panel.len()];
+    }
+    for (k, [left, right]) in panel.iter().enumerate() {
+        for (sum, value) in sums.iter_mut().zip([a[k], b[k], c[k], d[k], e[k], f[k]]) {
+            let value = simd.splat_f32s(value);
+            sum[0] = simd.mul_add_f32s(value, *left, sum[0]);
+            sum[1] = simd.mul_add_f32s(value, *right, sum[1]);
+        }
+    }
+}
+
+/// Adds the product of the transpose of six columns with a panel that is one tile wide.
+///
+/// ```text
+/// sums[i][j] += Σ_k left[k][columns.start + i] · panel[k][j]
+/// ```
+///
+/// # Shapes
+///
+/// - `left`: rows `step` apart, `[k, columns.end]`; of fewer than six columns the sums of the others are left
+/// - `panel`: `[k, width]`
+#[inline(always)]
+pub(super) fn multiply_columns<S: Simd>(
+    simd: S,
+    left: &[f32],
+    step: usize,
+    columns: std::ops::Range<usize>,
+    panel: &[f32],
+    sums: &mut Sums<S>,
+) {
+    let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<2>();
+    for ([near, far], row) in panel.iter().zip(left.chunks(step)) {
+        let row = &row[columns.clone()];
+        let mut few = [0.0; ROWS];
+        let values = row.first_chunk().unwrap_or_else(|| {
+            few[..row.len()].copy_from_slice(row);
+            &few
+        });
+        for (sum, &value) in sums.iter_mut().zip(values) {
+            let value = simd.splat_f32s(value);
+            sum[0] = simd.mul_add_f32s(value, *near, sum[0]);
+            sum[1] = simd.mul_add_f32s(value, *far, sum[1]);
+        }
+    }
+}
+
+/// Sums that start at one value per row.
+#[inline(always)]
+pub(super) fn start<S: Simd>(simd: S, values: [f32; ROWS]) -> Sums<S> {
+    let mut sums = [[simd.splat_f32s(0.0); 2]; ROWS];
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum = [simd.splat_f32s(value); 2];
+    }
+    sums
+}
+
+/// Sums that start where `row` left off.
+#[inline(always)]
+pub(super) fn load<S: Simd>(simd: S, row: &[f32]) -> [S::f32s; 2] {
+    match S::as_simd_f32s(row).0 {
+        [left, right, ..] => [*left, *right],
+        [left] => [*left, simd.partial_load_f32s(&row[S::F32_LANES..])],
+        [] => [simd.partial_load_f32s(row), simd.splat_f32s(0.0)],
+    }
+}
+
+/// Writes the sums of one row, as many as `row` holds.
+#[inline(always)]
+pub(super) fn store<S: Simd>(sums: [S::f32s; 2], row: &mut [f32]) {
+    let lanes: &[f32] = pulp::bytemuck::cast_slice(&sums);
+    match row.split_at_mut_checked(width::<S>()) {
+        Some((row, _)) => row.copy_from_slice(&lanes[..width::<S>()]),
+        None => row.copy_from_slice(&lanes[..row.len()]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::noise;
+
+    struct Product<'a>(&'a [f32], &'a [f32]);
+
+    impl WithSimd for Product<'_> {
+        type Output = Vec<f32>;
+
+        fn with_simd<S: Simd>(self, simd: S) -> Vec<f32> {
+            let depth = self.0.len() / ROWS - 1;
+            let mut rows = [self.0; ROWS];
+            for (row, values) in rows.iter_mut().zip(self.0.chunks(depth + 1)) {
+                *row = values;
+            }
+            let mut sums = start(simd, [1.0; ROWS]);
+            multiply(simd, rows, 1, &self.1[..depth * width::<S>()], &mut sums);
+            let mut out = vec![0.0; ROWS * width::<S>()];
+            for (row, sums) in out.chunks_mut(width::<S>()).zip(sums) {
+                store::<S>(sums, row);
+            }
+            out
+        }
+    }
+
+    /// One plus the product, on whatever this machine has and on one lane.
+    #[test]
+    fn a_tile_is_a_matrix_product() {
+        let (rows, panel) = (noise(ROWS * 10, 1), noise(9 * 64, 2));
+        let scalar = pulp::Scalar::new().vectorize(Product(&rows, &panel));
+        for out in [scalar, pulp::Arch::new().dispatch(Product(&rows, &panel))] {
+            let width = out.len() / ROWS;
+            for (i, sum) in out.iter().enumerate() {
+                let (row, column) = (i / width, i % width);
+                let exact: f64 = (0..9)
+                    .map(|k| {
+                        f64::from(rows[row * 10 + 1 + k]) * f64::from(panel[k * width + column])
+                    })
+                    .sum();
+                // Ten roundings of values below 3.
+                assert!((f64::from(*sum) - 1.0 - exact).abs() < 10.0 * 3.0 * 6e-8);
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! What a parameter is called in a file.
+//!
+//! | here | in the file |
+//! | --- | --- |
+//! | `gamma`, `beta` of a layer norm | `weight`, `bias` |
+//! | `to_out` | `to_out.0` |
+//! | `ff.proj`, `ff.out` | `ff.net.0.proj`, `ff.net.2` |
+//! | `attentions.0.attention.to_q` (autoencoder) | `attentions.0.to_q` |
+//! | `layers`, `…_embedding`, `final_layer_norm` (text) | below `text_model`, `.encoder`, `.embeddings` |
+
+/// Whose names a file uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// U-Net and autoencoder, as diffusers writes them.
+    Diffusers,
+    /// The text encoder, as transformers writes it.
+    ClipText,
+}
+
+/// Where in a model a parameter lies.
+#[derive(Debug, Default)]
+pub struct ModulePath {
+    segments: Vec<(String, String)>,
+}
+
+impl ModulePath {
+    pub fn enter(&mut self, name: &str, container: &str) {
+        self.segments.push((name.to_owned(), container.to_owned()));
+    }
+
+    pub fn exit(&mut self) {
+        self.segments.pop();
+    }
+
+    /// Whether a file holds the transpose: the matrices of linear layers.
+    pub fn is_transposed(&self, rank: usize) -> bool {
+        let owner = self
+            .segments
+            .iter()
+            .rev()
+            .find(|(_, container)| container.starts_with("Struct:"));
+        rank == 2 && owner.is_some_and(|(_, container)| container == "Struct:Linear")
+    }
+
+    /// The name in a file.
+    pub fn file_name(&self, layout: Layout) -> String {
+        // The variants of an enum of layers are no level of their own.
+        let segments = self.segments.iter().map(|(name, _)| name.as_str());
+        let segments: Vec<&str> = segments
+            .filter(|name| !["Conv", "Linear"].contains(name))
+            .collect();
+        let plain = segments.join(".");
+        match layout {
+            Layout::Diffusers => renamed(&plain),
+            Layout::ClipText => below_text_model(&renamed(&plain)),
+        }
+    }
+}
+
+const RENAMED: [(&str, &str); 6] = [
+    (".gamma", ".weight"),
+    (".beta", ".bias"),
+    (".to_out.", ".to_out.0."),
+    (".ff.proj.", ".ff.net.0.proj."),
+    (".ff.out.", ".ff.net.2."),
+    (".attention.", "."),
+];
+
+fn renamed(name: &str) -> String {
+    RENAMED.iter().fold(name.to_owned(), |name, (here, there)| {
+        name.replace(here, there)
+    })
+}
+
+fn below_text_model(name: &str) -> String {
+    let part = match name {
+        _ if name.starts_with("layers.") => "encoder.",
+        _ if name.contains("_embedding.") => "embeddings.",
+        _ => "",
+    };
+    format!("text_model.{part}{name}")
+}
+
+/// The name that a tensor has today, where it was called otherwise.
+pub(super) fn modern(name: &str) -> String {
+    const OLD: [(&str, &str); 4] = [
+        (".query.", ".to_q."),
+        (".key.", ".to_k."),
+        (".value.", ".to_v."),
+        (".proj_attn.", ".to_out.0."),
+    ];
+    OLD.iter()
+        .fold(name.to_owned(), |name, (old, new)| name.replace(old, new))
+}
+
+/// Buffers that files carry and models do not need.
+pub(super) fn is_buffer(name: &str) -> bool {
+    name.ends_with(".position_ids")
+}

@@ -1,0 +1,339 @@
+//! Everything a run needs to go on, as a folder that is either whole or not there.
+//!
+//! ```text
+//! FOLDER/step-00001200/state.json
+//! FOLDER/step-00001200/tensors-000.safetensors, tensors-001.safetensors, …
+//! ```
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde_json::Value;
+
+use crate::error::{Error, Result};
+
+/// No file of tensors is longer than this \[bytes\], unless a single tensor is.
+const LARGEST_FILE: usize = 11_000_000;
+/// How many of the newest checkpoints stay.
+const KEPT: usize = 2;
+
+/// Tensors by name: shape and numbers.
+pub type Tensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
+
+/// The state of a run after some steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checkpoint {
+    /// Steps made.
+    pub step: usize,
+    /// Those of them that changed the weights.
+    pub applied: usize,
+    /// Whatever is no tensor.
+    pub state: Value,
+    /// Weights, averages.
+    pub tensors: Tensors,
+}
+
+impl Checkpoint {
+    /// Writes the checkpoint below a folder and removes all but the two newest, and what killed runs left: a folder
+    /// belongs to one run and one process, see [`RunFolder`](super::RunFolder).
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::Io`] when something cannot be written; older checkpoints are then still there.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf> {
+        let target = folder.join(format!("step-{:08}", self.step));
+        let temporary = folder.join(format!(".step-{:08}.{}.tmp", self.step, std::process::id()));
+        let written = self.write_files(&temporary).and_then(|()| {
+            if target.exists() {
+                fs::remove_dir_all(&target)?;
+            }
+            fs::rename(&temporary, &target)
+        });
+        if written.is_err() {
+            // The write failed already; what is left of it is the lesser trouble.
+            fs::remove_dir_all(&temporary).ok();
+        }
+        written.map_err(|source| io("write", &target, source))?;
+        sweep(folder)?;
+        let mut old = checkpoints(folder)?;
+        old.truncate(old.len().saturating_sub(KEPT));
+        for (_, path) in old {
+            fs::remove_dir_all(&path).map_err(|source| io("remove", &path, source))?;
+        }
+        Ok(target)
+    }
+
+    /// What keeps a run of this `state` from going on here, if anything does.
+    pub(super) fn differs(&self, state: &Value) -> Option<Error> {
+        let (key, there, here) = difference("", &self.state, state)?;
+        Some(Error::Value(wake_nn::Error::InvalidOption {
+            option: "checkpoint".to_owned(),
+            value: format!("of a run with {key} = {there}"),
+            expected: format!(
+                "{here}; go on with what it was begun with, or choose another folder"
+            ),
+        }))
+    }
+
+    fn write_files(&self, folder: &Path) -> std::io::Result<()> {
+        fs::create_dir_all(folder)?;
+        let (mut part, mut bytes, mut number) = (Vec::new(), 0, 0);
+        for (name, (shape, numbers)) in &self.tensors {
+            if bytes > 0 && bytes + 4 * numbers.len() > LARGEST_FILE {
+                write_part(folder, number, &part)?;
+                (part, bytes, number) = (Vec::new(), 0, number + 1);
+            }
+            bytes += 4 * numbers.len();
+            part.push((name, shape, numbers));
+        }
+        write_part(folder, number, &part)?;
+        let state =
+            serde_json::json!({"step": self.step, "applied": self.applied, "state": self.state});
+        fs::write(folder.join("state.json"), format!("{state:#}\n"))?;
+        for entry in fs::read_dir(folder)? {
+            fs::File::open(entry?.path())?.sync_all()?;
+        }
+        Ok(())
+    }
+
+    /// Reads the newest checkpoint below a folder; `None` where there is none.
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::Io`], [`wake_nn::Error::Json`] or [`wake_nn::Error::InvalidSafetensors`] for a checkpoint that cannot be read.
+    pub fn newest(folder: &Path) -> Result<Option<Self>> {
+        match checkpoints(folder)?.pop() {
+            None => Ok(None),
+            Some((_, path)) => Self::read(&path).map(Some),
+        }
+    }
+
+    /// The step of the newest checkpoint below a folder.
+    pub(super) fn newest_step(folder: &Path) -> Result<Option<usize>> {
+        Ok(checkpoints(folder)?.pop().map(|(step, _)| step))
+    }
+
+    /// Reads one checkpoint.
+    ///
+    /// # Errors
+    ///
+    /// As [`newest`](Self::newest).
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = path.join("state.json");
+        let text = whole_files::read_text(&file)?;
+        let mut state: Value = serde_json::from_str(&text).map_err(|source| Error::Value(wake_nn::Error::Json {
+            path: file.clone(),
+            source,
+        }))?;
+        let count = |key: &str| {
+            let count = state[key].as_u64().and_then(|n| usize::try_from(n).ok());
+            count.ok_or_else(|| Error::Dataset {
+                path: file.clone(),
+                line: 0,
+                message: format!(
+                    "no whole number '{key}'; remove this checkpoint to go on from the one before"
+                ),
+            })
+        };
+        let (step, applied) = (count("step")?, count("applied")?);
+        let mut tensors = Tensors::new();
+        let entries = fs::read_dir(path).map_err(|source| io("read", path, source))?;
+        for entry in entries {
+            let file = entry.map_err(|source| io("read", path, source))?.path();
+            if file
+                .extension()
+                .is_some_and(|extension| extension == "safetensors")
+            {
+                read_part(&file, &mut tensors)?;
+            }
+        }
+        Ok(Self {
+            step,
+            applied,
+            state: state["state"].take(),
+            tensors,
+        })
+    }
+}
+
+/// The first value in which two trees differ: its path, and both values.
+pub(super) fn difference(path: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
+    let below = |key: &str| match path {
+        "" => key.to_owned(),
+        _ => format!("{path}.{key}"),
+    };
+    match (a, b) {
+        _ if a == b => None,
+        (Value::Object(x), Value::Object(y)) => {
+            let keys: std::collections::BTreeSet<&String> = x.keys().chain(y.keys()).collect();
+            let find = |key: &String| difference(&below(key), &a[key], &b[key]);
+            keys.into_iter().find_map(find)
+        }
+        (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
+            let find = |k: usize| difference(&below(&k.to_string()), &x[k], &y[k]);
+            (0..x.len()).find_map(find)
+        }
+        _ => Some((path.to_owned(), short(a), short(b))),
+    }
+}
+
+/// A value in a few words.
+fn short(value: &Value) -> String {
+    match value {
+        Value::Null => "nothing".to_owned(),
+        _ => value.to_string().chars().take(80).collect(),
+    }
+}
+
+fn io(action: &'static str, path: &Path, source: std::io::Error) -> Error {
+    Error::Value(wake_nn::Error::Io {
+        action,
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Removes checkpoints half-written.
+fn sweep(folder: &Path) -> Result<()> {
+    for entry in fs::read_dir(folder).map_err(|source| io("read", folder, source))? {
+        let path = entry.map_err(|source| io("read", folder, source))?.path();
+        if whole_files::is_temporary(&path) {
+            fs::remove_dir_all(&path).map_err(|source| io("remove", &path, source))?;
+        }
+    }
+    Ok(())
+}
+
+/// The checkpoints below a folder, the newest last.
+fn checkpoints(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let entries = fs::read_dir(folder).map_err(|source| io("read", folder, source))?;
+    let mut found = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|source| io("read", folder, source))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if let Some(step) = name
+            .strip_prefix("step-")
+            .and_then(|step| step.parse().ok())
+        {
+            found.push((step, path));
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+type Part<'a> = [(&'a String, &'a Vec<usize>, &'a Vec<f32>)];
+
+fn write_part(folder: &Path, number: usize, part: &Part<'_>) -> std::io::Result<()> {
+    let bytes: Vec<Vec<u8>> = part
+        .iter()
+        .map(|(.., numbers)| numbers.iter().flat_map(|x| x.to_le_bytes()).collect())
+        .collect();
+    let views = part.iter().zip(&bytes).map(|((name, shape, _), bytes)| {
+        let view = TensorView::new(Dtype::F32, (*shape).clone(), bytes);
+        view.map(|view| (name.as_str(), view))
+            .map_err(std::io::Error::other)
+    });
+    let views: Vec<_> = views.collect::<std::io::Result<_>>()?;
+    let path = folder.join(format!("tensors-{number:03}.safetensors"));
+    safetensors::serialize_to_file(views, None, &path).map_err(std::io::Error::other)
+}
+
+fn read_part(path: &Path, tensors: &mut Tensors) -> Result<()> {
+    let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| Error::Value(wake_nn::Error::InvalidSafetensors {
+        path: path.to_owned(),
+        reason,
+    });
+    let bytes = fs::read(path).map_err(|source| io("read", path, source))?;
+    let file = SafeTensors::deserialize(&bytes).map_err(|error| invalid(error.into()))?;
+    for (name, view) in file.tensors() {
+        if view.dtype() != Dtype::F32 {
+            return Err(invalid(format!("{name} is no f32").into()));
+        }
+        let (chunks, _) = view.data().as_chunks::<4>();
+        let numbers = chunks
+            .iter()
+            .map(|chunk| f32::from_le_bytes(*chunk))
+            .collect();
+        tensors.insert(name, (view.shape().to_vec(), numbers));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checkpoint(step: usize) -> Checkpoint {
+        let large = vec![0.25; 2_000_000];
+        Checkpoint {
+            step,
+            applied: step - 1,
+            state: serde_json::json!({"seed": 3}),
+            tensors: BTreeMap::from([
+                (
+                    "a".to_owned(),
+                    (vec![2, 2], vec![1.0, -0.0, f32::MIN_POSITIVE, step as f32]),
+                ),
+                ("b".to_owned(), (vec![2_000_000], large.clone())),
+                ("c".to_owned(), (vec![2_000_000], large)),
+            ]),
+        }
+    }
+
+    #[test]
+    fn the_newest_comes_back_and_two_are_kept_in_small_files() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(
+            Checkpoint::newest(&folder.path().join("none")).unwrap(),
+            None
+        );
+        for step in [5, 20, 100] {
+            checkpoint(step).write(folder.path()).unwrap();
+        }
+        assert_eq!(
+            Checkpoint::newest(folder.path()).unwrap(),
+            Some(checkpoint(100))
+        );
+        let left = checkpoints(folder.path()).unwrap();
+        assert_eq!(
+            left.iter().map(|(step, _)| *step).collect::<Vec<_>>(),
+            [20, 100]
+        );
+        let files: Vec<_> = fs::read_dir(&left[1].1)
+            .unwrap()
+            .map(Result::unwrap)
+            .collect();
+        assert_eq!(files.len(), 3);
+        assert!(
+            files
+                .iter()
+                .all(|file| file.metadata().unwrap().len() <= 12_000_000)
+        );
+    }
+
+    #[test]
+    fn half_a_checkpoint_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        checkpoint(7).write(folder.path()).unwrap();
+        // What a killed run leaves behind has another name.
+        let half = folder.path().join(".step-00000009.1.tmp");
+        fs::create_dir(&half).unwrap();
+        assert_eq!(
+            Checkpoint::newest(folder.path()).unwrap().map(|c| c.step),
+            Some(7)
+        );
+        checkpoint(8).write(folder.path()).unwrap();
+        assert!(!half.exists());
+        fs::remove_dir_all(folder.path().join("step-00000008")).unwrap();
+        let file = folder.path().join("step-00000007/tensors-000.safetensors");
+        fs::write(&file, b"short").unwrap();
+        let refused = Checkpoint::newest(folder.path());
+        assert!(matches!(refused, Err(Error::Value(wake_nn::Error::InvalidSafetensors { .. }))));
+    }
+}

@@ -1,0 +1,187 @@
+//! Simulated images for learning: clear wakes more often, and over them what the simulator does not know: land, islets, piers,
+//! streaks, ships at rest, fronts, borders.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use wake_dataset::{Grey, Pair, Simulated, Source};
+use wake_physics::labels::WakeLabel;
+use wake_physics::labels_of;
+
+use super::draw::Draw;
+use super::sample::wakes;
+use super::sea::{Echoes, border, clutter, front};
+
+/// Scenes of which the first with a clear wake is simulated, at every other position.
+const OF: u64 = 4;
+/// Signal over noise of a clear wake's line.
+const CLEAR: f32 = 8.0;
+/// Share of images with a front.
+const FRONTS: f32 = 0.12;
+/// Clutter this bright, in medians of the image, hides a wake.
+const HIDES: f32 = 0.5;
+/// Random numbers of the clutter, apart from those of other draws of the same seed.
+const STREAM: u64 = 0xC1_77E5;
+
+/// Simulated images under painted clutter.
+#[derive(Debug)]
+pub(crate) struct Cluttered {
+    simulated: Simulated,
+}
+
+impl Cluttered {
+    pub(crate) fn new(simulated: Simulated) -> Self {
+        Self { simulated }
+    }
+
+    /// The scene at a position: at even ones the first of a few that shows a clear wake. Labels tell so before an image is
+    /// simulated.
+    fn chosen(&self, position: u64) -> wake_dataset::Result<u64> {
+        let candidates = position * OF..(position + 1) * OF;
+        if position.is_multiple_of(2) {
+            for index in candidates.clone() {
+                let scene = self.simulated.scene(index)?;
+                let seen = wakes(&labels_of(&scene).objects(), &scene);
+                if seen.iter().any(|wake| wake.snr >= CLEAR) {
+                    return Ok(index);
+                }
+            }
+        }
+        Ok(candidates.start)
+    }
+
+    /// Paints over an image.
+    fn painted_over(&self, mut pair: Pair) -> Pair {
+        let draw = &mut Draw::new(self.simulated.seed() ^ STREAM, pair.index);
+        let size = pair.image.rows;
+        let mut mean = vec![1.0; size * size];
+        if draw.chance(FRONTS) {
+            front(&mut mean, size, draw);
+        }
+        border(&mut mean, size, draw);
+        let mut bright = vec![0.0; size * size];
+        clutter(&mut bright, size, &Echoes::draw(draw), draw);
+        let level = median(&pair.image.pixels);
+        let levels: Vec<u8> = (pair.image.pixels.iter().zip(&mean).zip(&bright))
+            .map(|((grey, factor), bright)| match *factor {
+                0.0 => 0,
+                factor => (255.0 * (grey * factor + level * bright)).round() as u8,
+            })
+            .collect();
+        pair.image = Grey::of_levels(&levels, size, size);
+        let hidden = |i: usize| mean[i] == 0.0 || bright[i] > HIDES;
+        for ship in &mut pair.labels.ships {
+            hide(&mut ship.wake, size, hidden);
+        }
+        pair
+    }
+}
+
+/// Weakens a wake by what is hidden of its line: a matched filter sees the rest.
+fn hide(wake: &mut WakeLabel, size: usize, hidden: impl Fn(usize) -> bool) {
+    let (Some(visibility), Some([a, b, c, d])) = (&mut wake.visibility, wake.oriented_box_px)
+    else {
+        return;
+    };
+    let [from, to] = [[a, b], [c, d]].map(|[p, q]| [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]);
+    const PLACES: usize = 64;
+    let inside = |x: f64| (x >= 0.0 && x < size as f64 - 0.5).then(|| x.round() as usize);
+    let free = (0..PLACES).filter(|&k| {
+        let t = (k as f64 + 0.5) / PLACES as f64;
+        let [x, y] = [0, 1].map(|axis| inside(from[axis] + t * (to[axis] - from[axis])));
+        x.zip(y).is_none_or(|(x, y)| !hidden(y * size + x))
+    });
+    visibility.snr *= (free.count() as f64 / PLACES as f64).sqrt();
+}
+
+fn median(pixels: &[f32]) -> f32 {
+    let mut sorted = pixels.to_vec();
+    let middle = sorted.len() / 2;
+    *sorted.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+impl Source for Cluttered {
+    fn size(&self) -> [usize; 2] {
+        self.simulated.size()
+    }
+
+    fn items(&self, positions: Range<u64>) -> wake_dataset::Result<Vec<Pair>> {
+        let pair = |position| {
+            let pair = self.simulated.pair(self.chosen(position)?)?;
+            Ok(self.painted_over(pair))
+        };
+        positions.into_par_iter().map(pair).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wake_dataset::Recipe;
+    use wake_physics::labels::Visibility;
+
+    fn source() -> Cluttered {
+        let changes = ["scene.grid.rows = 96", "scene.grid.columns = 96"];
+        let recipe = Recipe::detector().and_then(|recipe| recipe.with_assignments(&changes));
+        Cluttered::new(Simulated::new(recipe.expect("a recipe"), 5).expect("a source"))
+    }
+
+    /// Images follow from their positions; where nothing was painted the simulated grey stands.
+    #[test]
+    fn clutter_lies_over_simulated_images() {
+        let source = source();
+        let pairs = source.items(0..6).expect("pairs");
+        assert_eq!(source.items(4..6).expect("pairs"), pairs[4..]);
+        let mut kept = 0;
+        for (position, pair) in (0..).zip(&pairs) {
+            let index = source.chosen(position).expect("a scene");
+            assert!((position * OF..(position + 1) * OF).contains(&index));
+            let below = source.simulated.pair(index).expect("a pair");
+            let same = |(a, b): (&f32, &f32)| (a - b).abs() < 0.5 / 255.0;
+            let pixels = pair.image.pixels.iter().zip(&below.image.pixels);
+            kept += pixels.filter(|&pixel| same(pixel)).count();
+        }
+        let all = 6 * 96 * 96;
+        assert!(kept > all / 4 && kept < all, "{kept} of {all}");
+    }
+
+    /// At even positions a clear wake is there whenever one of the candidates has it.
+    #[test]
+    fn clear_wakes_are_chosen() {
+        let source = source();
+        let clear = |index| {
+            let scene = source.simulated.scene(index).expect("a scene");
+            let seen = wakes(&labels_of(&scene).objects(), &scene);
+            seen.iter().any(|wake| wake.snr >= CLEAR)
+        };
+        let (mut chosen, mut first) = (0, 0);
+        for position in (0..40).step_by(2) {
+            let index = source.chosen(position).expect("a scene");
+            let any = (position * OF..(position + 1) * OF).any(clear);
+            assert_eq!(clear(index), any);
+            chosen += usize::from(any);
+            first += usize::from(clear(position * OF));
+        }
+        assert!(chosen > first, "{chosen} {first}");
+    }
+
+    /// Three quarters of a line under land leave half its signal over noise; a wake that is free keeps it.
+    #[test]
+    fn hidden_wakes_are_weaker() {
+        let label = || WakeLabel {
+            visibility: Some(Visibility {
+                contrast_db: 1.0,
+                snr: 2.0,
+            }),
+            oriented_box_px: Some([[0.0, 10.0], [0.0, 20.0], [80.0, 20.0], [80.0, 10.0]]),
+            ..WakeLabel::default()
+        };
+        for (from, expected) in [(20, 1.0), (200, 2.0), (0, 0.0)] {
+            let mut wake = label();
+            hide(&mut wake, 96, |i| i % 96 >= from);
+            let snr = wake.visibility.expect("it stays").snr;
+            // One of 64 places more or less.
+            assert!((snr - expected).abs() < 0.04, "{snr} {expected}");
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! What is known beside what was found, as a picture.
+
+use image::RgbImage;
+
+use wake_detector::Detector;
+use wake_detector::drawing::Drawing;
+use wake_detector::GreyImage;
+use crate::detector::FOUND;
+use wake_detector::{Detection, Wake};
+
+/// The colour of wakes that are known.
+const KNOWN: [u8; 3] = [0, 200, 0];
+
+/// An image with the wakes that are to be found in green, and in red and yellow what was found from
+/// [`Detector::OPERATING_POINT`] on.
+#[must_use]
+pub fn compared(image: &GreyImage, wakes: &[Wake], found: &[Detection]) -> RgbImage {
+    let mut drawing = Drawing::new(image);
+    for wake in wakes.iter().filter(|wake| wake.snr >= FOUND) {
+        drawing.ray(wake, KNOWN);
+    }
+    let sure = |one: &&Detection| one.score >= Detector::OPERATING_POINT;
+    drawing.found(found.iter().filter(sure));
+    drawing.into_picture()
+}

@@ -1,0 +1,24 @@
+//! The detector: trained on images made on the fly, scored on images whose wakes are known.
+//!
+//! ```text
+//! recipe ─► source of pairs ─► samples: images with their wakes ─► targets: maps ─► loss ─► network
+//! ```
+
+pub mod judging;
+
+mod cluttered;
+mod draw;
+mod painted;
+mod recipes;
+mod repeated;
+mod sample;
+mod sea;
+mod targets;
+mod training;
+
+pub use painted::Painted;
+pub use recipes::Recipe;
+pub use repeated::Repeated;
+pub use sample::Sample;
+pub use targets::FOUND;
+pub use training::{Training, train};

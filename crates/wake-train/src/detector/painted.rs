@@ -1,0 +1,372 @@
+//! Painted images: a dark line, a bright streak beside it, a blob, correlated noise. No physics at all.
+
+use super::draw::Draw;
+use super::sample::{Sample, pixel_snr};
+use super::sea::{Echoes, Speckle, border, clutter, mottle, quick_look};
+use wake_detector::{Wake, direction};
+use rayon::prelude::*;
+use std::ops::Range;
+use wake_dataset::{Grey, Pair, Source};
+use wake_physics::Scene;
+use wake_physics::labels::{LabelledShip, Labels, ShipLabel, Visibility, WakeLabel};
+
+/// Images painted from a seed.
+#[derive(Debug, Clone, Copy)]
+pub struct Painted {
+    /// Seed of all images.
+    pub seed: u64,
+    /// Rows and columns.
+    pub size: usize,
+}
+
+impl Source for Painted {
+    fn size(&self) -> [usize; 2] {
+        [self.size, self.size]
+    }
+
+    fn items(&self, positions: Range<u64>) -> wake_dataset::Result<Vec<Pair>> {
+        let pair = |index| {
+            let Sample { pixels, wakes, .. } = self.sample(index);
+            let levels: Vec<u8> = pixels.iter().map(|&p| p as u8).collect();
+            let mut scene = Scene {
+                ships: Vec::new(),
+                seed: index,
+                ..Scene::default()
+            };
+            (scene.grid.rows, scene.grid.columns) = (self.size, self.size);
+            Pair {
+                index,
+                image: Grey::of_levels(&levels, self.size, self.size),
+                prompt: String::new(),
+                scene,
+                labels: Labels {
+                    ships: wakes.iter().map(|wake| label(wake, self.size)).collect(),
+                    ..Labels::default()
+                },
+                amplitudes: None,
+            }
+        };
+        Ok(positions.into_par_iter().map(pair).collect())
+    }
+}
+
+/// The label of a wake without a ship.
+fn label(wake: &Wake, size: usize) -> LabelledShip {
+    let corners = wake.oriented_box().map(|corner| corner.map(f64::from));
+    let inside = wake
+        .tip
+        .iter()
+        .all(|x| (0.0..size as f32 - 1.0).contains(x));
+    let [low, high] = [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| {
+        [0, 1].map(|a| {
+            corners
+                .iter()
+                .map(|c| c[a])
+                .reduce(pick)
+                .unwrap_or_default()
+        })
+    });
+    LabelledShip {
+        ship: ShipLabel::default(),
+        wake: WakeLabel {
+            tip_px: inside.then(|| wake.tip.map(f64::from)),
+            axis_deg: Some(f64::from(wake.axis_deg)),
+            half_angle_deg: Some(f64::from(wake.half_angle_deg)),
+            length_px: f64::from(wake.length),
+            visibility: Some(Visibility {
+                contrast_db: 0.0,
+                snr: pixel_snr(wake.snr, wake.length),
+            }),
+            box_px: Some([low[0], low[1], high[0] - low[0], high[1] - low[1]]),
+            oriented_box_px: Some(corners),
+            ..WakeLabel::default()
+        },
+    }
+}
+
+impl Painted {
+    /// Image number `index`, always the same one.
+    #[must_use]
+    pub fn sample(&self, index: u64) -> Sample {
+        let draw = &mut Draw::new(self.seed, index);
+        let size = self.size;
+        let speckle = Speckle::draw(draw);
+        let mut mean = vec![1.0; size * size];
+        mottle(&mut mean, size, draw);
+        border(&mut mean, size, draw);
+        let echoes = Echoes::draw(draw);
+        let mut bright = vec![0.0; size * size];
+        let mut wakes: Vec<Wake> = Vec::new();
+        // Ships of one image often go the same way.
+        let common = draw.between(0.0, 360.0);
+        for _ in 0..draw.one_of(&[0.22, 0.45, 0.2, 0.13]) {
+            let axis_deg = match draw.chance(0.3) {
+                true => common + draw.between(-8.0, 8.0) + 180.0 * draw.one_of(&[0.7, 0.3]) as f32,
+                false => draw.between(0.0, 360.0),
+            };
+            let wake = wake(&mut mean, size, &speckle, axis_deg.rem_euclid(360.0), draw);
+            if draw.chance(0.88) {
+                let shift = echoes.shift(draw);
+                echoes.add(&mut bright, size, [wake.tip, shift], wake.axis_deg, draw);
+            }
+            wakes.push(wake);
+        }
+        clutter(&mut bright, size, &echoes, draw);
+        speckle.apply(&mut mean, size, draw);
+        mean.iter_mut().zip(bright).for_each(|(m, b)| *m += b);
+        let pixels = quick_look(mean, draw);
+        Sample {
+            size,
+            pixels,
+            wakes,
+        }
+    }
+}
+
+/// A line along a wake.
+struct Line {
+    /// Contrast at its beginning, relative to the mean.
+    contrast: f32,
+    /// Distance over which it falls to a third \[pixels\].
+    fade: f32,
+    /// Standard deviation of the profile at its beginning \[pixels\].
+    width: f32,
+    /// Distance from the axis at the beginning \[pixels\], and growth of it along the wake.
+    beside: f32,
+    opening: f32,
+}
+
+impl Line {
+    fn at(&self, along: f32, across: f32) -> f32 {
+        // A turbulent wake widens with the fifth root of the distance.
+        let wider = (1.0 + along / 20.0).powf(0.2);
+        let off = (across - self.beside * wider - self.opening * along) / (self.width * wider);
+        match off.abs() < 3.5 {
+            true => self.contrast * (-0.5 * off * off - 1.1 * along / self.fade).exp(),
+            false => 0.0,
+        }
+    }
+}
+
+/// The lines of a wake, contrasts relative to the strongest one, and half the angle they open [tangent].
+fn lines(length: f32, draw: &mut Draw) -> (Vec<Line>, f32) {
+    let zoom = draw.scale(0.7, 1.6);
+    let side = draw.sign();
+    let dark = Line {
+        contrast: -1.0,
+        fade: length,
+        width: zoom * draw.scale(1.3, 6.0),
+        beside: 0.0,
+        opening: 0.0,
+    };
+    let opening = match draw.chance(0.5) {
+        true => side * draw.between(0.0, 8f32.to_radians()),
+        false => 0.0,
+    };
+    let bright = Line {
+        contrast: draw.scale(0.4, 1.8),
+        fade: length * draw.scale(0.4, 1.3),
+        width: dark.width * draw.scale(0.5, 1.5),
+        beside: side * 1.8 * dark.width,
+        opening,
+    };
+    let mut lines = match draw.one_of(&[0.46, 0.24, 0.2, 0.1]) {
+        0 => vec![dark, bright],
+        1 => vec![dark],
+        // A bright line alone is the axis itself.
+        2 => vec![Line {
+            beside: 0.0,
+            opening: 0.0,
+            ..bright
+        }],
+        _ => {
+            let opening = draw.between(2.0, 16.0).to_radians();
+            let arm = |side: f32| Line {
+                beside: 0.0,
+                opening: side * opening,
+                ..bright
+            };
+            vec![arm(-1.0), arm(1.0)]
+        }
+    };
+    let mut half_angle = lines.iter().map(|l| l.opening.abs()).fold(0.0, f32::max);
+    for side in [-1.0, 1.0] {
+        if draw.chance(0.25) {
+            let opening = draw.between(10.0, 20.0).to_radians().tan();
+            let sign = if draw.chance(0.75) { 0.8 } else { -0.5 };
+            lines.push(Line {
+                contrast: sign * draw.scale(0.5, 1.5),
+                fade: length * draw.scale(0.4, 1.2),
+                width: zoom * draw.scale(1.2, 4.0),
+                beside: 0.0,
+                opening: side * opening,
+            });
+            half_angle = half_angle.max(opening);
+        }
+    }
+    (lines, half_angle)
+}
+
+/// A tip, most often in the image, from where the image shows at least some of the wake.
+fn place(mean: &[f32], size: usize, axis_deg: f32, length: f32, draw: &mut Draw) -> [f32; 2] {
+    let s = size as f32;
+    let margin = if draw.chance(0.1) { 0.15 } else { 0.0 };
+    let [right, down] = direction(axis_deg);
+    let seen = |x: f32, y: f32| {
+        let inside = (0.0..s).contains(&x) && (0.0..s).contains(&y);
+        inside && mean[y as usize * size + x as usize] > 0.0
+    };
+    let mut tip = [0.0; 2];
+    for _ in 0..12 {
+        tip = [0, 1].map(|_| draw.between(-margin, 1.0 + margin) * s);
+        let far = length.min(80.0);
+        if (margin > 0.0 || seen(tip[0], tip[1])) && seen(tip[0] + far * right, tip[1] + far * down)
+        {
+            break;
+        }
+    }
+    tip
+}
+
+/// Multiplies a mean with a wake.
+fn wake(mean: &mut [f32], size: usize, speckle: &Speckle, axis_deg: f32, draw: &mut Draw) -> Wake {
+    let length = draw.scale(45.0, 500.0);
+    let (lines, half_angle) = lines(length, draw);
+    let tip = place(mean, size, axis_deg, length, draw);
+    let bend = match draw.chance(0.3) {
+        true => draw.normal() * 12.0 / (length * length),
+        false => 0.0,
+    };
+    let gap = match draw.chance(0.3) {
+        true => draw.between(0.0, 30.0),
+        false => 0.0,
+    };
+    let rough = draw.between(0.0, 0.6);
+    let texture: Vec<f32> = (0..64).map(|_| (rough * draw.normal()).exp()).collect();
+    let [right, down] = direction(axis_deg);
+    // Pixels that the wake changes: where they are, how far along the wake, and by how much.
+    let mut changes: Vec<(usize, f32, f32)> = Vec::new();
+    for (i, m) in mean.iter().enumerate() {
+        let (x, y) = ((i % size) as f32 - tip[0], (i / size) as f32 - tip[1]);
+        let along = x * right + y * down;
+        if *m <= 0.0 || !(0.0..2.5 * length).contains(&along) {
+            continue;
+        }
+        let across = y * right - x * down - bend * along * along;
+        // Nothing of a wake lies further off than this.
+        if across.abs() > 40.0 + 0.4 * along {
+            continue;
+        }
+        let knot = along / 12.0;
+        let [a, b] = [0, 1].map(|k| texture[(knot as usize + k) % 64]);
+        let grain = a + (b - a) * knot.fract();
+        let begin = ((along - gap + 4.0) / 8.0).clamp(0.0, 1.0);
+        let change: f32 = lines.iter().map(|line| line.at(along, across)).sum();
+        changes.push((i, along, begin * grain * change));
+    }
+    // Strength follows from the signal over noise that is wanted, as far as contrasts go.
+    let power = changes.iter().map(|c| c.2 * c.2).sum::<f32>() / speckle.correlated_pixels();
+    let peak = changes.iter().map(|c| c.2.abs()).fold(0.0, f32::max);
+    let strength = (draw.scale(3.5, 35.0) / power.sqrt()).min(MOST / peak);
+    let strength = if strength.is_finite() {
+        strength * speckle.spread
+    } else {
+        0.0
+    };
+    let (mut power, mut reach) = (0.0, 0.0f32);
+    for (i, along, change) in changes {
+        let change = (strength * change).max(-0.8);
+        mean[i] *= 1.0 + change;
+        let z = change / speckle.spread;
+        power += z * z;
+        if z.abs() > VISIBLE {
+            reach = reach.max(along);
+        }
+    }
+    Wake {
+        tip,
+        axis_deg,
+        half_angle_deg: half_angle.atan().to_degrees(),
+        length: reach.max(20.0),
+        snr: (power / speckle.correlated_pixels()).sqrt(),
+        contrast_db: None,
+    }
+}
+
+/// The largest contrast \[standard deviations of a pixel\].
+const MOST: f32 = 4.0;
+/// Contrast that counts as visible, in standard deviations of a pixel.
+const VISIBLE: f32 = 0.3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_follows_from_seed_and_number() {
+        let source = Painted { seed: 5, size: 96 };
+        assert_eq!(source.sample(3), source.sample(3));
+        assert_ne!(source.sample(3).pixels, source.sample(4).pixels);
+        assert_ne!(
+            source.sample(3).pixels,
+            Painted { seed: 6, size: 96 }.sample(3).pixels
+        );
+    }
+
+    /// What a loader gives of a painted image is what was painted.
+    #[test]
+    fn pairs_keep_the_wakes() {
+        let source = Painted { seed: 5, size: 96 };
+        for index in 0..20 {
+            let (sample, pair) = (
+                source.sample(index),
+                &source.items(index..index + 1).expect("a pair")[0],
+            );
+            let again = Sample::of_pair(pair);
+            assert_eq!(again.pixels, sample.pixels);
+            assert_eq!(again.wakes.len(), sample.wakes.len());
+            for (a, b) in again.wakes.iter().zip(&sample.wakes) {
+                // Corners, directions and roots in single precision, of numbers up to some hundred.
+                let apart = (a.tip[0] - b.tip[0]).hypot(a.tip[1] - b.tip[1]);
+                assert!(
+                    apart < 1e-3 && (a.axis_deg - b.axis_deg).abs() < 1e-3,
+                    "{a:?} {b:?}"
+                );
+                assert!((a.length - b.length).abs() < 1e-3 && (a.snr / b.snr - 1.0).abs() < 1e-4);
+            }
+        }
+    }
+
+    /// The dark line lies where the label says: pixels along the ray are darker than those beside it.
+    #[test]
+    fn a_dark_line_lies_on_its_ray() {
+        let (size, speckle) = (
+            256,
+            Speckle {
+                spread: 0.2,
+                filter: [0.0; 2],
+            },
+        );
+        let mut found = 0;
+        for index in 0..60 {
+            let mut mean = vec![1.0; size * size];
+            let draw = &mut Draw::new(1, index);
+            let wake = wake(&mut mean, size, &speckle, 37.0 * index as f32 % 360.0, draw);
+            let grey = |along: f32, across: f32| {
+                let ([x, y], [right, down]) = (wake.at(along), wake.direction());
+                let (x, y) = ((x - across * down).round(), (y + across * right).round());
+                let inside = |v: f32| (0.0..size as f32).contains(&v);
+                (inside(x) && inside(y)).then(|| mean[y as usize * size + x as usize])
+            };
+            let mean_of = |across: f32| {
+                let greys: Vec<f32> = (20..60).filter_map(|a| grey(a as f32, across)).collect();
+                greys.iter().sum::<f32>() / greys.len() as f32
+            };
+            let (on, beside) = (mean_of(0.0), mean_of(60.0));
+            assert!((beside - 1.0).abs() < 1e-6 || beside.is_nan());
+            found += usize::from((on - 1.0).abs() > 0.02);
+        }
+        // All but those outside the frame, a V that has opened, and the weakest.
+        assert!(found > 40, "{found} of 60");
+    }
+}

@@ -1,0 +1,164 @@
+//! Images to learn from, by name.
+
+use std::sync::Arc;
+
+use wake_ldm::WakeSampler;
+use wake_dataset::{Mixture, Recipe as SceneRecipe, Sampled, Simulated, Source};
+use wake_nn::device_named;
+
+use super::cluttered::Cluttered;
+use super::painted::Painted;
+
+/// What the images of a training run, or of an evaluation, show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recipe {
+    /// Painted lines, streaks and blobs, no physics
+    Painted,
+    /// Simulated: X band over an open sea with at most one ship, at satellite pixels
+    Plain,
+    /// Simulated: several sensors with their response and noise, and the ship's echo
+    Echo,
+    /// The same, and the edges of the turbulent wake
+    Edge,
+    /// The recipe detector: all that, gusts, swell, slicks, shallow water, several ships
+    Detector,
+    /// The same, clear wakes more often, under painted land, piers, streaks, fronts and borders
+    Cluttered,
+    /// The recipe detector, drawn by the wake model
+    Sampled,
+    /// Painted and simulated images (detector) in turn
+    Mixed,
+    /// Painted and simulated images (cluttered) in turn
+    Full,
+}
+
+/// What the recipe detector is without gusts, swell, slicks, shallow water and a second ship.
+const CALM: [&str; 5] = [
+    "draw.count = { one_of = [0, 1], weights = [1, 4] }",
+    "draw.sea.gust_strength = 0",
+    "draw.sea.swell_height = 0",
+    "draw.sea.slick_damping = 0",
+    "draw.sea.depth = \"infinite\"",
+];
+/// And without edges.
+const NO_EDGE: [&str; 1] = ["scene.ship.edge = false"];
+/// And without echo, breaking waves, sensors, responses and noise.
+const PLAIN: [&str; 5] = [
+    "scene.ship.echo = false",
+    "scene.sea.breaking = false",
+    "draw.together = [{ \"grid.spacing\" = [5, 25], \"radar.incidence\" = [20, 45] }]",
+    "draw.radar.noise_floor = -60",
+    "draw.radar.looks = [1, 8]",
+];
+
+impl Recipe {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Painted,
+        Self::Plain,
+        Self::Echo,
+        Self::Edge,
+        Self::Detector,
+        Self::Cluttered,
+        Self::Sampled,
+        Self::Mixed,
+        Self::Full,
+    ];
+
+    /// Its name on the command line and in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Painted => "painted",
+            Self::Plain => "plain",
+            Self::Echo => "echo",
+            Self::Edge => "edge",
+            Self::Detector => "detector",
+            Self::Cluttered => "cluttered",
+            Self::Sampled => "sampled",
+            Self::Mixed => "mixed",
+            Self::Full => "full",
+        }
+    }
+
+    /// What its images show, in a line.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Painted => "Painted lines, streaks and blobs, no physics",
+            Self::Plain => {
+                "Simulated: X band over an open sea with at most one ship, at satellite pixels"
+            }
+            Self::Echo => {
+                "Simulated: several sensors with their response and noise, and the ship's echo"
+            }
+            Self::Edge => "The same, and the edges of the turbulent wake",
+            Self::Detector => {
+                "The recipe detector: all that, gusts, swell, slicks, shallow water, several ships"
+            }
+            Self::Cluttered => {
+                "The same, clear wakes more often, under painted land, piers, streaks, fronts and borders"
+            }
+            Self::Sampled => "The recipe detector, drawn by the wake model",
+            Self::Mixed => "Painted and simulated images (detector) in turn",
+            Self::Full => "Painted and simulated images (cluttered) in turn",
+        }
+    }
+
+    /// Images of `size` rows and columns.
+    ///
+    /// # Errors
+    ///
+    /// Of the recipe or the model; the wake model draws 256 rows and columns alone.
+    pub fn source(self, seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
+        let changes: [&[&str]; 3] = match self {
+            Self::Plain => [&CALM, &NO_EDGE, &PLAIN],
+            Self::Echo => [&CALM, &NO_EDGE, &[]],
+            Self::Edge => [&CALM, &[], &[]],
+            Self::Detector => [&[]; 3],
+            Self::Cluttered => {
+                return Ok(Arc::new(Cluttered::new(simulated(&[], seed, size)?)));
+            }
+            Self::Painted => return Ok(Arc::new(Painted { seed, size })),
+            Self::Sampled => {
+                let sampler = WakeSampler::pretrained(&device_named("flex")?)?;
+                let scenes = simulated(&[], seed, size)?;
+                return Ok(Arc::new(Sampled::new(sampler, scenes)?));
+            }
+            Self::Mixed => return in_turn([Self::Painted, Self::Detector], seed, size),
+            Self::Full => return in_turn([Self::Painted, Self::Cluttered], seed, size),
+        };
+        Ok(Arc::new(simulated(&changes.concat(), seed, size)?))
+    }
+
+    /// Images of the open sea of the recipe detector, or of plain pixels: without ships and slicks.
+    ///
+    /// # Errors
+    ///
+    /// Of the recipe.
+    pub fn open_sea(plain: bool, seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
+        let changes: [&[&str]; 3] = match plain {
+            true => [&CALM, &NO_EDGE, &PLAIN],
+            false => [&[]; 3],
+        };
+        let empty = ["draw.count = 0", "draw.sea.slick_damping = 0"];
+        let changes = [&changes.concat()[..], &empty].concat();
+        Ok(Arc::new(simulated(&changes, seed, size)?))
+    }
+}
+
+/// Images of both recipes in turn.
+fn in_turn(recipes: [Recipe; 2], seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
+    let part = |recipe: Recipe| Ok((1.0, recipe.source(seed, size)?));
+    let parts = recipes.into_iter().map(part);
+    Ok(Arc::new(Mixture::new(
+        parts.collect::<wake_dataset::Result<_>>()?,
+    )?))
+}
+
+/// The recipe detector with changes.
+fn simulated(changes: &[&str], seed: u64, size: usize) -> wake_dataset::Result<Simulated> {
+    let pixels = ["rows", "columns"].map(|side| format!("scene.grid.{side} = {size}"));
+    let recipe = SceneRecipe::detector()?.with_assignments(&pixels)?;
+    Simulated::new(recipe.with_assignments(changes)?, seed)
+}

@@ -1,0 +1,234 @@
+//! Images to learn from, and where the wakes are in them.
+
+use wake_dataset::{Batch, Pair};
+use wake_physics::Scene;
+use wake_physics::labels::{Class, Object};
+
+use super::draw::Draw;
+use wake_detector::GreyImage;
+use wake_detector::Wake;
+
+/// An image with its wakes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// Rows and columns of a square image.
+    pub size: usize,
+    /// Grey levels from 0 to 255, row by row.
+    pub pixels: Vec<f32>,
+    /// All wakes, the weak ones too.
+    pub wakes: Vec<Wake>,
+}
+
+/// Width of the line that is looked for \[pixels\].
+const LINE: f64 = 16.0;
+/// How long the wake of a ship may be that is not to be seen \[pixels\], and its signal over noise: between what is to be
+/// found and what is sea.
+const UNSURE: (f32, f32) = (80.0, 3.0);
+
+impl Sample {
+    /// The images of a batch; all are square.
+    pub(crate) fn of_batch(batch: Batch) -> Vec<Self> {
+        let [_, _, size, _] = batch.images.dims();
+        let grey: Vec<f32> = batch.images.into_data().iter::<f32>().collect();
+        let images = grey.chunks_exact((size * size).max(1));
+        let labels = batch.objects.iter().zip(&batch.scenes);
+        let sample = |(grey, (objects, scene)): (&[f32], (&Vec<Object>, &Scene))| Self {
+            size,
+            pixels: grey.iter().map(|g| (127.5 * (g + 1.0)).round()).collect(),
+            wakes: wakes(objects, scene),
+        };
+        images.zip(labels).map(sample).collect()
+    }
+
+    /// One image; it is square.
+    #[must_use]
+    pub fn of_pair(pair: &Pair) -> Self {
+        Self {
+            size: pair.image.rows,
+            pixels: pair.image.levels().into_iter().map(f32::from).collect(),
+            wakes: wakes(&pair.labels.objects(), &pair.scene),
+        }
+    }
+
+    /// The image alone.
+    #[must_use]
+    pub fn image(&self) -> GreyImage {
+        GreyImage::from_levels(self.size, self.size, &self.pixels)
+    }
+
+    /// The image as other geometries have it: mirrored, or with rows and columns exchanged.
+    pub(crate) fn turned(self, draw: &mut Draw) -> Self {
+        let size = self.size;
+        let [exchange, left_right] = [draw.chance(0.5), draw.chance(0.5)];
+        let last = size as f32 - 1.0;
+        let (mut pixels, mut wakes) = (self.pixels, self.wakes);
+        if exchange {
+            pixels = (0..size * size)
+                .map(|i| pixels[i % size * size + i / size])
+                .collect();
+            for wake in &mut wakes {
+                wake.tip.reverse();
+                // Right becomes down: the angle from up becomes that from left, the other way round.
+                wake.axis_deg = (270.0 - wake.axis_deg).rem_euclid(360.0);
+            }
+        }
+        if left_right {
+            pixels.chunks_exact_mut(size).for_each(<[f32]>::reverse);
+            for wake in &mut wakes {
+                wake.tip[0] = last - wake.tip[0];
+                wake.axis_deg = (-wake.axis_deg).rem_euclid(360.0);
+            }
+        }
+        Self {
+            size,
+            pixels,
+            wakes,
+        }
+    }
+}
+
+/// The wakes of a scene: those that its labels show, and those of its other ships under way, which nobody is sure of.
+///
+/// A wake's line begins at the stern. A scene without ships is of a painted image: its wakes are the objects alone.
+pub(crate) fn wakes(objects: &[Object], scene: &Scene) -> Vec<Wake> {
+    let mut seen: Vec<&Object> = objects.iter().filter(|o| o.class == Class::Wake).collect();
+    let grid = &scene.grid;
+    // The origin lies at a pixel's centre; azimuth grows upward.
+    let middle = [(grid.columns / 2) as f64, (grid.rows / 2) as f64];
+    let pixel = |[x, y]: [f64; 2]| [middle[0] + x / grid.spacing, middle[1] - y / grid.spacing];
+    let mut wakes = Vec::new();
+    for ship in scene.ships.iter().filter(|ship| ship.speed > 0.0) {
+        let axis = (ship.heading + 180.0).rem_euclid(360.0);
+        let astern = [axis.to_radians().sin(), axis.to_radians().cos()];
+        let stern = [0, 1].map(|a| ship.position[a] + 0.5 * ship.length * astern[a]);
+        let hull = ship.length / grid.spacing;
+        let label = seen.iter().position(|o| (o.axis_deg - axis).abs() < 1e-9);
+        let object = label.map(|at| seen.swap_remove(at));
+        let half_angle = object.map_or(0.0, |o| o.half_angle_deg);
+        let (length, snr) = match object {
+            Some(object) => (
+                (object.length_px - hull).max(LINE) as f32,
+                line_snr(object, scene),
+            ),
+            None => UNSURE,
+        };
+        wakes.push(Wake {
+            tip: pixel(stern).map(|x| x as f32),
+            axis_deg: axis as f32,
+            half_angle_deg: half_angle as f32,
+            length,
+            snr,
+            contrast_db: object.and_then(|o| Some(o.visibility?.contrast_db as f32)),
+        });
+    }
+    wakes.extend(seen.into_iter().map(|object| painted(object, scene)));
+    wakes
+}
+
+/// A wake that no ship of the scene has: its box begins at its tip.
+fn painted(object: &Object, scene: &Scene) -> Wake {
+    let [port, starboard, ..] = object.oriented_box_px;
+    let tip = [0, 1].map(|a| 0.5 * (port[a] + starboard[a]));
+    Wake {
+        tip: object.tip.unwrap_or(tip).map(|x| x as f32),
+        axis_deg: object.axis_deg as f32,
+        half_angle_deg: object.half_angle_deg as f32,
+        length: object.length_px as f32,
+        snr: line_snr(object, scene),
+        contrast_db: None,
+    }
+}
+
+/// Signal over noise of the whole line, from that of a pixel.
+///
+/// ```text
+/// snr √(length · width / correlated pixels),   correlated pixels = resolution over spacing, at least 1, in both directions
+/// ```
+fn line_snr(object: &Object, scene: &Scene) -> f32 {
+    let pixels = |resolution: f64| (resolution / scene.grid.spacing).max(1.0);
+    let correlated = scene
+        .radar
+        .range_resolution
+        .map_or(1.0, |range| pixels(range) * pixels(scene.radar.resolution));
+    let snr = object.visibility.map_or(f64::INFINITY, |v| v.snr);
+    (snr * (object.length_px * LINE / correlated).sqrt()) as f32
+}
+
+/// What [`line_snr`] is of an image without correlation, as that of a pixel.
+pub(crate) fn pixel_snr(line: f32, length: f32) -> f64 {
+    f64::from(line) / (f64::from(length) * LINE).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Turned images keep their labels: the pixel of a tip is the same one.
+    #[test]
+    fn a_turned_image_has_turned_labels() {
+        let size = 32;
+        for seed in 0..8 {
+            let mut pixels = vec![0.0; size * size];
+            (pixels[5 * size + 9], pixels[5 * size + 12]) = (200.0, 100.0);
+            let wake = Wake {
+                tip: [9.0, 5.0],
+                axis_deg: 90.0,
+                half_angle_deg: 1.0,
+                length: 3.0,
+                snr: 9.0,
+                contrast_db: None,
+            };
+            let sample = Sample {
+                size,
+                pixels,
+                wakes: vec![wake],
+            };
+            let turned = sample.turned(&mut Draw::new(seed, 1));
+            let grey =
+                |[x, y]: [f32; 2]| turned.pixels[y.round() as usize * size + x.round() as usize];
+            let wake = turned.wakes[0];
+            assert!(
+                grey(wake.tip) > 150.0 && (grey(wake.at(3.0)) - 100.0).abs() < 1.0,
+                "{wake:?}"
+            );
+        }
+    }
+
+    /// A scene's wake begins at the stern and runs astern, whether it is seen or not; what is seen is surer the longer it
+    /// is and the less its pixels are correlated.
+    #[test]
+    fn wakes_of_a_scene_begin_at_the_stern() {
+        let changes = [
+            "ship.heading=90",
+            "ship.length=200",
+            "ship.position=[100, -50]",
+            "ship.speed=8",
+            "grid.spacing=10",
+            "radar.looks=50",
+        ];
+        let scene = Scene::default()
+            .with_assignments(&changes)
+            .expect("a scene");
+        let seen = wakes(&wake_physics::labels_of(&scene).objects(), &scene);
+        let [wake] = seen[..] else {
+            panic!("{seen:?}");
+        };
+        // 512 pixels around pixel 256; the stern lies 100 m left of midship, azimuth grows upward.
+        assert!((wake.tip[0] - 256.0).abs() < 1e-3 && (wake.tip[1] - 261.0).abs() < 1e-3);
+        assert!(
+            (wake.axis_deg - 270.0).abs() < 1e-4 && wake.snr > 5.0,
+            "{wake:?}"
+        );
+        assert!(wake.contrast_db.is_some_and(|db| db > 0.1));
+        let unseen = wakes(&[], &scene)[0];
+        assert_eq!((unseen.tip, unseen.axis_deg), (wake.tip, wake.axis_deg));
+        assert_eq!((unseen.length, unseen.snr), UNSURE);
+        let object = wake_physics::labels_of(&scene).objects()[0];
+        let mut correlated = scene.clone();
+        correlated.radar.range_resolution = Some(40.0);
+        correlated.radar.resolution = 20.0;
+        // Eight pixels of ten metres count as one.
+        let ratio = line_snr(&object, &scene) / line_snr(&object, &correlated);
+        assert!((ratio - 8f32.sqrt()).abs() < 1e-4, "{ratio}");
+    }
+}

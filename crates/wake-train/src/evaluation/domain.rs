@@ -1,0 +1,84 @@
+//! How like simulated images others are over all scenes of a recipe, before speckle and with it.
+
+use std::time::Instant;
+
+use burn::tensor::Device;
+use rayon::prelude::*;
+use serde::Serialize;
+use wake_physics::{Field, Scene};
+
+use super::judge::told_apart;
+use super::pixels::grey;
+use super::source::{ImageSource, Told, draw_all};
+use crate::error::Result;
+use wake_ldm::sampler::speckled;
+use crate::TwoSample;
+
+/// One kind of image against simulated ones of the same scenes.
+#[derive(Debug, Clone, Serialize)]
+pub struct DomainRow {
+    /// Kind of image.
+    pub image: &'static str,
+    /// The judge's finding on grey before speckle; `None` of less than four scenes.
+    pub before_speckle: Option<TwoSample>,
+    /// The same with the speckle of each scene's radar.
+    pub with_speckle: Option<TwoSample>,
+    /// Seconds of one image on all cores, speckle apart.
+    pub seconds: f64,
+}
+
+/// Grey of a source's images, before speckle and with it, in the order of the scenes.
+#[derive(Debug, Clone)]
+pub struct Views {
+    /// Before speckle.
+    pub plain: Vec<Field>,
+    /// With the speckle of each scene's radar, as a user of a data set sees them.
+    pub speckled: Vec<Field>,
+    /// Seconds of one image on all cores, speckle apart.
+    pub seconds: f64,
+}
+
+impl Views {
+    /// Draws scenes, of which the source is told all.
+    ///
+    /// - `step`: told the number of images after each batch
+    ///
+    /// # Errors
+    ///
+    /// As [`ImageSource::draw`].
+    pub fn draw(source: &dyn ImageSource, scenes: &[Scene], step: impl FnMut(u64)) -> Result<Self> {
+        let start = Instant::now();
+        let images = draw_all(source, scenes, Told::Scene, step)?;
+        let seconds = start.elapsed().as_secs_f64() / scenes.len().max(1) as f64;
+        Ok(Self {
+            speckled: greys_with_speckle(scenes, &images)?,
+            plain: images.iter().map(grey).collect(),
+            seconds,
+        })
+    }
+
+    /// How well a judge tells these images from simulated ones of the same scenes and other seas.
+    ///
+    /// - `device`: of the judge, one that holds no gradients
+    ///
+    /// # Errors
+    ///
+    /// As [`told_apart`].
+    pub fn row(&self, image: &'static str, simulated: &Self, device: &Device) -> Result<DomainRow> {
+        Ok(DomainRow {
+            image,
+            before_speckle: told_apart(&simulated.plain, &self.plain, device)?,
+            with_speckle: told_apart(&simulated.speckled, &self.speckled, device)?,
+            seconds: self.seconds,
+        })
+    }
+}
+
+/// Grey of images with the speckle of their scenes.
+fn greys_with_speckle(scenes: &[Scene], images: &[Field]) -> Result<Vec<Field>> {
+    let pairs: Vec<_> = scenes.iter().zip(images).collect();
+    let greys = pairs
+        .par_iter()
+        .map(|(scene, image)| Ok(grey(&speckled(image, scene)?)));
+    greys.collect()
+}

@@ -1,0 +1,58 @@
+//! How good generated images are: every figure beside the simulator's own.
+//!
+//! ```text
+//! scenes ─► ImageSource ─► intensity ─► readings of heading, speed, wind and incidence ─► rows of errors, swaps
+//!                              └─► grey ─► pixels, rungs, wake correlation, two-sample judge, domain
+//! real images ─► pairs of windows ─► kinds of sea ─► rows
+//! ```
+//!
+//! Two simulated images of one scene are unlike each other, for their seas are random. So every figure stands beside that
+//! of a second simulated image, of the physics without a network ([`Baseline`]), of a constant image and of a blurred one: good is
+//! what comes as close to a simulated image as another simulated image does.
+//!
+//! Every type whose name ends in `Row` is a line of a report, and is serialized under the names of its fields. Whatever draws
+//! images can be judged, see [`ImageSource`]:
+//!
+//! ```
+//! use wake_train::evaluation::{Baseline, ImageSource, Quantity, Reading, Told};
+//! use wake_physics::Scene;
+//!
+//! let scenes = [Scene::default().with_assignments(&["grid.rows = 64", "grid.columns = 64"])?];
+//! let images = Baseline::Gaussian.draw(&scenes, Told::Both)?;
+//! let reading = Reading::of(&images[0], &scenes[0])?;
+//! println!("error of the wind speed {:?} m/s", reading.error(Quantity::WindSpeed, &scenes[0]));
+//! # Ok::<(), wake_ldm::Error>(())
+//! ```
+
+// What is judged, and what beside it.
+mod baseline;
+mod source;
+
+// Figures of images.
+mod judge;
+mod pixels;
+mod reading;
+mod statistics;
+
+// Figures of sources, over scenes.
+mod comparison;
+mod domain;
+mod measurements;
+mod rungs;
+mod swaps;
+mod wake_correlation;
+
+pub mod sea;
+
+pub use baseline::Baseline;
+pub use comparison::Comparison;
+pub use domain::{DomainRow, Views};
+pub use judge::told_apart;
+pub use measurements::MeasurementRow;
+pub use pixels::{PixelRow, PixelTally, grey};
+pub use reading::{Quantity, Reading};
+pub use rungs::{RungRow, rungs};
+pub use source::{BATCH, ImageSource, Told, draw_all, other_sea};
+pub use statistics::{AbsoluteErrors, mean, quantile};
+pub use swaps::{SwapRow, swaps};
+pub use wake_correlation::{WakeCorrelation, wake_correlation};

@@ -1,0 +1,106 @@
+//! What one kind of sea looks like.
+
+use serde::Serialize;
+use wake_physics::Field;
+use wake_physics::measure::{Binning, Texture, radial_spectrum, texture};
+
+use wake_ldm::sea_texture::PATCH;
+use crate::TwoSample;
+
+/// Figures of one kind of sea, means over its windows.
+#[derive(Debug, Clone, Serialize)]
+pub struct SeaRow {
+    /// Name of the kind.
+    pub kind: &'static str,
+    /// Against the right halves; `None` of these themselves.
+    pub two_sample: Option<TwoSample>,
+    /// Root mean square over the rings of the difference of the mean radial spectrum, of windows of variance 1 \[dB\].
+    pub spectrum_db: f64,
+    /// Correlation of speckle one and two pixels apart, along rows and along columns.
+    pub correlations: [f64; 4],
+    /// Skewness of speckle.
+    pub skewness: f64,
+    /// Standard deviation over mean of the means of blocks of 8 and of 32 pixels.
+    pub block_variation: [f64; 2],
+}
+
+impl SeaRow {
+    /// The row of some windows of [`PATCH`] rows and columns.
+    ///
+    /// - `reference`: [`mean_spectrum`] of what they stand against
+    #[must_use]
+    pub fn of(
+        kind: &'static str,
+        windows: &[Field],
+        reference: &[f64],
+        two_sample: Option<TwoSample>,
+    ) -> Self {
+        let textures: Vec<_> = windows.iter().filter_map(|f| texture(f, PATCH)).collect();
+        let mean = |of: &dyn Fn(&Texture) -> f64| {
+            textures.iter().map(of).sum::<f64>() / textures.len().max(1) as f64
+        };
+        let spectrum = mean_spectrum(windows);
+        let squares = spectrum.iter().zip(reference).map(|(a, b)| (a - b).powi(2));
+        Self {
+            kind,
+            two_sample,
+            spectrum_db: (squares.sum::<f64>() / reference.len().max(1) as f64).sqrt(),
+            correlations: [
+                mean(&|t| t.along_rows[0]),
+                mean(&|t| t.along_rows[1]),
+                mean(&|t| t.along_columns[0]),
+                mean(&|t| t.along_columns[1]),
+            ],
+            skewness: mean(&|t| t.skewness),
+            block_variation: [
+                mean(&|t| t.block_variation[0]),
+                mean(&|t| t.block_variation[1]),
+            ],
+        }
+    }
+}
+
+/// Power by rings of windows of [`PATCH`] rows and columns and of variance 1, up to the Nyquist wavenumber, mean over the windows
+/// \[dB\].
+#[must_use]
+pub fn mean_spectrum(windows: &[Field]) -> Vec<f64> {
+    let rings = PATCH / 2;
+    let mut sums = vec![0.0; rings - 1];
+    for field in windows {
+        let spectrum = radial_spectrum(field, Binning::Round);
+        let pairs = || spectrum.power.iter().zip(&spectrum.count).skip(1);
+        let total: f64 = pairs().map(|(power, &count)| power * count as f64).sum();
+        for (sum, (power, _)) in sums.iter_mut().zip(pairs()) {
+            *sum += 10.0 * (power / total).max(1e-12).log10();
+        }
+    }
+    let count = windows.len().max(1) as f64;
+    sums.into_iter().map(|sum| sum / count).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pair::window;
+    use super::*;
+    use wake_nn::noise::NoiseSource;
+
+    /// White noise of any scale has the spectrum of white noise, 1/(128² − 1) in every ring; its seed moves a mean over four windows
+    /// by less than 3 dB where a ring has eight waves.
+    #[test]
+    fn the_spectrum_knows_no_scale() {
+        let noise = |seed: u64, scale: f32| {
+            let values = NoiseSource::new(seed).normal(0, PATCH * PATCH);
+            window(values.into_iter().map(|x| scale * (3.0 + x)).collect())
+        };
+        let windows: Vec<Field> = (1..5).map(|seed| noise(seed, 1.0)).collect();
+        let louder: Vec<Field> = (1..5).map(|seed| noise(seed, 7.0)).collect();
+        let spectrum = mean_spectrum(&windows);
+        assert_eq!(spectrum.len(), PATCH / 2 - 1);
+        let row = SeaRow::of("louder", &louder, &spectrum, None);
+        assert!(row.spectrum_db < 1e-3, "{row:?}");
+        let expected = -10.0 * ((PATCH * PATCH - 1) as f64).log10();
+        for ring in &spectrum[1..] {
+            assert!((ring - expected).abs() < 3.0, "{ring} {expected}");
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Where images come from: anything that draws scenes.
+
+use std::fmt::Debug;
+
+use wake_physics::{Field, Scene};
+use wake_text::Wording;
+
+use crate::error::{Error, Result};
+use wake_ldm::sampler::{Conditioning, WakeSampler};
+
+/// Images that [`draw_all`] asks a source for at once.
+pub const BATCH: usize = 8;
+
+/// What a model is told about a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Told {
+    /// The paper's sentence, and its numbers.
+    #[default]
+    Both,
+    /// The sentence alone.
+    Text,
+    /// The numbers of the sentence alone.
+    Numbers,
+    /// Another wording of the sentence, alone.
+    Paraphrase,
+    /// The scene itself, with all that no sentence says.
+    Scene,
+}
+
+impl Told {
+    /// Name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Both => "both",
+            Self::Text => "text",
+            Self::Numbers => "numbers",
+            Self::Paraphrase => "paraphrase",
+            Self::Scene => "scene",
+        }
+    }
+}
+
+/// Draws images of scenes.
+pub trait ImageSource: Debug {
+    /// Intensity before speckle of each scene, in the unit of σ⁰ and of the scene's rows and columns; `scene.seed` decides the
+    /// random sea. What knows the scene anyway may overhear what it is told.
+    ///
+    /// # Errors
+    ///
+    /// If one cannot be drawn. Another number of images, or another size, is refused by whatever judges them.
+    fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
+}
+
+/// The wake model is told what is asked for, whatever [`Conditioning`] it has; [`Told::Scene`] is told with its own.
+impl ImageSource for WakeSampler {
+    fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
+        let (told, wording) = match told {
+            Told::Both => (Conditioning::Both, Wording::Paper),
+            Told::Text => (Conditioning::Words, Wording::Paper),
+            Told::Numbers => (Conditioning::Numbers, Wording::Paper),
+            Told::Paraphrase => (Conditioning::Words, Wording::WindFirst),
+            Told::Scene => {
+                let images = self.sample_scenes(scenes)?;
+                return Ok(images.into_iter().map(|image| image.intensity).collect());
+            }
+        };
+        let sampler = self.clone().with_conditioning(told);
+        let mut images = Vec::with_capacity(scenes.len());
+        // Image k of a call has the first seed plus k.
+        for batch in scenes.chunk_by(|one, next| next.seed == one.seed.wrapping_add(1)) {
+            let prompts: Vec<String> = batch
+                .iter()
+                .map(|scene| wording.prompt(scene))
+                .collect::<wake_text::Result<_>>()?;
+            let prompts: Vec<&str> = prompts.iter().map(String::as_str).collect();
+            let drawn = sampler.sample_many(&prompts, batch[0].seed)?;
+            images.extend(drawn.into_iter().map(|image| image.intensity));
+        }
+        Ok(images)
+    }
+}
+
+/// All images of a source, [`BATCH`] at once.
+///
+/// - `step`: told the number of images after each batch
+///
+/// # Errors
+///
+/// As [`ImageSource::draw`].
+pub fn draw_all(
+    source: &dyn ImageSource,
+    scenes: &[Scene],
+    told: Told,
+    mut step: impl FnMut(u64),
+) -> Result<Vec<Field>> {
+    let mut images = Vec::with_capacity(scenes.len());
+    for batch in scenes.chunks(BATCH) {
+        images.extend(drawn(source, batch, told)?);
+        step(batch.len() as u64);
+    }
+    Ok(images)
+}
+
+/// Images of a source, one of each scene and of its size, which a source of a user's own might miss.
+pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
+    let images = source.draw(scenes, told)?;
+    let size = |image: &Field| [image.rows, image.columns, image.values.len()];
+    let asked = |scene: &Scene| {
+        let [rows, columns] = [scene.grid.rows, scene.grid.columns];
+        [rows, columns, rows * columns]
+    };
+    if images.iter().map(size).eq(scenes.iter().map(asked)) {
+        return Ok(images);
+    }
+    Err(Error::Value(wake_nn::Error::InvalidOption {
+        option: "images of a source".to_owned(),
+        value: format!("{} for {} scenes", images.len(), scenes.len()),
+        expected: "one of each scene, with its rows and columns".to_owned(),
+    }))
+}
+
+/// The same scene with another random sea, that of the seed `number` further on.
+#[must_use]
+pub fn other_sea(scene: &Scene, number: u64) -> Scene {
+    Scene {
+        seed: scene.seed.wrapping_add(number),
+        ..scene.clone()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// A source of which each image is one pixel that tells how many were drawn with it.
+    #[derive(Debug)]
+    struct Counted;
+
+    impl ImageSource for Counted {
+        fn draw(&self, scenes: &[Scene], _: Told) -> Result<Vec<Field>> {
+            let image = Field {
+                rows: 1,
+                columns: 1,
+                values: vec![scenes.len() as f32],
+            };
+            Ok(vec![image; scenes.len()])
+        }
+    }
+
+    #[test]
+    fn scenes_are_drawn_some_at_a_time() {
+        let mut scene = Scene::default();
+        (scene.grid.rows, scene.grid.columns) = (1, 1);
+        let scenes = vec![scene; BATCH + 3];
+        let mut steps = Vec::new();
+        let images = draw_all(&Counted, &scenes, Told::Both, |n| steps.push(n)).unwrap();
+        let counts: Vec<usize> = images.iter().map(|f| f.values[0] as usize).collect();
+        assert_eq!(counts, [vec![BATCH; BATCH], vec![3; 3]].concat());
+        assert_eq!(steps, [BATCH as u64, 3]);
+    }
+    /// One pixel is not the image of a scene of more, and no image is not that of one.
+    #[test]
+    fn other_images_than_were_asked_for_are_refused() {
+        #[derive(Debug)]
+        struct Nothing;
+        impl ImageSource for Nothing {
+            fn draw(&self, _: &[Scene], _: Told) -> Result<Vec<Field>> {
+                Ok(Vec::new())
+            }
+        }
+        let scenes = [Scene::default()];
+        for source in [&Counted as &dyn ImageSource, &Nothing] {
+            let refused = drawn(source, &scenes, Told::Both).unwrap_err().to_string();
+            assert!(refused.contains("for 1 scenes"), "{refused}");
+        }
+        assert!(drawn(&Nothing, &[], Told::Both).unwrap().is_empty());
+    }
+}

@@ -1,0 +1,312 @@
+//! The folder of a run: of one model, one data set and one process.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use whole_files::FolderLock;
+
+use super::checkpoint::{Checkpoint, difference};
+use crate::error::{Error, Result};
+
+/// A folder that the stages of one run share, taken for this process.
+///
+/// ```text
+/// config.json      the model
+/// run.json         the data, and of each stage: the steps its results were made after, and those it shall make
+/// checkpoints/     a folder for each stage
+/// ```
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    record: Map<String, Value>,
+    _lock: FolderLock,
+}
+
+/// Where the checkpoints of all stages lie in it.
+const CHECKPOINTS: &str = "checkpoints";
+
+/// How far the results of a stage are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Noted {
+    step: usize,
+    of: usize,
+}
+
+impl RunFolder {
+    /// Opens or makes the folder of a run; what is refused changes nothing.
+    ///
+    /// - `model`: what shapes it
+    /// - `data`: what is learnt from, such as the manifest of a data set; `Null` for a stage that needs none
+    /// - `stage`: the one that shall begin, or be resumed
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::InvalidOption`] with the first value in which the folder's model or data differ, or as
+    /// [`begin`](Self::begin); [`Error::Scene`] if another process works there.
+    pub fn open(
+        path: &Path,
+        model: &impl Serialize,
+        data: &Value,
+        (stage, resume): (&str, bool),
+    ) -> Result<Self> {
+        let encode = |source| Error::Value(wake_nn::Error::Json {
+            path: path.to_owned(),
+            source,
+        });
+        let model = serde_json::to_value(model).map_err(encode)?;
+        compare(path, &model, data)?;
+        check_begin(path, &path.join(CHECKPOINTS).join(stage), stage, resume)?;
+        let lock = whole_files::lock_folder(path)?;
+        let mut record = read(&path.join("run.json"))?.unwrap_or_default();
+        if !data.is_null() {
+            record.insert("data".to_owned(), data.clone());
+        }
+        let folder = Self {
+            path: path.to_owned(),
+            record,
+            _lock: lock,
+        };
+        whole_files::write_json(&path.join("config.json"), &model)?;
+        folder.write()?;
+        Ok(folder)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where the checkpoints of a stage lie.
+    pub fn checkpoints(&self, stage: &str) -> PathBuf {
+        self.path.join(CHECKPOINTS).join(stage)
+    }
+
+    /// The checkpoint that a stage goes on from, or none for one that begins.
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::InvalidOption`] when there is none to resume, or one that a new beginning would lose.
+    pub fn begin(&self, stage: &str, resume: bool) -> Result<Option<Checkpoint>> {
+        check_begin(&self.path, &self.checkpoints(stage), stage, resume)?;
+        Checkpoint::newest(&self.checkpoints(stage))
+    }
+
+    /// Whether the results of a stage are there, and were made after `step` steps.
+    ///
+    /// - `results`: names of its files
+    pub fn is_current(&self, stage: &str, step: usize, results: &[&str]) -> bool {
+        let there = results.iter().all(|name| self.path.join(name).is_file());
+        there && self.noted(stage).is_some_and(|noted| noted.step == step)
+    }
+
+    /// Steps that a stage was begun for and has not made, or whose results are missing or older than its last
+    /// checkpoint: `None` where nothing is left to do, `Some(0)` where it never began.
+    ///
+    /// # Errors
+    ///
+    /// As [`Checkpoint::newest`].
+    pub fn unfinished(&self, stage: &str, results: &[&str]) -> Result<Option<usize>> {
+        let there = results.iter().all(|name| self.path.join(name).is_file());
+        let newest = Checkpoint::newest_step(&self.checkpoints(stage))?;
+        Ok(match (newest, self.noted(stage)) {
+            // Results that were put there, or whose checkpoints were removed.
+            (None, _) => (!there).then_some(0),
+            (Some(step), Some(noted)) if there && noted.step == step && step >= noted.of => None,
+            (Some(step), noted) => Some(noted.map_or(0, |noted| noted.of).max(step)),
+        })
+    }
+
+    /// Notes what a stage shall do, and after how many steps its results were made.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Scene`] if it cannot be written.
+    pub fn note(&mut self, stage: &str, step: usize, of: usize) -> Result<()> {
+        let stages = self.record.entry("stages").or_insert_with(|| json!({}));
+        stages[stage] = json!({"results_after": step, "steps": of});
+        self.write()
+    }
+
+    fn noted(&self, stage: &str) -> Option<Noted> {
+        let stage = self.record.get("stages")?.get(stage)?;
+        let number = |key: &str| stage[key].as_u64().map(|n| n as usize);
+        Some(Noted {
+            step: number("results_after")?,
+            of: number("steps")?,
+        })
+    }
+
+    fn write(&self) -> Result<()> {
+        Ok(whole_files::write_json(
+            &self.path.join("run.json"),
+            &self.record,
+        )?)
+    }
+}
+
+/// Whether a folder is free, or of this model and data.
+fn compare(path: &Path, model: &Value, data: &Value) -> Result<()> {
+    let refuse = |file: &str, (key, there, here): (String, String, String)| Error::Value(wake_nn::Error::InvalidOption {
+        option: path.join(file).display().to_string(),
+        value: format!("of a run with {key} = {there}"),
+        expected: format!("{here}; choose another folder, or what that run was begun with"),
+    });
+    if let Some(there) = read(&path.join("config.json"))?
+        && let Some(found) = difference("", &Value::Object(there), model)
+    {
+        return Err(refuse("config.json", found));
+    }
+    let record = read(&path.join("run.json"))?.unwrap_or_default();
+    match record.get("data") {
+        Some(there) if !data.is_null() => match difference("data", there, data) {
+            Some(found) => Err(refuse("run.json", found)),
+            None => Ok(()),
+        },
+        _ => Ok(()),
+    }
+}
+
+/// Refuses to resume what never began, and to begin what has begun.
+///
+/// - `path`: the folder of the run
+/// - `checkpoints`: where those of the stage lie
+pub(super) fn check_begin(
+    path: &Path,
+    checkpoints: &Path,
+    stage: &str,
+    resume: bool,
+) -> Result<()> {
+    match (Checkpoint::newest_step(checkpoints)?, resume) {
+        (Some(_), true) | (None, false) => Ok(()),
+        (None, true) => Err(Error::Value(wake_nn::Error::InvalidOption {
+            option: "--resume".to_owned(),
+            value: format!(
+                "given, but there is no checkpoint in {}",
+                checkpoints.display()
+            ),
+            expected: "no --resume for a run that begins".to_owned(),
+        })),
+        (Some(step), false) => Err(Error::Value(wake_nn::Error::InvalidOption {
+            option: path.display().to_string(),
+            value: format!("a run whose stage {stage} has made {step} steps"),
+            expected: "another folder for a new run; --resume goes on with this one".to_owned(),
+        })),
+    }
+}
+
+/// A JSON object; `None` if there is no such file.
+fn read(path: &Path) -> Result<Option<Map<String, Value>>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = whole_files::read_text(path)?;
+    let object = serde_json::from_str(&text).map_err(|source| Error::Value(wake_nn::Error::Json {
+        path: path.to_owned(),
+        source,
+    }))?;
+    Ok(Some(object))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wake_ldm::conditioning::Vocabulary;
+    use wake_ldm::network::WakeModelConfig;
+
+    fn config() -> WakeModelConfig {
+        WakeModelConfig::standard(&Vocabulary::new([1, 2]))
+    }
+
+    fn checkpoint(folder: &RunFolder, stage: &str, step: usize) {
+        let checkpoint = Checkpoint {
+            step,
+            applied: step,
+            state: json!({}),
+            tensors: super::super::Tensors::new(),
+        };
+        checkpoint.write(&folder.checkpoints(stage)).unwrap();
+    }
+
+    #[test]
+    fn a_folder_belongs_to_one_model_and_one_set() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        let data = json!({"seed": 7, "count": 10});
+        drop(RunFolder::open(&path, &config(), &Value::Null, ("mean", false)).unwrap());
+        drop(RunFolder::open(&path, &config(), &data, ("mean", false)).unwrap());
+        drop(RunFolder::open(&path, &config(), &Value::Null, ("mean", false)).unwrap());
+        let before = std::fs::read(path.join("run.json")).unwrap();
+        let other = json!({"seed": 8, "count": 10});
+        let refused = RunFolder::open(&path, &config(), &other, ("mean", false))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            refused.contains("data.seed = 7") && refused.contains("expected 8"),
+            "{refused}"
+        );
+        let wide = WakeModelConfig {
+            prior_width: 64,
+            ..config()
+        };
+        let refused = RunFolder::open(&path, &wide, &data, ("mean", false))
+            .unwrap_err()
+            .to_string();
+        assert!(refused.contains("prior_width = 128"), "{refused}");
+        assert_eq!(std::fs::read(path.join("run.json")).unwrap(), before);
+        let first = RunFolder::open(&path, &config(), &data, ("mean", false)).unwrap();
+        let second = RunFolder::open(&path, &config(), &data, ("mean", false))
+            .unwrap_err()
+            .to_string();
+        assert!(second.contains("another process"), "{second}");
+        drop(first);
+    }
+
+    #[test]
+    fn a_stage_begins_once_and_is_resumed_from_its_last_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = RunFolder::open(folder.path(), &config(), &Value::Null, ("mean", false)).unwrap();
+        assert!(
+            run.begin("mean", true)
+                .unwrap_err()
+                .to_string()
+                .contains("no checkpoint")
+        );
+        assert_eq!(run.begin("mean", false).unwrap(), None);
+        for step in [100, 20] {
+            checkpoint(&run, "mean", step);
+        }
+        let refused = run.begin("mean", false).unwrap_err().to_string();
+        assert!(
+            refused.contains("100 steps") && refused.contains("--resume"),
+            "{refused}"
+        );
+        assert_eq!(run.begin("mean", true).unwrap().unwrap().step, 100);
+        assert_eq!(run.begin("words", false).unwrap(), None);
+    }
+
+    #[test]
+    fn results_are_current_only_after_their_last_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut run =
+            RunFolder::open(folder.path(), &config(), &Value::Null, ("mean", false)).unwrap();
+        let results = ["prior.safetensors"];
+        let file = folder.path().join(results[0]);
+        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(0));
+        std::fs::write(&file, "put there").unwrap();
+        assert_eq!(run.unfinished("mean", &results).unwrap(), None);
+        checkpoint(&run, "mean", 4);
+        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(4));
+        run.note("mean", 4, 6).unwrap();
+        assert!(run.is_current("mean", 4, &results));
+        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(6));
+        checkpoint(&run, "mean", 6);
+        assert!(!run.is_current("mean", 6, &results));
+        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(6));
+        run.note("mean", 6, 6).unwrap();
+        assert_eq!(run.unfinished("mean", &results).unwrap(), None);
+        std::fs::remove_file(file).unwrap();
+        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(6));
+        assert!(!run.is_current("mean", 6, &results));
+    }
+}

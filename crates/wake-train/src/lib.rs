@@ -1,0 +1,67 @@
+#![doc = include_str!("../README.md")]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod error;
+mod streams;
+
+// Loop.
+mod tensors;
+mod checkpoint;
+mod optimizer;
+mod progress;
+mod log;
+
+mod trainer;
+mod folder;
+
+// What is learnt.
+mod latents;
+mod pairs;
+mod prompts;
+mod run;
+mod sea;
+mod tasks;
+
+// Runs in their folders.
+mod fine_tune;
+mod sheet;
+mod stage;
+mod stage_options;
+mod text_to_image;
+mod small_pipeline;
+mod sea_training;
+mod wake_model;
+
+// Figures.
+pub mod metrics;
+mod two_sample;
+pub mod evaluation;
+
+pub mod detector;
+
+pub use checkpoint::{Checkpoint, Tensors};
+pub use error::{Error, Result};
+pub use fine_tune::{FineTune, FineTuneOptions, FineTuning, Frozen, PromptedBatches};
+pub use folder::RunFolder;
+pub use latents::{Example, LatentSet, fit_patches};
+pub use log::Metrics;
+pub use optimizer::{AdamOptions, Rate};
+pub use pairs::TrainingPairs;
+pub use progress::Progress;
+pub use prompts::Prompts;
+pub use run::{Run, RunOptions, Task, Terms};
+pub use sea::{SeaPatches, SeaTask};
+pub use sea_training::SeaTraining;
+pub use small_pipeline::PipelineTraining;
+pub use stage::Stage;
+pub use stage_options::{StageOptions, Usual};
+pub use tasks::{FlowTask, PriorTask, WordsTask};
+pub use text_to_image::{
+    AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
+};
+pub use trainer::{StepReport, Trainer, TrainerOptions};
+pub use two_sample::{TwoSample, TwoSampleOptions, two_sample};
+pub use wake_model::{WakeStage, WakeTraining};
+
+#[cfg(all(test, feature = "flex"))]
+mod tests;

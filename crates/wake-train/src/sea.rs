@@ -1,0 +1,346 @@
+//! A sea is learnt from patches of images that nobody labelled.
+
+use std::ops::Range;
+
+use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
+
+use super::run::{Task, Terms, number};
+use super::tasks::{examples, noise_level, noise_of, on_the_way};
+use wake_nn::noise::{NoiseSource, streams::SEA_PLACES};
+use wake_ldm::sea_texture::{PATCH, SeaFlow, SeaImage, SeaStyle};
+
+/// Patches of an image for every one that fits into it beside the others, at most: more would show the same pixels.
+const OVERLAP: usize = 16;
+/// Places that are looked at for every patch that is wanted, at most.
+const TRIES: u64 = 8;
+/// Places that an image can have looked at.
+const MOST: u64 = 1 << 32;
+
+/// Patches of open sea, which stay in memory: 72 KiB each.
+#[derive(Debug, Clone, Default)]
+pub struct SeaPatches {
+    patches: Vec<Patch>,
+    images: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Patch {
+    /// Amplitude of mean 0 and variance 1, `[PATCH, PATCH]`.
+    values: Vec<f32>,
+    style: SeaStyle,
+}
+
+impl SeaPatches {
+    /// Takes patches of open sea anywhere in an image, and returns how many were found: fewer than `count` where targets
+    /// and masks leave little sea, or the image is small.
+    ///
+    /// - `seed`: draws the places, others in every image
+    pub fn push(&mut self, image: &SeaImage, count: usize, seed: u64) -> usize {
+        let [rows, columns] = image.size();
+        let number = self.images;
+        self.images += 1;
+        if rows < PATCH || columns < PATCH {
+            return 0;
+        }
+        let random = NoiseSource::new(seed);
+        let room = [rows - PATCH + 1, columns - PATCH + 1];
+        let place = |n: u64| -> [usize; 2] {
+            std::array::from_fn(|axis| {
+                let position = 2 * (MOST * number + n) + axis as u64;
+                (random.uniform(SEA_PLACES, position) * room[axis] as f64) as usize
+            })
+        };
+        let most = OVERLAP * (rows * columns).div_ceil(PATCH * PATCH);
+        let wanted = count.min(most) as u64;
+        let (mut found, mut tried) = (Vec::new(), 0);
+        while (found.len() as u64) < wanted && tried < TRIES * wanted {
+            let more = wanted - found.len() as u64;
+            let places = (tried..tried + more).into_par_iter().map(place);
+            let patches: Vec<Option<Patch>> = places.map(|place| Patch::of(image, place)).collect();
+            found.extend(patches.into_iter().flatten());
+            tried += more;
+        }
+        let count = found.len();
+        self.patches.extend(found);
+        count
+    }
+
+    /// Number of patches.
+    pub fn len(&self) -> usize {
+        self.patches.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.patches.is_empty()
+    }
+
+    /// The style of every patch, in the order of the images.
+    pub fn styles(&self) -> Vec<SeaStyle> {
+        self.patches.iter().map(|p| p.style.clone()).collect()
+    }
+}
+
+impl Patch {
+    fn of(image: &SeaImage, place: [usize; 2]) -> Option<Self> {
+        let (patch, style) = image.patch(place)?;
+        let mean = patch.mean() as f32;
+        let variance = patch.values.iter().map(|&v| f64::from(v - mean).powi(2));
+        let deviation = (variance.sum::<f64>() / patch.values.len() as f64).sqrt() as f32;
+        let values = patch.values.iter().map(|v| (v - mean) / deviation);
+        Some(Self {
+            values: values.collect(),
+            style,
+        })
+    }
+}
+
+/// Learning the velocity of a sea's flow by its squared error.
+///
+/// ```text
+/// φ = πσ/2,    x = cos φ r + sin φ n,    loss = |v(x, σ, style) − (cos φ n − sin φ r)|²
+/// ```
+///
+/// with r a patch of amplitude, of mean 0 and variance 1, and n Gaussian noise with the correlation of this very patch.
+///
+/// # References
+///
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants".
+#[derive(Debug)]
+pub struct SeaTask<'a> {
+    /// What is learnt from, at least one patch.
+    pub patches: &'a SeaPatches,
+    /// Seed of order, noise and noise levels.
+    pub seed: u64,
+}
+
+impl Task<SeaFlow> for SeaTask<'_> {
+    fn loss(&self, model: &SeaFlow, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+        let random = NoiseSource::new(self.seed);
+        let indices = examples(self.seed, positions.clone(), self.patches.len());
+        let patches: Vec<&Patch> = indices.iter().map(|&i| &self.patches.patches[i]).collect();
+        let levels: Vec<f32> = positions
+            .clone()
+            .map(|p| noise_level(random, p) as f32)
+            .collect();
+        let drawn: Vec<(&Patch, u64)> = patches.iter().copied().zip(positions).collect();
+        let noise = drawn.par_iter().map(|(patch, position)| {
+            let source = noise_of(self.seed, *position);
+            patch.style.noise(source, PATCH, PATCH).values
+        });
+        let noise: Vec<f32> = noise.collect::<Vec<_>>().concat();
+        let residual: Vec<f32> = patches.iter().flat_map(|p| &p.values).copied().collect();
+        let features: Vec<f32> = patches.iter().flat_map(|p| p.style.features()).collect();
+        let count = patches.len();
+        let image = |values| -> Tensor<4> {
+            Tensor::from_data(TensorData::new(values, [count, 1, PATCH, PATCH]), device)
+        };
+        let told = features.len() / count.max(1);
+        let features = Tensor::from_data(TensorData::new(features, [count, told]), device);
+        let (x, target, levels) = on_the_way(image(residual), image(noise), &levels);
+        let error = model.velocity(x, levels, features) - target.clone();
+        let loss = error.square().mean();
+        // What a flow that stands still would lose.
+        let still = number(&target.square().mean());
+        let terms = vec![("sea", number(&loss)), ("still", still)];
+        (loss, terms)
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use wake_physics::Field;
+
+    use super::super::{Checkpoint, Rate, Run, RunOptions, Tensors, TrainerOptions};
+    use super::*;
+    use wake_ldm::sea_texture::SeaTexture;
+
+    /// Amplitudes exp(0.3 g) of Gaussian noise that neighbours in a row share half of.
+    fn skewed(rows: usize, columns: usize, seed: u64) -> Field {
+        let white = NoiseSource::new(seed).normal(0, rows * columns + 1);
+        let value = |n: usize| (0.3 * (white[n] + white[n + 1]) / f32::sqrt(2.0)).exp();
+        Field {
+            rows,
+            columns,
+            values: (0..rows * columns).map(value).collect(),
+        }
+    }
+
+    fn patches(count: usize) -> SeaPatches {
+        let mut patches = SeaPatches::default();
+        let image = SeaImage::new(skewed(320, 320, 4), None).unwrap();
+        assert_eq!(patches.push(&image, count, 9), count);
+        patches
+    }
+
+    fn options(batch: usize, steps: usize) -> RunOptions {
+        RunOptions {
+            batch,
+            seed: 5,
+            identity: serde_json::Value::Null,
+            trainer: TrainerOptions {
+                rate: Rate {
+                    peak: 3e-3,
+                    warmup: 5,
+                    steps,
+                },
+                average_decay: 0.95,
+                ..TrainerOptions::default()
+            },
+        }
+    }
+
+    fn run(batch: usize, steps: usize) -> Run<SeaFlow> {
+        let devices = vec![Device::flex().autodiff()];
+        let options = options(batch, steps);
+        Run::of("sea", &SeaFlow::shape(), SeaFlow::new, options, devices).unwrap()
+    }
+
+    /// A stripe of one bright value, ten columns wide and less than three medians bright, is open sea to every other rule.
+    #[test]
+    fn nothing_that_a_mask_marks_is_in_any_patch() {
+        let mut image = skewed(400, 500, 2);
+        let mut mask = Field {
+            values: vec![0.0; image.values.len()],
+            ..image
+        };
+        for n in (0..image.values.len()).filter(|n| (200..210).contains(&(n % 500))) {
+            (image.values[n], mask.values[n]) = (2.5, 255.0);
+        }
+        let count = |mask: Option<Field>| {
+            let mut patches = SeaPatches::default();
+            let found = patches.push(&SeaImage::new(image.clone(), mask).unwrap(), 60, 3);
+            assert_eq!(found, patches.len());
+            let striped = patches.patches.iter().filter(|patch| {
+                // The stripe is the only value that comes twice side by side.
+                patch
+                    .values
+                    .windows(2)
+                    .any(|two| two[0].to_bits() == two[1].to_bits())
+            });
+            (found, striped.count())
+        };
+        assert_eq!(count(Some(mask)), (60, 0));
+        let (found, striped) = count(None);
+        assert!(found == 60 && striped > 10, "{striped}");
+    }
+
+    #[test]
+    fn places_are_drawn_anew_in_every_image_and_small_images_give_none() {
+        let image = SeaImage::new(skewed(300, 300, 1), None).unwrap();
+        let mut patches = SeaPatches::default();
+        // Six patches fit, counted by area.
+        assert_eq!(patches.push(&image, 1000, 3), 96);
+        assert_eq!(patches.push(&image, 4, 3), 4);
+        let first = |n: usize| patches.patches[n].values[0].to_bits();
+        assert!((0..4).all(|n| first(n) != first(96 + n)));
+        let mut again = SeaPatches::default();
+        again.push(&image, 4, 3);
+        assert!((0..4).all(|n| again.patches[n].values[0].to_bits() == first(n)));
+        let small = SeaImage::new(skewed(127, 400, 1), None).unwrap();
+        assert_eq!(again.push(&small, 4, 3), 0);
+        assert_eq!(again.styles().len(), 4);
+    }
+
+    #[test]
+    fn a_stopped_run_goes_on_to_the_bit() {
+        let (patches, folder) = (patches(6), tempfile::tempdir().unwrap());
+        let task = SeaTask {
+            patches: &patches,
+            seed: 5,
+        };
+        let weights = |run: &Run<SeaFlow>, name: &str| -> Tensors {
+            let folder = folder.path().join(name);
+            run.checkpoint(&folder).unwrap();
+            Checkpoint::newest(&folder).unwrap().unwrap().tensors
+        };
+        let start = run(2, 4);
+        weights(&start, "start");
+        let checkpoint = |name: &str| {
+            let found = Checkpoint::newest(&folder.path().join(name));
+            found.unwrap().unwrap()
+        };
+        let go_on = |name: &str, steps: usize| {
+            let mut run = run(2, 4);
+            run.resume(checkpoint(name)).unwrap();
+            for _ in 0..steps {
+                run.step(&task).unwrap();
+            }
+            run
+        };
+        let whole = weights(&go_on("start", 4), "whole");
+        weights(&go_on("start", 2), "half");
+        assert_eq!(weights(&go_on("half", 2), "rest"), whole);
+        let begun = checkpoint("start").tensors;
+        assert_ne!(begun, whole);
+    }
+
+    fn skewness(field: &Field) -> f64 {
+        let mean = field.mean();
+        let moment = |power: i32| {
+            let powers = field
+                .values
+                .iter()
+                .map(|&v| (f64::from(v) - mean).powi(power));
+            powers.sum::<f64>() / field.values.len() as f64
+        };
+        moment(3) / moment(2).powf(1.5)
+    }
+
+    /// Squares of 8 pixels, four of five at 100, the others at 40, and noise of 5 on all.
+    fn squares(side: usize) -> Field {
+        let random = NoiseSource::new(1);
+        let white = random.normal(0, side * side);
+        let value = |n: usize| {
+            let square = n / side / 8 * side + n % side / 8;
+            let level = match random.uniform(7, square as u64) < 0.2 {
+                true => 40.0,
+                false => 100.0,
+            };
+            level + 5.0 * white[n]
+        };
+        Field {
+            rows: side,
+            columns: side,
+            values: (0..side * side).map(value).collect(),
+        }
+    }
+
+    /// Two levels, one of them with a probability of p = 0.2, have skewness −(1 − 2p)/√(p(1 − p)), −1.5, and the noise, of a
+    /// twenty-fourth of their variance, leaves (24/25)^{3/2} of it: −1.41. Gaussian noise has 0 up to √(6/N), 0.1 of the 512
+    /// squares in two images. What is learnt in few steps goes a third of the way, over four times that chance.
+    #[test]
+    fn a_learnt_sea_is_skewed_as_its_images_are() {
+        let mut patches = SeaPatches::default();
+        patches.push(&SeaImage::new(squares(320), None).unwrap(), 64, 9);
+        let task = SeaTask {
+            patches: &patches,
+            seed: 5,
+        };
+        let mut run = run(4, STEPS);
+        let terms: Vec<Terms> = (0..STEPS).map(|_| run.step(&task).unwrap().1).collect();
+        let late = &terms[STEPS - 10..];
+        let mean = |term: usize| late.iter().map(|t| t[term].1).sum::<f64>() / 10.0;
+        // The mean of 40 patches of 256 squares each is known to a hundredth.
+        assert!(mean(0) < 0.9 * mean(1), "{} {}", mean(0), mean(1));
+        let styles = patches.styles();
+        let texture = SeaTexture::new(run.averaged(), &styles, None).unwrap();
+        let drawn = (0..2).map(|n| {
+            let sea = texture.amplitude(&styles[n], n as u64, PATCH, PATCH);
+            skewness(&sea.unwrap())
+        });
+        let (found, asked) = (drawn.sum::<f64>() / 2.0, -1.41);
+        assert!(
+            found < asked / 3.0 && found > 1.5 * asked,
+            "{found} {asked}"
+        );
+        let gaussian =
+            (0..2).map(|n| skewness(&styles[n].noise(NoiseSource::new(n as u64), PATCH, PATCH)));
+        let still = gaussian.sum::<f64>() / 2.0;
+        assert!(still.abs() < 0.4, "{still}");
+    }
+
+    const STEPS: usize = 80;
+}

@@ -1,0 +1,102 @@
+//! The sea of real images, learnt in the folder of one run.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::folder::RunFolder;
+use super::progress::Progress;
+use super::run::{Run, RunOptions};
+use super::sea::{SeaPatches, SeaTask};
+use super::stage::Stage;
+use super::stage_options::{StageOptions, Usual};
+use crate::error::{Error, Result};
+use wake_ldm::sea_texture::{SeaFlow, SeaTexture};
+
+/// Name of the stage, its checkpoints and its log.
+const STAGE: &str = "sea";
+/// What it takes where nothing else is asked for.
+const USUAL: Usual = Usual {
+    steps: 1200,
+    batch: 16,
+    rate: 1e-3,
+};
+/// Steps over which the rate rises to its largest, and decay of the averaged weights: less than a longer run takes.
+const WARMUP: usize = 50;
+const AVERAGE_DECAY: f64 = 0.995;
+/// What is written: the sea, and the picture of it that the caller draws.
+const WEIGHTS: &str = "sea.safetensors";
+const SHEET: &str = "sea.png";
+
+/// How a sea is learnt from patches of images that nobody labelled.
+#[derive(Debug, Clone)]
+pub struct SeaTraining<'a> {
+    /// What it learns from, at least one patch.
+    pub patches: &'a SeaPatches,
+    /// Side of their pixels \[m\], where it is known: then scenes of other pixels are refused.
+    pub spacing: Option<f64>,
+    /// What the patches were cut from: a checkpoint of another run is refused.
+    pub identity: Value,
+    /// How the run is made.
+    pub options: StageOptions,
+}
+
+impl SeaTraining<'_> {
+    /// Checks constants before any image is read.
+    ///
+    /// # Errors
+    ///
+    /// As [`RunOptions::validate`].
+    pub fn check(options: &StageOptions) -> Result<()> {
+        constants(options, Value::Null).validate(options.devices.len())
+    }
+
+    /// Makes all steps. Writes `sea.safetensors`, which [`SeaTexture::load`] reads, a log, and what a [`RunFolder`] has; a run
+    /// that was killed goes on from its last checkpoint.
+    ///
+    /// - `draw`: draws the sea as it is now into a file, `sea.png`, after every checkpoint
+    ///
+    /// # Errors
+    ///
+    /// Those of `draw`, and as [`check`](Self::check), [`SeaTexture::new`], [`RunFolder::open`] and [`Stage::train`].
+    pub fn train<E: From<Error>>(
+        &self,
+        out: &Path,
+        progress: &dyn Fn(Progress),
+        draw: impl Fn(&SeaTexture, &Path) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (options, shape) = (&self.options, SeaFlow::shape());
+        let styles = self.patches.styles();
+        // What cannot become a sea is refused before the first step.
+        SeaTexture::new(SeaFlow::new(&options.device()), &styles, self.spacing)?;
+        let begin = (STAGE, options.resume);
+        let mut folder = RunFolder::open(out, &shape, &self.identity, begin)?;
+        let constants = constants(options, self.identity.clone());
+        let learning = options.learning_devices()?;
+        let run = Run::of(STAGE, &shape, SeaFlow::new, constants, learning)?;
+        let task = SeaTask {
+            patches: self.patches,
+            seed: options.seed,
+        };
+        let show = |run: &Run<SeaFlow>| -> Result<(), E> {
+            let texture = SeaTexture::new(run.averaged(), &styles, self.spacing)?;
+            texture.save(&out.join(WEIGHTS))?;
+            draw(&texture, &out.join(SHEET))
+        };
+        let stage = Stage {
+            name: STAGE,
+            resume: options.resume,
+            every: options.every,
+            steps: options.steps(&USUAL),
+            results: &[WEIGHTS, SHEET],
+        };
+        stage.train(&mut folder, run, &task, progress, show)
+    }
+}
+
+fn constants(options: &StageOptions, identity: Value) -> RunOptions {
+    let mut constants = options.run(&USUAL, identity);
+    constants.trainer.rate.warmup = WARMUP;
+    constants.trainer.average_decay = AVERAGE_DECAY;
+    constants
+}

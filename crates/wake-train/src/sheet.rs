@@ -1,0 +1,28 @@
+//! Images of a model beside those that it learns from.
+
+use std::path::Path;
+
+use wake_physics::output;
+
+use wake_dataset::Pair;
+use crate::error::Result;
+
+/// Writes a PNG file with images of a set above, and below each one what the model makes of its scene or prompt.
+///
+/// - `drawn`: grey 0…1 in rows, as many numbers an image as a pair has
+///
+/// All are squares of one size.
+pub(super) fn write_sheet(examples: &[Pair], drawn: &[Vec<f32>], path: &Path) -> Result<()> {
+    let size = examples.first().map_or(0, |pair| pair.image.rows);
+    let width = size * examples.len();
+    let mut sheet = vec![0; 2 * size * width];
+    for (i, (pair, drawn)) in examples.iter().zip(drawn).enumerate() {
+        for (row, pixels) in [(0, &pair.image.pixels), (1, drawn)] {
+            for (p, &grey) in pixels.iter().enumerate() {
+                let (x, y) = (i * size + p % size, row * size + p / size);
+                sheet[y * width + x] = (255.0 * grey).round() as u8;
+            }
+        }
+    }
+    Ok(output::write_png(path, &sheet, 2 * size, width)?)
+}

@@ -1,0 +1,271 @@
+//! A small model of Stable Diffusion's kind from nothing, in the folder of one run: the autoencoder, then text encoder and
+//! U-Net together.
+
+use std::path::Path;
+
+use burn::tensor::Device;
+use serde_json::{Value, json};
+
+use super::folder::RunFolder;
+use super::pairs::TrainingPairs;
+use super::progress::{Progress, counted};
+use super::run::Run;
+use super::sheet::write_sheet;
+use super::stage::Stage;
+use super::stage_options::{StageOptions, Usual};
+use super::text_to_image::{
+    AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
+};
+use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
+use wake_dataset::Pair;
+use crate::error::{Error, Result};
+use whole_files::fingerprint;
+use wake_ldm::pipeline::{Pipeline, PipelineParts, Request};
+use wake_ldm::scheduler::{NoiseSchedule, SchedulerConfig};
+use wake_ldm::text::ClipTextConfig;
+use wake_ldm::unet::UNetConfig;
+use wake_nn::weights::{Layout, Precision, save_folder};
+
+/// Names of the two stages, and what they take where nothing else is asked for.
+const AUTOENCODER: &str = "autoencoder-kl";
+const MODEL: &str = "text-to-image";
+const USUAL: Usual = Usual {
+    steps: 5000,
+    batch: 16,
+    rate: 5e-4,
+};
+const USUAL_AUTOENCODER: Usual = Usual {
+    steps: 2000,
+    ..USUAL
+};
+/// What the stages write.
+const VAE: &str = "vae/diffusion_pytorch_model.safetensors";
+const SHEET: &str = "sheet.png";
+/// Images read or simulated at the same time.
+const AT_ONCE: u64 = 64;
+/// Images of a sheet, and the steps that they are drawn with.
+const SHOWN: u64 = 8;
+const DRAWN: usize = 25;
+/// Channels of a latent pixel, and of a token.
+const LATENTS: usize = 32;
+const TOKENS: usize = 128;
+
+/// How a small model of Stable Diffusion's kind is learnt from images and prompts alone.
+#[derive(Debug, Clone)]
+pub struct PipelineTraining<'a> {
+    /// What it learns from.
+    pub pairs: &'a TrainingPairs,
+    /// Steps of the autoencoder; `None`: the usual number.
+    pub autoencoder_steps: Option<usize>,
+    /// How the stages run; the steps are those of text encoder and U-Net.
+    pub options: StageOptions,
+}
+
+impl PipelineTraining<'_> {
+    /// Checks constants and the size of the images, without which nothing can be learnt.
+    ///
+    /// # Errors
+    ///
+    /// As [`RunOptions::validate`](super::RunOptions::validate), and [`wake_nn::Error::InvalidOption`] for images that the models cannot
+    /// halve as often as they do.
+    pub fn check(&self) -> Result<()> {
+        let constants = self.options.run(&USUAL, Value::Null);
+        constants.validate(self.options.devices.len())?;
+        let [rows, columns] = self.pairs.source().size();
+        let multiple = 4 * autoencoder().downsampling();
+        if rows == columns && rows.is_multiple_of(multiple) && !self.pairs.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Value(wake_nn::Error::InvalidOption {
+            option: "image size".to_owned(),
+            value: format!("{rows} x {columns} pixels"),
+            expected: format!(
+                "squares with a multiple of {multiple} on a side; set grid.rows and grid.columns of the data set to that"
+            ),
+        }))
+    }
+
+    /// Memory that images and latents take \[bytes\].
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let (pixels, down) = (
+            self.pairs.source().size().iter().product::<usize>(),
+            autoencoder().downsampling(),
+        );
+        // Two bytes a pixel, and four a latent number while they are scaled.
+        let each = 2 * pixels + 6 * LATENTS * pixels / (down * down);
+        self.pairs.len().saturating_mul(each as u64)
+    }
+
+    /// Makes all steps. Writes what [`Pipeline::load`] reads, `sheet.png`, logs, and what a [`RunFolder`] has; a run that was
+    /// killed goes on from its last checkpoints.
+    ///
+    /// # Errors
+    ///
+    /// As [`check`](Self::check), [`RunFolder::open`] and [`Stage::train`].
+    pub fn train(&self, out: &Path, progress: &(dyn Fn(Progress) + Sync)) -> Result<()> {
+        self.check()?;
+        let options = &self.options;
+        let examples = self.pairs.first(SHOWN)?;
+        let model = json!({
+            "vae": autoencoder().to_json(), "text_encoder": text().to_json(), "unet": unet().to_json(),
+        });
+        let identity = self.pairs.identity();
+        let learning = options.learning_devices()?;
+        let begin = (AUTOENCODER, options.resume);
+        let mut folder = RunFolder::open(out, &model, &identity, begin)?;
+        let images = counted("pairs", self.pairs.len(), progress, |done| {
+            self.images(done)
+        })?;
+        if folder.unfinished(AUTOENCODER, &[VAE])?.is_some() {
+            self.autoencoder(&mut folder, &images, learning.clone(), &model, progress)?;
+        }
+
+        let identity = json!({"data": identity, "vae": fingerprint(&out.join(VAE))?});
+        let device = options.device();
+        let autoencoder = AutoencoderKl::from_folder(&out.join("vae"), &device)?;
+        let count = images.len() as u64;
+        let (set, autoencoder) = counted("latents", count, progress, |done| {
+            images.encode(autoencoder, &device, |n| done(n as u64))
+        });
+        let init = |device: &Device| TextToImage {
+            text_encoder: text().init(device),
+            unet: unet().init(device),
+        };
+        let run = Run::of(MODEL, &model, init, options.run(&USUAL, identity), learning)?;
+        let scheduler = SchedulerConfig::stable_diffusion("ddim")?;
+        let task = TextToImageTask {
+            set: &set,
+            schedule: schedule(&scheduler)?,
+            seed: options.seed,
+        };
+        let show = |run: &Run<TextToImage>| {
+            let parts = parts(run.averaged(), &autoencoder, &scheduler, &set);
+            let pipeline = Pipeline::new(parts, &device)?;
+            let drawn = draw(&pipeline, &examples, options.seed)?;
+            write_sheet(&examples, &drawn, &out.join(SHEET))?;
+            pipeline.save(out, Precision::F16)
+        };
+        let results = ["model_index.json", SHEET];
+        let stage = self.stage(MODEL, options.steps(&USUAL), &results, &folder);
+        stage.train(&mut folder, run, &task, progress, show)
+    }
+
+    /// The first stage.
+    fn autoencoder(
+        &self,
+        folder: &mut RunFolder,
+        images: &PromptedImages,
+        learning: Vec<Device>,
+        model: &Value,
+        progress: &dyn Fn(Progress),
+    ) -> Result<()> {
+        let options = StageOptions {
+            steps: self.autoencoder_steps,
+            ..self.options.clone()
+        };
+        let constants = options.run(&USUAL_AUTOENCODER, self.pairs.identity());
+        let init = |device: &Device| autoencoder().init(device);
+        let run = Run::of(AUTOENCODER, &model["vae"], init, constants, learning)?;
+        let task = AutoencoderTask {
+            images,
+            seed: options.seed,
+        };
+        let vae = folder.path().join("vae");
+        let show = |run: &Run<AutoencoderKl>| {
+            let (averaged, config) = (run.averaged(), &model["vae"]);
+            save_folder(&averaged, Layout::Diffusers, config, &vae, Precision::F16)
+        };
+        let steps = options.steps(&USUAL_AUTOENCODER);
+        let stage = self.stage(AUTOENCODER, steps, &[VAE], folder);
+        stage.train(folder, run, &task, progress, show)
+    }
+
+    /// How a stage runs: on from its last checkpoint, if that is asked for and there is one.
+    fn stage<'a>(
+        &self,
+        name: &'static str,
+        steps: usize,
+        results: &'a [&'a str],
+        folder: &RunFolder,
+    ) -> Stage<'a> {
+        Stage {
+            name,
+            resume: self.options.resume && folder.checkpoints(name).is_dir(),
+            every: self.options.every,
+            steps,
+            results,
+        }
+    }
+
+    /// All images and prompts.
+    fn images(&self, done: &dyn Fn(u64)) -> Result<PromptedImages> {
+        let (mut images, count) = (PromptedImages::default(), self.pairs.len());
+        for first in (0..count).step_by(AT_ONCE as usize) {
+            for pair in self.pairs.items(first..count.min(first + AT_ONCE))? {
+                images.push(&pair)?;
+                done(1);
+            }
+        }
+        Ok(images)
+    }
+}
+
+/// Widths of the three models.
+fn autoencoder() -> AutoencoderKlConfig {
+    AutoencoderKlConfig::small(LATENTS, 3)
+}
+
+fn text() -> ClipTextConfig {
+    ClipTextConfig::new()
+        .with_hidden_size(TOKENS)
+        .with_intermediate_size(4 * TOKENS)
+        .with_layers(4)
+        .with_heads(4)
+        .with_end_token(49407)
+}
+
+fn unet() -> UNetConfig {
+    UNetConfig::small(LATENTS, Some(TOKENS), None)
+}
+
+fn schedule(scheduler: &SchedulerConfig) -> Result<&NoiseSchedule> {
+    scheduler
+        .noise_schedule()
+        .ok_or_else(|| Error::Value(wake_nn::Error::Unsupported {
+            option: "scheduler".to_owned(),
+            value: scheduler.class().to_owned(),
+            supported: "those with a noise schedule".to_owned(),
+        }))
+}
+
+/// The model as it is now.
+fn parts(
+    learnt: TextToImage,
+    autoencoder: &AutoencoderKl,
+    scheduler: &SchedulerConfig,
+    set: &PromptedLatents,
+) -> PipelineParts {
+    PipelineParts {
+        tokenizer: None,
+        text_encoder: learnt.text_encoder,
+        unet: learnt.unet,
+        autoencoder: autoencoder.clone(),
+        scheduler: scheduler.clone(),
+        latent_size: set.shape()[1],
+    }
+}
+
+/// What the model draws from the prompts of some pairs, grey 0…1 of the first channel and all others.
+fn draw(pipeline: &Pipeline, examples: &[Pair], seed: u64) -> Result<Vec<Vec<f32>>> {
+    let prompts: Vec<String> = examples.iter().map(|pair| pair.prompt.clone()).collect();
+    let request = Request::new(prompts)
+        .with_images_at_once(examples.len())
+        .with_guidance(1.0)
+        .with_steps(DRAWN)
+        .with_seed(seed);
+    let images = pipeline.generate(&request)?;
+    let pixels: Vec<f32> = images.into_data().iter::<f32>().collect();
+    let each = (pixels.len() / examples.len().max(1)).max(1);
+    Ok(pixels.chunks(each).map(<[f32]>::to_vec).collect())
+}

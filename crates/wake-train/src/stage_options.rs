@@ -1,0 +1,186 @@
+//! How a stage of training runs: how long, how fast, from where, and on what.
+
+use burn::tensor::{DType, Device};
+use serde_json::Value;
+
+use super::optimizer::Rate;
+use super::run::RunOptions;
+use super::trainer::TrainerOptions;
+use crate::error::{Error, Result};
+
+/// Steps over which the rate of a stage rises to its largest.
+const WARMUP: usize = 100;
+
+/// What a stage takes where nothing else is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Usual {
+    /// Steps in all.
+    pub steps: usize,
+    /// Examples of a batch.
+    pub batch: usize,
+    /// Largest step of the optimizer.
+    pub rate: f64,
+}
+
+/// How a stage of training runs.
+#[derive(Debug, Clone)]
+pub struct StageOptions {
+    /// Steps in all; `None`: the [`Usual`] number.
+    pub steps: Option<usize>,
+    /// Examples of a batch; `None`: the usual number.
+    pub batch: Option<usize>,
+    /// Largest step of the optimizer; `None`: the usual one.
+    pub rate: Option<f64>,
+    /// Parts of a batch that a device takes one after the other, to save memory.
+    pub accumulation: usize,
+    /// Steps between checkpoints, at least 1.
+    pub every: usize,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+    /// Whether it goes on from the newest checkpoint.
+    pub resume: bool,
+    /// Whether less is kept for the way back through the model, and computed again.
+    pub checkpointing: bool,
+    /// Whether losses and gradients are computed in bfloat16; weights keep 32 bits.
+    pub bf16: bool,
+    /// What it computes on, outside autodiff: at least one.
+    pub devices: Vec<Device>,
+}
+
+impl Default for StageOptions {
+    fn default() -> Self {
+        Self {
+            steps: None,
+            batch: None,
+            rate: None,
+            accumulation: 1,
+            every: 500,
+            seed: 7,
+            resume: false,
+            checkpointing: false,
+            bf16: false,
+            devices: vec![Device::default()],
+        }
+    }
+}
+
+impl StageOptions {
+    /// Steps in all.
+    #[must_use]
+    pub fn steps(&self, usual: &Usual) -> usize {
+        self.steps.unwrap_or(usual.steps)
+    }
+
+    /// Constants of the stage's run.
+    ///
+    /// - `identity`: what it learns from, see [`RunOptions::identity`]
+    #[must_use]
+    pub fn run(&self, usual: &Usual, identity: Value) -> RunOptions {
+        RunOptions {
+            batch: self.batch.unwrap_or(usual.batch),
+            seed: self.seed,
+            identity,
+            trainer: TrainerOptions {
+                rate: Rate {
+                    peak: self.rate.unwrap_or(usual.rate),
+                    warmup: WARMUP,
+                    steps: self.steps(usual),
+                },
+                accumulation: self.accumulation,
+                bf16: self.bf16,
+                ..TrainerOptions::default()
+            },
+        }
+    }
+
+    /// The device of what is computed without gradients.
+    #[must_use]
+    pub fn device(&self) -> Device {
+        self.devices.first().cloned().unwrap_or_default()
+    }
+
+    /// The devices in autodiff, for what learns.
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::UnsupportedPrecision`] for a device that does not compute in the bfloat16 that is asked for.
+    pub fn learning_devices(&self) -> Result<Vec<Device>> {
+        let learning = |device: &Device| {
+            if self.bf16 && !device.supports_dtype(DType::BF16) {
+                return Err(Error::Value(wake_nn::Error::UnsupportedPrecision {
+                    device: format!("{device:?}"),
+                    precision: "bf16",
+                }));
+            }
+            let device = device.clone().autodiff();
+            Ok(match self.checkpointing {
+                true => device.gradient_checkpointing(),
+                false => device,
+            })
+        };
+        self.devices.iter().map(learning).collect()
+    }
+
+    /// The same for a stage that runs because a later one needs it, and that may have been stopped half-way.
+    ///
+    /// - `left`: the steps that it was begun for, 0 if it never was
+    /// - `state`: of its last checkpoint, `Null` if there is none
+    pub(super) fn before(&self, left: usize, state: &Value) -> Self {
+        Self {
+            steps: Some(left).filter(|&steps| steps > 0),
+            batch: state["batch"].as_u64().map(|batch| batch as usize),
+            rate: state["trainer"]["rate"].as_f64(),
+            bf16: state["trainer"]["bf16"].as_bool().unwrap_or(self.bf16),
+            seed: state["seed"].as_u64().unwrap_or(self.seed),
+            resume: left > 0,
+            ..self.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    const USUAL: Usual = Usual {
+        steps: 40,
+        batch: 8,
+        rate: 1e-3,
+    };
+
+    /// What is asked for is taken, and what is left open is usual.
+    #[test]
+    fn what_is_left_open_is_usual() {
+        let options = StageOptions {
+            rate: Some(5e-4),
+            ..StageOptions::default()
+        };
+        let run = options.run(&USUAL, Value::Null);
+        let rate = run.trainer.rate;
+        assert!((rate.peak - 5e-4).abs() < 1e-15);
+        assert_eq!((rate.steps, run.batch), (40, 8));
+    }
+
+    /// A stage that was stopped goes on as it was begun; one that never began takes what is usual for it.
+    #[test]
+    fn an_earlier_stage_goes_on_as_it_was_begun() {
+        let later = StageOptions {
+            steps: Some(9),
+            batch: Some(2),
+            rate: Some(1.0),
+            ..StageOptions::default()
+        };
+        let state = json!({"batch": 4, "seed": 3, "trainer": {"rate": 0.25, "bf16": false}});
+        let stopped = later.before(6, &state);
+        assert_eq!((stopped.steps, stopped.batch), (Some(6), Some(4)));
+        assert_eq!(
+            (stopped.rate, stopped.seed, stopped.resume),
+            (Some(0.25), 3, true)
+        );
+        let begun = later.before(0, &Value::Null);
+        assert_eq!((begun.steps, begun.batch, begun.rate), (None, None, None));
+        assert!(!begun.resume && begun.seed == later.seed);
+    }
+}

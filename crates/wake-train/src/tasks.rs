@@ -1,0 +1,261 @@
+//! What the parts of the small model learn.
+
+use std::f32::consts::FRAC_PI_2;
+use std::ops::Range;
+
+use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
+use wake_physics::Scene;
+
+use super::latents::LatentSet;
+use super::run::{Task, Terms, number};
+use wake_ldm::conditioning::{MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens};
+use wake_dataset::{Prompts, shuffled};
+use wake_ldm::network::{
+    ChannelWindows, Flow, Known, PatchTransform, Prior, PromptParser, SeaFields, windows,
+};
+use wake_nn::noise::NoiseSource;
+use crate::streams;
+
+/// The noise level of the image at a position of a run.
+///
+/// ```text
+/// σ = 1/(1 + e^(−n)),  n normal
+/// ```
+///
+/// # References
+///
+/// Esser et al. (2024), "Scaling Rectified Flow Transformers", section 3.1 (logit-normal).
+pub(super) fn noise_level(random: NoiseSource, position: u64) -> f64 {
+    let [a, b] = [0, 1].map(|i| random.uniform(streams::LEVELS, 2 * position + i));
+    let normal = (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos();
+    1.0 / (1.0 + (-normal).exp())
+}
+
+/// The examples at some positions of a run: each round through a set is in another order.
+pub(super) fn examples(
+    seed: u64,
+    positions: impl Iterator<Item = u64>,
+    count: usize,
+) -> Vec<usize> {
+    positions
+        .map(|position| shuffled(position, count as u64, seed) as usize)
+        .collect()
+}
+
+/// The noise of one image of a run.
+pub(super) fn noise_of(seed: u64, position: u64) -> NoiseSource {
+    NoiseSource::new(seed ^ position.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+}
+
+/// Reading what prompts state: squared error of each quantity, and of whether it is stated.
+#[derive(Debug)]
+pub struct WordsTask<'a> {
+    /// The prompts.
+    pub prompts: &'a Prompts,
+    /// The ids that the reader knows.
+    pub vocabulary: &'a Vocabulary,
+}
+
+impl Task<PromptParser> for WordsTask<'_> {
+    fn loss(
+        &self,
+        model: &PromptParser,
+        device: &Device,
+        positions: Range<u64>,
+    ) -> (Tensor<1>, Terms) {
+        let drawn = positions.filter_map(|position| self.prompts.prompt(position).ok());
+        let (prompts, said): (Vec<_>, Vec<_>) = drawn
+            .map(|(text, conditions)| (tokens(&text), statement(&conditions)))
+            .unzip();
+        let (windows, length) = windows(&prompts, self.vocabulary, device);
+        let count = prompts.len() * QUANTITIES;
+        let said: Tensor<2> = Tensor::from_data(TensorData::new(said.concat(), [count, 3]), device);
+        let read = model.forward(windows, length).reshape([count, 3]);
+        let error = (read - said.clone()).square();
+        let flags = said.narrow(1, 0, 1);
+        let stated = error.clone().narrow(1, 0, 1).mean();
+        let values = (error.narrow(1, 1, 2) * flags).mean();
+        let terms = vec![("stated", number(&stated)), ("values", number(&values))];
+        (stated + values, terms)
+    }
+}
+
+/// Latent pixels of an image that a step looks at.
+const CELLS: usize = 64;
+
+/// Learning mean and spread by the likelihood of the latents, and the mean grey by its squared error.
+///
+/// ```text
+/// loss = mean[½ (z − μ)²/⌊s⌋] + mean[½ ((z − ⌊μ⌋)/s)² + ln s] + ½ (10 (grey − found))²
+/// ```
+///
+/// ⌊ ⌋ counts as a constant. With the likelihood alone, ½ ((z − μ)/s)² in the first mean, a wake not yet learnt would be
+/// taken for a rough sea, and hardly be learnt any more. Many scenes, few pixels of each: the network sees one latent
+/// pixel at a time.
+///
+/// # References
+///
+/// Nix & Weigend (1994), "Estimating the Mean and Variance of the Target Probability Distribution", Eq. 4; Seitzer et
+/// al. (2022), "On the Pitfalls of Heteroscedastic Uncertainty Estimation with Probabilistic Neural Networks", Eq. 5,
+/// β = ½.
+#[derive(Debug)]
+pub struct PriorTask<'a> {
+    /// The latents.
+    pub set: &'a LatentSet,
+    /// Seed of the order.
+    pub seed: u64,
+}
+
+impl PriorTask<'_> {
+    /// Latent pixels to learn from: half of them anywhere, half inside the wedge, if there is one.
+    fn cells(&self, scene: &Scene, position: u64) -> Vec<usize> {
+        let random = NoiseSource::new(self.seed);
+        let all = MapGrid::of(&scene.grid).cells();
+        let places = places(scene, &all);
+        let inside = &places[WEDGE * all.len()..][..all.len()];
+        let wedge: Vec<usize> = all.iter().copied().filter(|&c| inside[c] > 0.5).collect();
+        let draw = |i: usize| {
+            let from = if i.is_multiple_of(2) && !wedge.is_empty() {
+                &wedge
+            } else {
+                &all
+            };
+            let at = random.uniform(streams::CELLS, position * CELLS as u64 + i as u64);
+            from[(at * from.len() as f64) as usize]
+        };
+        (0..CELLS).map(draw).collect()
+    }
+}
+
+impl Task<Prior> for PriorTask<'_> {
+    fn loss(&self, model: &Prior, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+        let indices = examples(self.seed, positions.clone(), self.set.len());
+        let scenes = self.set.scenes(&indices);
+        let cells: Vec<Vec<usize>> = scenes
+            .iter()
+            .zip(positions)
+            .map(|(scene, position)| self.cells(scene, position))
+            .collect();
+        let tensor = |pixels: fn(&LatentSet, usize, &[usize]) -> Vec<f32>| -> Tensor<4> {
+            let pairs = indices.iter().zip(&cells);
+            let numbers = pairs.flat_map(|(&i, cells)| pixels(self.set, i, cells));
+            let shape = [indices.len(), self.set.shape()[0], CELLS, 1];
+            Tensor::from_data(TensorData::new(numbers.collect(), shape), device)
+        };
+        let wake = tensor(LatentSet::expected_pixels);
+        let deviations = self.set.log_deviations(&indices);
+        let expected = model.forward(&Known::of_cells(&scenes, &cells, wake, &deviations));
+        let latents = tensor(LatentSet::pixels);
+        let off = latents - expected.mean;
+        let error = number(&off.clone().square().mean());
+        let log_spread = expected.log_spread;
+        let spread = log_spread.clone().detach().exp();
+        let steady = (off.clone().square() / spread).mean() * 0.5;
+        let scaled = off.detach() * log_spread.clone().neg().exp();
+        let surprise = (scaled.square() * 0.5 + log_spread).mean();
+        let greys: Vec<f32> = indices.iter().map(|&i| self.set.example(i).grey).collect();
+        let count = greys.len();
+        let greys: Tensor<2> = Tensor::from_data(TensorData::new(greys, [count, 1]), device);
+        let grey = (expected.grey - greys).square().mean();
+        let terms = vec![
+            ("surprise", number(&surprise)),
+            ("error", error),
+            ("grey", number(&grey)),
+        ];
+        (steady + surprise + grey * 50.0, terms)
+    }
+}
+
+/// Between data r and noise n at noise levels σ: x = cos φ r + sin φ n, its velocity cos φ n − sin φ r, and σ, φ = πσ/2.
+pub(super) fn on_the_way(
+    data: Tensor<4>,
+    noise: Tensor<4>,
+    levels: &[f32],
+) -> (Tensor<4>, Tensor<4>, Tensor<1>) {
+    let levels = TensorData::new(levels.to_vec(), [levels.len()]);
+    let levels: Tensor<1> = Tensor::from_data(levels, &data.device());
+    let angle = (levels.clone() * FRAC_PI_2).reshape([-1, 1, 1, 1]);
+    let (cos, sin) = (angle.clone().cos(), angle.sin());
+    let x = data.clone() * cos.clone() + noise.clone() * sin.clone();
+    (x, noise * cos - data * sin, levels)
+}
+
+/// Learning the velocity of the flow by its squared error.
+///
+/// ```text
+/// φ = πσ/2,    x = cos φ r + sin φ n,    loss = |v(x, σ, numbers) − (cos φ n − sin φ r)|²
+/// ```
+///
+/// with n Gaussian noise like the scene's sea. A batch whose noise cannot be made has a loss that is not a number, and is passed over.
+///
+/// # References
+///
+/// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants"; Salimans & Ho (2022), "Progressive
+/// Distillation for Fast Sampling of Diffusion Models" (v).
+#[derive(Debug)]
+pub struct FlowTask<'a> {
+    /// The residuals.
+    pub set: &'a LatentSet,
+    /// What they were encoded with, outside autodiff.
+    pub patches: &'a PatchTransform,
+    /// Seed of order, noise and noise levels.
+    pub seed: u64,
+}
+
+impl FlowTask<'_> {
+    /// The noise at some positions, made on all cores.
+    fn noise(&self, indices: &[usize], positions: Range<u64>) -> Tensor<4> {
+        let scenes = indices.iter().map(|&i| &self.set.example(i).scene);
+        let pairs: Vec<(&Scene, u64)> = scenes.zip(positions).collect();
+        let [channels, rows, columns] = self.set.shape();
+        let windows = ChannelWindows::new(self.patches);
+        let noise = pairs.par_iter().map(|&(scene, position)| {
+            let (scenes, sources) = (std::slice::from_ref(scene), [noise_of(self.seed, position)]);
+            let seas = SeaFields::new(scenes, &sources, &windows);
+            seas.map_or_else(
+                |_| Tensor::full([1, channels, rows, columns], f32::NAN, &Device::default()),
+                |seas| seas.noise(scenes, &sources, self.patches),
+            )
+        });
+        Tensor::cat(noise.collect(), 0)
+    }
+}
+
+impl Task<Flow> for FlowTask<'_> {
+    fn loss(&self, model: &Flow, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+        let random = NoiseSource::new(self.seed);
+        let indices = examples(self.seed, positions.clone(), self.set.len());
+        let levels: Vec<f32> = positions
+            .clone()
+            .map(|p| noise_level(random, p) as f32)
+            .collect();
+        let noise = self.noise(&indices, positions);
+        let noise = Tensor::from_inner(noise.to_device(&device.clone().inner()));
+        let residual = self.set.latents(&indices, device);
+        let (x, target, levels) = on_the_way(residual, noise, &levels);
+        let known = model.prepared(&self.set.known(&indices, device));
+        let error = model.velocity(x, levels, &known) - target;
+        let loss = error.square().mean();
+        let terms = vec![("flow", number(&loss))];
+        (loss, terms)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_round_takes_every_example_once_in_another_order() {
+        let rounds: Vec<Vec<usize>> = (0..3)
+            .map(|round| examples(5, round * 24..(round + 1) * 24, 24))
+            .collect();
+        for round in &rounds {
+            let mut sorted = round.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..24).collect::<Vec<_>>());
+        }
+        assert_ne!(rounds[0], rounds[1]);
+    }
+}

@@ -1,0 +1,374 @@
+//! A toy model goes through everything that a real run does.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use burn::module::Module;
+use burn::tensor::{DType, Device, Tensor};
+use serde_json::Value;
+
+use super::trainer::Trainer;
+use super::*;
+use wake_ldm::conditioning::Vocabulary;
+use wake_dataset::{Prompts, Recipe, Simulated};
+use wake_ldm::network::{Flow, Foreseen, PatchTransform, WakeModelConfig};
+
+const SIZE: usize = 32;
+
+fn config() -> WakeModelConfig {
+    WakeModelConfig {
+        image_size: SIZE,
+        latent_channels: 4,
+        widths: vec![16, 32],
+        text_width: 16,
+        prior_width: 16,
+        map_channels: 8,
+        norm_groups: 8,
+        ..WakeModelConfig::standard(&Vocabulary::new([1, 2]))
+    }
+}
+
+/// Waves whose direction the conditions tell, and the patches that encode them.
+fn set() -> (LatentSet, PatchTransform) {
+    let device = Device::flex();
+    let wave = |i: usize| -> Vec<f32> {
+        let (sin, cos) = (i as f64).sin_cos();
+        let at = |p: usize| ((p / SIZE) as f64 * sin + (p % SIZE) as f64 * cos) * 0.8;
+        (0..SIZE * SIZE)
+            .map(|p| (0.5 + 0.1 * at(p).sin()) as f32)
+            .collect()
+    };
+    let images: Vec<Vec<f32>> = (0..12).map(wave).collect();
+    let (transform, _) = PatchTransform::fit(images.iter().map(Vec::as_slice), SIZE, 4, &device);
+    let mut set = LatentSet::default();
+    for (i, image) in images.into_iter().enumerate() {
+        let mut scene = config().base_scene();
+        let ship = &mut scene.ships[0];
+        (ship.speed, ship.heading) = (8.0, (i as f64).to_degrees());
+        // What is expected shows half of the wave.
+        let foreseen = Foreseen {
+            grey: image.iter().map(|g| 0.5 + 0.5 * (g - 0.5)).collect(),
+            log_deviations: vec![0.0; 4],
+        };
+        set.extend(&transform, vec![(image, foreseen, scene)])
+            .unwrap();
+    }
+    (set, transform)
+}
+
+fn options(accumulation: usize) -> RunOptions {
+    RunOptions {
+        batch: 4,
+        seed: 5,
+        identity: Value::Null,
+        trainer: TrainerOptions {
+            rate: Rate {
+                peak: 3e-3,
+                warmup: 3,
+                steps: 40,
+            },
+            accumulation,
+            ..TrainerOptions::default()
+        },
+    }
+}
+
+fn run(workers: usize, accumulation: usize) -> Run<Flow> {
+    let devices = vec![Device::flex().autodiff(); workers];
+    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+    Run::new("flow", &config(), init, options(accumulation), devices).unwrap()
+}
+
+/// A run that goes on from a checkpoint.
+fn resumed(workers: usize, accumulation: usize, checkpoint: &Checkpoint) -> Run<Flow> {
+    let mut run = run(workers, accumulation);
+    run.resume(checkpoint.clone()).unwrap();
+    run
+}
+
+/// The weights after a checkpoint, as numbers.
+fn weights(run: &Run<Flow>, folder: &Path) -> Tensors {
+    run.checkpoint(folder).unwrap();
+    Checkpoint::newest(folder).unwrap().unwrap().tensors
+}
+
+fn advance(
+    run: &mut Run<Flow>,
+    (set, patches): &(LatentSet, PatchTransform),
+    steps: usize,
+) -> Vec<f64> {
+    let task = FlowTask {
+        set,
+        patches,
+        seed: 5,
+    };
+    (0..steps)
+        .map(|_| run.step(&task).unwrap().0.loss)
+        .collect()
+}
+
+/// The same start for several runs: random initialisation draws from a generator that other tests share.
+fn start(folder: &Path) -> Checkpoint {
+    run(1, 1).checkpoint(folder).unwrap();
+    Checkpoint::newest(folder).unwrap().unwrap()
+}
+
+#[test]
+fn a_killed_run_gives_the_same_curve_to_the_bit() {
+    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let start = start(&folder.path().join("start"));
+    let mut whole = resumed(1, 1, &start);
+    let curve = advance(&mut whole, &set, 6);
+    let mut first = resumed(1, 1, &start);
+    let mut pieces = advance(&mut first, &set, 3);
+    first.checkpoint(&folder.path().join("half")).unwrap();
+    drop(first);
+    let half = Checkpoint::newest(&folder.path().join("half"))
+        .unwrap()
+        .unwrap();
+    let mut second = resumed(1, 1, &half);
+    pieces.extend(advance(&mut second, &set, 3));
+    assert_eq!(curve, pieces);
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    assert_eq!(weights(&whole, &a), weights(&second, &b));
+}
+
+#[test]
+fn two_workers_and_two_parts_make_the_step_of_one() {
+    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let start = start(&folder.path().join("start"));
+    let after = |workers: usize, accumulation: usize| {
+        let mut run = resumed(workers, accumulation, &start);
+        let losses = advance(&mut run, &set, 2);
+        let name = format!("{workers}-{accumulation}");
+        (losses, weights(&run, &folder.path().join(name)))
+    };
+    let (losses, one) = after(1, 1);
+    for (workers, accumulation) in [(2, 1), (1, 2), (2, 2)] {
+        let (other_losses, other) = after(workers, accumulation);
+        for (a, b) in losses.iter().zip(&other_losses) {
+            // Means of f32 over another order of some thousand terms.
+            assert!((a - b).abs() < 1e-5 * a.abs(), "{a} {b}");
+        }
+        for (name, (_, numbers)) in one.iter().filter(|(name, _)| name.starts_with("first.")) {
+            let largest = numbers.iter().fold(0f32, |m, x| m.max(x.abs()));
+            let differences = numbers
+                .iter()
+                .zip(&other[name].1)
+                .map(|(a, b)| (a - b).abs());
+            // Gradients are sums over batch and pixels with cancellation: a few thousand roundings.
+            let allowed = 1e-3 * largest + 1e-7;
+            assert!(
+                differences.fold(0f32, f32::max) <= allowed,
+                "{name} {largest}"
+            );
+        }
+    }
+}
+
+/// Means of the first and the last five losses.
+fn early_and_late(losses: &[f64]) -> [f64; 2] {
+    assert!(losses.iter().all(|loss| loss.is_finite()), "{losses:?}");
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    [mean(&losses[..5]), mean(&losses[losses.len() - 5..])]
+}
+
+#[test]
+fn the_loss_of_the_flow_falls() {
+    let losses = advance(&mut run(1, 1), &set(), 150);
+    let [early, late] = early_and_late(&losses);
+    // The first losses are the variance of the velocity; the mean of five, 1,280 squares, is known to 0.04 of it.
+    assert!(late < 0.8 * early, "{early} {late}");
+}
+
+#[test]
+fn sixteen_bits_learn_as_32_bits_do() {
+    let (set, folder) = (set(), tempfile::tempdir().unwrap());
+    let start = start(folder.path());
+    let losses = |bf16: bool| {
+        let devices = vec![Device::flex().autodiff()];
+        let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+        let mut options = options(1);
+        options.trainer.bf16 = bf16;
+        let mut run = Run::new("flow", &config(), init, options, devices).unwrap();
+        // The same weights; a run of its own would begin with 32 bits or go on with them.
+        let mut start = start.clone();
+        start.state["trainer"]["bf16"] = bf16.into();
+        run.resume(start).unwrap();
+        let losses = advance(&mut run, &set, 40);
+        assert_eq!(run.averaged().dtype(), DType::F32);
+        losses
+    };
+    let (wide, narrow) = (losses(false), losses(true));
+    // Eight bits of mantissa, a dozen layers: 2⁻⁸ √12 of the velocity, once forward.
+    assert!((wide[0] - narrow[0]).abs() < 0.014 * wide[0]);
+    let [[early, late], [_, other]] = [&wide, &narrow].map(|losses| early_and_late(losses));
+    // Rounding sends the two apart; what is left to learn falls alike.
+    assert!(
+        late < 0.9 * early && (other - late).abs() < 0.25 * (early - late),
+        "{early} {late} {other}"
+    );
+    assert!(wide != narrow);
+}
+
+#[test]
+fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
+    let (set, _) = set();
+    let device = Device::flex();
+    let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
+    let mut run = Run::new(
+        "prior",
+        &config(),
+        init,
+        options(1),
+        vec![device.autodiff()],
+    )
+    .unwrap();
+    let task = PriorTask { set: &set, seed: 5 };
+    let steps: Vec<(StepReport, Terms)> = (0..300).map(|_| run.step(&task).unwrap()).collect();
+    let losses: Vec<f64> = steps.iter().map(|(report, _)| report.loss).collect();
+    let [_, late] = early_and_late(&losses);
+    // Latents have variance 1: both terms of the loss are ½ where nothing is known but that.
+    assert!(late < 0.9, "{late}");
+    let count = set.len();
+    let done = AtomicUsize::new(0);
+    let residuals = set.residuals(&run.averaged(), |n| {
+        done.fetch_add(n, Relaxed);
+    });
+    assert_eq!(done.into_inner(), count);
+    let all: Vec<usize> = (0..count).collect();
+    let squares = residuals.latents(&all, &Device::flex()).square().mean();
+    let variance = squares.into_scalar::<f32>();
+    assert!((0.3..3.0).contains(&variance), "{variance}");
+}
+
+#[test]
+fn a_reader_learns_to_tell_prompts_apart() {
+    let prompts = Prompts::new(Simulated::new(Recipe::default(), 3).unwrap());
+    let ids = (0..8).flat_map(|i| wake_ldm::conditioning::tokens(&prompts.prompt(i).unwrap().0));
+    let vocabulary = Vocabulary::new(ids);
+    let config = WakeModelConfig {
+        vocabulary: vocabulary.known().to_vec(),
+        ..config()
+    };
+    let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
+    let devices = vec![Device::flex().autodiff()];
+    let mut run = Run::new("words", &config, init, options(1), devices).unwrap();
+    let task = WordsTask {
+        prompts: &prompts,
+        vocabulary: &vocabulary,
+    };
+    let losses: Vec<f64> = (0..60).map(|_| run.step(&task).unwrap().0.loss).collect();
+    let [early, late] = early_and_late(&losses);
+    assert!(late < 0.6 * early, "{early} {late}");
+}
+
+#[test]
+fn a_checkpoint_of_another_model_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = start(folder.path());
+    let other = WakeModelConfig {
+        map_channels: 16,
+        ..config()
+    };
+    let devices = vec![Device::flex().autodiff()];
+    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+    let mut other = Run::new("flow", &other, init, options(1), devices.clone()).unwrap();
+    assert!(other.resume(start.clone()).is_err());
+    let mut renamed = Run::new("other", &config(), init, options(1), devices).unwrap();
+    assert!(renamed.resume(start.clone()).is_err());
+    let mut broken = start;
+    broken.tensors.pop_last();
+    assert!(run(1, 1).resume(broken).is_err());
+}
+
+#[test]
+fn long_gradients_are_shortened_to_the_largest_norm() {
+    let mut trainer = of_a_plane(1);
+    // The gradient of 30 w₀ + 40 w₁ has the norm 50.
+    let report = trainer.step(|layer, device, _| {
+        let slope = Tensor::<2>::from_floats([[30.0], [40.0]], device);
+        (layer.weight.val() * slope).sum()
+    });
+    assert!((report.norm - 50.0).abs() < 1e-4);
+    let first = trainer.state()[2][0].clone().into_data();
+    let expected = [0.1 * 30.0 / 50.0, 0.1 * 40.0 / 50.0];
+    for (found, expected) in first.iter::<f64>().zip(expected) {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+    let before = trainer.model().clone();
+    let broken = trainer.step(|layer, _, _| (layer.weight.val() * f32::NAN).sum());
+    assert!(!broken.applied);
+    let same = (before.weight.val() - trainer.model().weight.val())
+        .abs()
+        .sum();
+    assert!(same.into_scalar::<f32>() < f32::MIN_POSITIVE);
+    assert_eq!(trainer.model().num_params(), 2);
+}
+
+/// A trainer of two weights under the loss w₀ + w₁, whose gradient is the same in every step.
+fn of_a_plane(steps: usize) -> Trainer<burn::nn::Linear> {
+    let device = Device::flex().autodiff();
+    let layer = burn::nn::LinearConfig::new(2, 1)
+        .with_bias(false)
+        .init(&device);
+    let options = TrainerOptions {
+        rate: Rate {
+            peak: 1e-2,
+            warmup: 0,
+            steps,
+        },
+        adam: AdamOptions {
+            weight_decay: 0.0,
+            ..AdamOptions::default()
+        },
+        ..TrainerOptions::default()
+    };
+    Trainer::new(layer, options, vec![device])
+}
+
+fn first_weight(trainer: &Trainer<burn::nn::Linear>) -> f64 {
+    let weights = trainer.model().weight.val().into_data();
+    weights.iter::<f64>().next().unwrap()
+}
+
+/// Under one and the same gradient a step of Adam is as long as its rate, whatever the step's number, if that counts the
+/// steps that were made: 1 − βᵗ cancels in both averages. A step that is lost moves nothing and is not counted.
+#[test]
+fn a_step_that_is_lost_counts_for_nobody() {
+    let mut trainer = of_a_plane(10);
+    let start = first_weight(&trainer);
+    let mut moved = 0.0;
+    for factor in [1.0, f32::NAN, 1.0, f32::INFINITY, 1.0] {
+        let before = first_weight(&trainer);
+        let report = trainer.step(|layer, _, _| (layer.weight.val() * factor).sum());
+        assert_eq!(report.applied, factor.is_finite());
+        if report.applied {
+            moved += report.rate;
+        } else {
+            assert_eq!(first_weight(&trainer).to_bits(), before.to_bits());
+        }
+    }
+    assert_eq!(trainer.steps(), 5);
+    // Weights below 1 are 32-bit numbers: 6e-8 a step; ε of 1e-8 beside the gradient's ½.
+    let found = start - first_weight(&trainer);
+    assert!((found - moved).abs() < 5e-7, "{found} {moved}");
+}
+
+#[test]
+fn a_run_without_a_finite_step_ends_as_an_error() {
+    let mut lost = of_a_plane(3);
+    for _ in 0..3 {
+        assert!(lost.check().is_ok());
+        lost.step(|layer, _, _| (layer.weight.val() * f32::NAN).sum());
+    }
+    let error = lost.check().unwrap_err().to_string();
+    assert!(error.contains("3 steps"), "{error}");
+    let mut found = of_a_plane(3);
+    for factor in [f32::NAN, 1.0, f32::NAN] {
+        found.step(|layer, _, _| (layer.weight.val() * factor).sum());
+    }
+    assert!(found.check().is_ok());
+}

@@ -1,0 +1,289 @@
+//! A latent diffusion model is learnt from images and prompts alone: the autoencoder, then text encoder and U-Net.
+
+use std::ops::Range;
+
+use burn::module::Module;
+use burn::tensor::{Device, Int, Tensor, TensorData};
+use half::f16;
+
+use super::fine_tune::noised;
+use super::latents::batch;
+use super::run::{Task, Terms, number};
+use super::tasks::{examples, noise_of};
+use wake_ldm::autoencoder::AutoencoderKl;
+use wake_dataset::Pair;
+use crate::error::{Error, Result};
+use wake_nn::noise::{NoiseSource, normal_batch};
+use crate::streams::{FINE_TUNE_STREAM, POSTERIOR_STREAM, self};
+use wake_ldm::pipeline::token_ids;
+use wake_ldm::scheduler::{NoiseSchedule, Prediction};
+use wake_ldm::text::ClipText;
+use wake_ldm::unet::{UNet, UNetInput};
+
+/// Rows and columns of the squares that the autoencoder learns from, unless images are smaller.
+const CROP: usize = 128;
+/// Weight of a latent's divergence beside the squared error of a pixel.
+const DIVERGENCE: f64 = 1e-5;
+/// Images that are encoded at once.
+const ENCODED: usize = 16;
+/// Part of the examples whose prompt is left out, for guidance.
+const WITHOUT_PROMPT: f64 = 0.1;
+
+/// Images of one size beside their prompts in memory, 16 bits a pixel.
+#[derive(Debug, Default)]
+pub struct PromptedImages {
+    size: [usize; 2],
+    pixels: Vec<f16>,
+    prompts: Vec<Vec<i32>>,
+}
+
+impl PromptedImages {
+    /// Adds the image and the prompt of a pair, in CLIP's tokens.
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::InvalidOption`] for an image of another size than those before.
+    pub fn push(&mut self, pair: &Pair) -> Result<()> {
+        let size = [pair.image.rows, pair.image.columns];
+        if self.prompts.is_empty() {
+            self.size = size;
+        }
+        if size != self.size {
+            return Err(Error::Value(wake_nn::Error::InvalidOption {
+                option: "image size".to_owned(),
+                value: format!("{size:?}"),
+                expected: format!("{:?} as before", self.size),
+            }));
+        }
+        let pixels = pair.image.pixels.iter().map(|&grey| f16::from_f32(grey));
+        self.pixels.extend(pixels);
+        self.prompts.push(token_ids(None, &pair.prompt));
+        Ok(())
+    }
+
+    /// Number of images.
+    pub fn len(&self) -> usize {
+        self.prompts.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.prompts.is_empty()
+    }
+
+    /// Rows and columns of the images.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The windows of `size` rows and columns at some places `[row, column]` of some images, in −1…1.
+    fn windows(
+        &self,
+        places: &[(usize, [usize; 2])],
+        size: [usize; 2],
+        device: &Device,
+    ) -> Tensor<4> {
+        let [rows, columns] = self.size;
+        let mut numbers = Vec::with_capacity(places.len() * size[0] * size[1]);
+        for &(image, [row, column]) in places {
+            for r in row..row + size[0] {
+                let first = (image * rows + r) * columns + column;
+                let line = &self.pixels[first..first + size[1]];
+                numbers.extend(line.iter().map(|grey| 2.0 * grey.to_f32() - 1.0));
+            }
+        }
+        let data = TensorData::new(numbers, [places.len(), 1, size[0], size[1]]);
+        Tensor::from_data(data, device)
+    }
+
+    /// The latents of all images: the means of their posteriors, shifted and scaled to mean 0 and variance 1 together.
+    ///
+    /// - `done`: called with the number of images that were encoded
+    ///
+    /// Returns the autoencoder that knows shift and scale, too.
+    ///
+    /// # Panics
+    ///
+    /// When there is no image.
+    pub fn encode(
+        self,
+        autoencoder: AutoencoderKl,
+        device: &Device,
+        done: impl Fn(usize),
+    ) -> (PromptedLatents, AutoencoderKl) {
+        let all: Vec<(usize, [usize; 2])> = (0..self.len()).map(|image| (image, [0, 0])).collect();
+        let (mut latents, mut shape) = (Vec::<f32>::new(), [0; 3]);
+        for places in all.chunks(ENCODED) {
+            let images = self.windows(places, self.size, device);
+            let images = images.repeat_dim(1, autoencoder.image_channels());
+            let means = autoencoder.encode(images).mode();
+            let [_, channels, rows, columns] = means.dims();
+            shape = [channels, rows, columns];
+            latents.extend(means.into_data().iter::<f32>());
+            done(places.len());
+        }
+        let count = latents.len() as f64;
+        let mean = latents.iter().map(|&z| f64::from(z)).sum::<f64>() / count;
+        let squares = latents.iter().map(|&z| (f64::from(z) - mean).powi(2));
+        let scale = (count / squares.sum::<f64>().max(f64::MIN_POSITIVE)).sqrt();
+        let scaled = latents.iter().map(|&z| (f64::from(z) - mean) * scale);
+        let set = PromptedLatents {
+            shape,
+            latents: scaled.map(f16::from_f64).collect(),
+            prompts: self.prompts,
+            empty: token_ids(None, ""),
+        };
+        (set, autoencoder.with_latents(mean, scale))
+    }
+}
+
+/// Latents of images beside their prompts, 16 bits a number.
+#[derive(Debug)]
+pub struct PromptedLatents {
+    shape: [usize; 3],
+    latents: Vec<f16>,
+    prompts: Vec<Vec<i32>>,
+    empty: Vec<i32>,
+}
+
+impl PromptedLatents {
+    /// Channels, rows and columns of the latents.
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
+}
+
+/// Learning to encode and decode: squared error of the pixels, and a little of the divergence of the latents from a
+/// normal distribution.
+///
+/// ```text
+/// loss = mean |decode(μ + σ n) − image|² + 10⁻⁵ mean KL
+/// ```
+///
+/// on squares of 128 pixels anywhere in the images, which lie in −1…1; KL of one latent number.
+///
+/// # References
+///
+/// Kingma & Welling (2014), "Auto-Encoding Variational Bayes", Eq. 10; Rombach et al. (2022), "High-Resolution Image
+/// Synthesis with Latent Diffusion Models", appendix G (the weight).
+#[derive(Debug)]
+pub struct AutoencoderTask<'a> {
+    /// The images, at least one, each with rows and columns that the autoencoder can halve as often as it does.
+    pub images: &'a PromptedImages,
+    /// Seed of order, places and noise.
+    pub seed: u64,
+}
+
+impl Task<AutoencoderKl> for AutoencoderTask<'_> {
+    fn loss(
+        &self,
+        model: &AutoencoderKl,
+        device: &Device,
+        positions: Range<u64>,
+    ) -> (Tensor<1>, Terms) {
+        let random = NoiseSource::new(self.seed);
+        let crop = self.images.size.map(|side| side.min(CROP));
+        let indices = examples(self.seed, positions.clone(), self.images.len());
+        let place = |position: u64| -> [usize; 2] {
+            std::array::from_fn(|axis| {
+                let room = self.images.size[axis] - crop[axis] + 1;
+                let draw = random.uniform(streams::CROPS, 2 * position + axis as u64);
+                (draw * room as f64) as usize
+            })
+        };
+        let places = indices.into_iter().zip(positions.clone().map(place));
+        let images = self
+            .images
+            .windows(&places.collect::<Vec<_>>(), crop, device)
+            .repeat_dim(1, model.image_channels());
+        let posterior = model.encode(images.clone());
+        let [count, channels, rows, columns] = posterior.mean.dims();
+        let sources: Vec<NoiseSource> = positions.map(|p| noise_of(self.seed, p)).collect();
+        let noise = normal_batch(
+            &sources,
+            POSTERIOR_STREAM,
+            [channels, rows, columns],
+            device,
+        );
+        let decoded = model.decode(posterior.sample(noise));
+        let error = (decoded - images).square().mean();
+        let numbers = (count * channels * rows * columns) as f64;
+        let divergence = posterior.kl().sum() / numbers;
+        let terms = vec![
+            ("error", number(&error)),
+            ("divergence", number(&divergence)),
+        ];
+        (error + divergence * DIVERGENCE, terms)
+    }
+}
+
+/// What turns prompts into latents, and learns together.
+#[derive(Module, Debug)]
+pub struct TextToImage {
+    /// Reads the prompt.
+    pub text_encoder: ClipText,
+    /// Predicts the noise.
+    pub unet: UNet,
+}
+
+/// Learning to predict the noise of latents from their prompts.
+///
+/// ```text
+/// x = √ᾱₜ z + √(1 − ᾱₜ) n,    loss = mean |unet(x, t, text encoder(prompt)) − n|²
+/// ```
+///
+/// A tenth of the prompts is left out.
+///
+/// # References
+///
+/// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models", Eq. 3; Ho & Salimans (2021),
+/// "Classifier-Free Diffusion Guidance", algorithm 1 (prompts left out).
+#[derive(Debug)]
+pub struct TextToImageTask<'a> {
+    /// The latents, at least one.
+    pub set: &'a PromptedLatents,
+    /// How much noise each step has.
+    pub schedule: &'a NoiseSchedule,
+    /// Seed of order, noise, steps, and of which prompts are left out.
+    pub seed: u64,
+}
+
+impl Task<TextToImage> for TextToImageTask<'_> {
+    fn loss(
+        &self,
+        model: &TextToImage,
+        device: &Device,
+        positions: Range<u64>,
+    ) -> (Tensor<1>, Terms) {
+        let random = NoiseSource::new(self.seed);
+        let indices = examples(self.seed, positions.clone(), self.set.prompts.len());
+        let count = self.schedule.steps() as f64;
+        let draw = |p: u64| (random.uniform(streams::STEPS, p) * count) as usize;
+        let steps: Vec<usize> = positions.clone().map(draw).collect();
+        let told = positions.clone().zip(&indices).flat_map(|(p, &i)| {
+            match random.uniform(streams::LEFT_OUT, p) < WITHOUT_PROMPT {
+                true => &self.set.empty,
+                false => &self.set.prompts[i],
+            }
+        });
+        let told: Vec<i32> = told.copied().collect();
+        let shape = [indices.len(), told.len() / indices.len().max(1)];
+        let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(told, shape), device);
+        let sources: Vec<NoiseSource> = positions.map(|p| noise_of(self.seed, p)).collect();
+        let noise = normal_batch(&sources, FINE_TUNE_STREAM, self.set.shape, device);
+        let clean = batch(&self.set.latents, self.set.shape, &indices, device);
+        let noised = noised(self.schedule, Prediction::Epsilon, &steps, clean, noise);
+        let found = model.unet.forward(UNetInput {
+            sample: noised.sample,
+            timesteps: noised.timesteps,
+            context: Some(model.text_encoder.last_hidden_state(ids)),
+            condition: None,
+        });
+        let loss = (found - noised.target).square().mean();
+        let terms = vec![("noise", number(&loss))];
+        (loss, terms)
+    }
+}
+
+#[cfg(all(test, feature = "flex"))]
+mod tests;

@@ -1,0 +1,171 @@
+//! Toy models learn two images and their names.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use burn::tensor::Device;
+use serde_json::Value;
+
+use super::*;
+use wake_ldm::autoencoder::AutoencoderKlConfig;
+use wake_ldm::scheduler::{BetaCurve, TerminalSnr};
+use wake_ldm::text::ClipTextConfig;
+use crate::{Rate, Run, RunOptions, TrainerOptions};
+use wake_ldm::unet::UNetConfig;
+
+fn options(batch: usize, peak: f64, steps: usize) -> RunOptions {
+    RunOptions {
+        batch,
+        seed: 3,
+        identity: Value::Null,
+        trainer: TrainerOptions {
+            rate: Rate {
+                peak,
+                warmup: 5,
+                steps,
+            },
+            average_decay: 0.9,
+            ..TrainerOptions::default()
+        },
+    }
+}
+
+/// Waves along both axes, longer from image to image.
+fn images(count: usize, size: usize) -> PromptedImages {
+    let grey = |image: usize, row: usize, column: usize| {
+        let [r, c] = [row, column].map(|x| x as f32 / (1.5 + image as f32));
+        f16::from_f32(0.5 + 0.2 * r.sin() + 0.2 * c.cos())
+    };
+    let at = |n: usize| grey(n / (size * size), n / size % size, n % size);
+    PromptedImages {
+        size: [size; 2],
+        pixels: (0..count * size * size).map(at).collect(),
+        prompts: (0..count as i32).map(|n| vec![n + 1; 4]).collect(),
+    }
+}
+
+fn autoencoder(device: &Device) -> AutoencoderKl {
+    AutoencoderKlConfig::small(4, 2)
+        .with_block_out_channels(vec![16, 16])
+        .with_norm_groups(4)
+        .init(device)
+}
+
+#[test]
+fn images_are_coded_and_decoded() {
+    let images = images(4, 32);
+    let (steps, device) = (120, Device::flex());
+    let mut run = Run::of(
+        "autoencoder-kl",
+        &Value::Null,
+        autoencoder,
+        options(4, 5e-3, steps),
+        vec![device.clone().autodiff()],
+    )
+    .unwrap();
+    let task = AutoencoderTask {
+        images: &images,
+        seed: 3,
+    };
+    for _ in 0..steps {
+        assert!(run.step(&task).unwrap().0.applied);
+    }
+    let places: Vec<(usize, [usize; 2])> = (0..4).map(|image| (image, [0, 0])).collect();
+    let pixels = images.windows(&places, [32, 32], &device);
+    let model = run.averaged();
+    let means = model.encode(pixels.clone()).mode();
+    let decoded = model.decode(means.clone());
+    let squares = |x: Tensor<4>| f64::from(x.square().mean().into_scalar::<f32>());
+    // The dumbest thing that could reach it: the mean grey.
+    let constant = squares(pixels.clone() - pixels.clone().mean().reshape([1, 1, 1, 1]));
+    let error = squares(decoded - pixels);
+    assert!(error < 0.1 * constant, "{error} of {constant}");
+
+    // Latents have mean 0 and variance 1, and are the means again once shift and scale are undone.
+    let (set, model) = images.encode(model, &device, |_| {});
+    assert_eq!(set.shape(), [4, 4, 4]);
+    let latents = batch(&set.latents, set.shape, &[0, 1, 2, 3], &device);
+    let mean = f64::from(latents.clone().mean().into_scalar::<f32>());
+    // 16 bits keep eleven of a number: 2⁻¹¹ of each, and the root of 256 numbers less of their mean.
+    let rounding = (0.5f64).powi(11);
+    assert!(mean.abs() < rounding, "{mean}");
+    assert!((squares(latents.clone()) - 1.0).abs() < 2.0 * rounding);
+    let off = squares(model.from_latents(latents) - means.clone()) / squares(means);
+    assert!(off.sqrt() < rounding, "{off}");
+}
+
+#[test]
+fn images_of_another_size_are_refused() {
+    let mut images = images(1, 32);
+    let recipe = wake_dataset::Recipe::default();
+    let pair = wake_dataset::Simulated::new(recipe, 1)
+        .unwrap()
+        .pair(0)
+        .unwrap();
+    let error = images.push(&pair).unwrap_err().to_string();
+    assert!(error.contains("[32, 32] as before"), "{error}");
+    let mut empty = PromptedImages::default();
+    empty.push(&pair).unwrap();
+    assert_eq!((empty.len(), empty.size()), (1, [256, 256]));
+    assert_eq!(empty.prompts[0].len(), 77);
+}
+
+/// Two latents that differ in sign, and steps with so little of them, ᾱ = 0.03 and 0.0009, that their mean of 0.17 at most can hardly be
+/// told from the noise's deviation of 0.09: only the prompt tells which. Of the wrong one the loss is larger by up to 4ᾱ.
+#[test]
+fn the_prompt_says_which_image() {
+    let device = Device::flex();
+    let length = 2 * 8 * 8;
+    let latents = (0..2 * length).map(|n| f16::from_f32(if n < length { 1.0 } else { -1.0 }));
+    let set = |prompts: [i32; 2]| PromptedLatents {
+        shape: [2, 8, 8],
+        latents: latents.clone().collect(),
+        prompts: prompts.map(|id| vec![id; 4]).to_vec(),
+        empty: vec![0; 4],
+    };
+    let (right, swapped) = (set([1, 2]), set([2, 1]));
+    let curve = BetaCurve::ScaledLinear(0.97, 0.97);
+    let schedule = NoiseSchedule::new(&curve, 2, TerminalSnr::Kept).unwrap();
+    let init = |device: &Device| TextToImage {
+        text_encoder: ClipTextConfig::new()
+            .with_vocab_size(8)
+            .with_hidden_size(8)
+            .with_intermediate_size(16)
+            .with_layers(1)
+            .with_heads(1)
+            .init(device),
+        unet: UNetConfig::small(2, Some(8), None)
+            .with_block_out_channels(vec![8, 16])
+            .with_down_attention(vec![false, true])
+            .with_up_attention(vec![true, false])
+            .with_heads(vec![1, 2])
+            .with_norm_groups(4)
+            .init(device),
+    };
+    let steps = 250;
+    let autodiff = device.clone().autodiff();
+    let constants = options(8, 1e-2, steps);
+    let devices = vec![autodiff];
+    let mut run = Run::of("text-to-image", &Value::Null, init, constants, devices).unwrap();
+    let task = |set| TextToImageTask {
+        set,
+        schedule: &schedule,
+        seed: 3,
+    };
+    for _ in 0..steps {
+        assert!(run.step(&task(&right)).unwrap().0.applied);
+    }
+    // The same noise, steps and order, batch by batch, with the prompts of both as learnt and exchanged.
+    let model = run.averaged();
+    let loss = |set, batch: u64| {
+        let positions = 10_000 + 8 * batch..10_008 + 8 * batch;
+        number(&task(set).loss(&model, &device, positions).0)
+    };
+    let costs: Vec<f64> = (0..32)
+        .map(|batch| loss(&swapped, batch) - loss(&right, batch))
+        .collect();
+    let count = costs.len() as f64;
+    let mean = costs.iter().sum::<f64>() / count;
+    let squares: f64 = costs.iter().map(|cost| (cost - mean).powi(2)).sum();
+    let error = (squares / (count * (count - 1.0))).sqrt();
+    assert!(mean > 5.0 * error, "{mean:e} ± {error:e}");
+}

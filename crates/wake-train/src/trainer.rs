@@ -1,0 +1,355 @@
+//! One step of training, on one device or several.
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, TensorData};
+use serde_json::{Value, json};
+
+use super::checkpoint::{Checkpoint, Tensors};
+use super::optimizer::{Adam, AdamOptions, Average, Rate};
+use super::tensors::{gradients, names, replaced, rounded, values};
+use crate::error::{Error, Result, check_range};
+
+/// Groups of a checkpoint's tensors, in the order of [`Trainer::state`].
+const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
+/// So many steps in a row without a finite gradient end a run.
+const LOST: usize = 20;
+
+/// Constants of a [`Trainer`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrainerOptions {
+    /// Size of the steps.
+    pub rate: Rate,
+    /// Constants of the optimizer.
+    pub adam: AdamOptions,
+    /// The largest norm of all gradients together; longer ones are shortened to it.
+    pub largest_norm: f64,
+    /// Decay of the averaged weights.
+    pub average_decay: f64,
+    /// Parts of a batch that one device takes after the other.
+    pub accumulation: usize,
+    /// Whether losses and gradients are computed with weights of type `bfloat16`, where the device has it; weights,
+    /// averages and steps are 32 bits all the same (Micikevicius et al. 2018, "Mixed Precision Training", section 3.1).
+    pub bf16: bool,
+}
+
+impl Default for TrainerOptions {
+    fn default() -> Self {
+        Self {
+            rate: Rate {
+                peak: 1e-3,
+                warmup: 200,
+                steps: 10_000,
+            },
+            adam: AdamOptions::default(),
+            largest_norm: 1.0,
+            average_decay: 0.999,
+            accumulation: 1,
+            bf16: false,
+        }
+    }
+}
+
+impl TrainerOptions {
+    /// Checks that steps of these sizes can be made.
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::OutOfRange`] with the constant at fault.
+    pub fn validate(&self) -> Result<()> {
+        let AdamOptions {
+            beta_1,
+            beta_2,
+            epsilon,
+            weight_decay,
+        } = self.adam;
+        check_range("rate", self.rate.peak, 1e-12, 1.0)?;
+        check_range("beta_1", beta_1, 0.0, 0.9999)?;
+        check_range("beta_2", beta_2, 0.0, 0.999999)?;
+        check_range("epsilon", epsilon, 1e-16, 1.0)?;
+        check_range("weight_decay", weight_decay, 0.0, 1.0)?;
+        check_range("largest_norm", self.largest_norm, 1e-6, 1e6)?;
+        check_range("average_decay", self.average_decay, 0.0, 0.999999)?;
+        check_range("accumulation", self.accumulation as f64, 1.0, 65536.0)
+    }
+
+    /// What two runs must have in common for one to go on from the other; more steps may be asked of the second, and
+    /// `accumulation` changes no result.
+    pub(super) fn state(&self) -> Value {
+        let AdamOptions {
+            beta_1,
+            beta_2,
+            epsilon,
+            weight_decay,
+        } = self.adam;
+        json!({
+            "rate": self.rate.peak, "warmup": self.rate.warmup, "beta_1": beta_1, "beta_2": beta_2,
+            "epsilon": epsilon, "weight_decay": weight_decay, "largest_norm": self.largest_norm,
+            "average_decay": self.average_decay, "bf16": self.bf16,
+        })
+    }
+}
+
+/// What a step did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepReport {
+    /// Mean loss of all parts.
+    pub loss: f64,
+    /// Norm of the gradient before clipping.
+    pub norm: f64,
+    /// Size of the step.
+    pub rate: f64,
+    /// Whether the gradient was finite; if not, nothing was changed.
+    pub applied: bool,
+}
+
+/// A model in training.
+///
+/// With several devices each computes the gradients of its own parts of the batch; they are averaged on the first
+/// device, which makes the step, as one device would with the whole batch.
+#[derive(Debug)]
+pub struct Trainer<M> {
+    model: M,
+    adam: Adam,
+    average: Average,
+    options: TrainerOptions,
+    devices: Vec<Device>,
+    /// Steps made.
+    step: usize,
+    /// Those that changed the weights: what optimizer and average count.
+    applied: usize,
+    /// Steps since the last of them.
+    lost: usize,
+}
+
+impl<M: Module> Trainer<M> {
+    /// A trainer of a model on the first of some autodiff devices.
+    ///
+    /// # Panics
+    ///
+    /// When there is no device.
+    pub fn new(model: M, options: TrainerOptions, devices: Vec<Device>) -> Self {
+        let model = model.fork(devices.first().expect("at least one device"));
+        let weights = values(&model);
+        Self {
+            adam: Adam::new(options.adam, weights.len()),
+            average: Average::new(weights, options.average_decay),
+            model,
+            options,
+            devices,
+            step: 0,
+            applied: 0,
+            lost: 0,
+        }
+    }
+
+    /// Weights, averaged weights, and both averages of the optimizer.
+    pub(super) fn state(&self) -> [Vec<Tensor<1>>; 4] {
+        let weights = values(&self.model);
+        let [first, second] = self.adam.averages(&weights);
+        [weights, self.average.values().to_vec(), first, second]
+    }
+
+    /// The model as it is now, on its autodiff device.
+    pub(super) fn model(&self) -> &M {
+        &self.model
+    }
+
+    /// The model with averaged weights, outside autodiff.
+    pub fn averaged(&self) -> M {
+        replaced(self.model.valid(), self.average.values().to_vec())
+    }
+
+    /// Steps made so far.
+    pub fn steps(&self) -> usize {
+        self.step
+    }
+
+    /// Parts that a batch is cut into.
+    pub fn parts(&self) -> usize {
+        self.devices.len() * self.options.accumulation
+    }
+
+    /// Whether the run still learns.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Diverged`] where none of many steps in a row, or of all so far, could be made.
+    pub fn check(&self) -> Result<()> {
+        let never = self.step > 0 && self.applied == 0;
+        if self.lost >= LOST || (never && self.step >= self.options.rate.steps) {
+            return Err(Error::Diverged {
+                step: self.step,
+                what: format!(
+                    "the last {} steps had no finite loss and gradient",
+                    self.lost
+                ),
+            });
+        }
+        Ok(())
+    }
+
+    /// One step against the mean of `loss` over all parts.
+    ///
+    /// - `loss`: of the model on a device, and the number of a part, below [`parts`](Self::parts)
+    pub fn step(&mut self, loss: impl Fn(&M, &Device, usize) -> Tensor<1> + Sync) -> StepReport {
+        let (gradients, loss) = self.gradients(&loss);
+        let norm = global_norm(&gradients);
+        let rate = self.options.rate.at(self.step);
+        let applied = norm.is_finite() && loss.is_finite();
+        if applied {
+            let scale = (self.options.largest_norm / (norm + 1e-6)).min(1.0);
+            let weights = self.adam.step(values(&self.model), gradients, rate, scale);
+            self.applied += 1;
+            self.average.update(&weights, self.applied);
+            self.model = replaced(self.model.clone(), weights);
+            self.lost = 0;
+        } else {
+            self.lost += 1;
+        }
+        self.step += 1;
+        StepReport {
+            loss,
+            norm,
+            rate,
+            applied,
+        }
+    }
+
+    /// Mean gradients and mean loss over all parts.
+    fn gradients(
+        &self,
+        loss: &(impl Fn(&M, &Device, usize) -> Tensor<1> + Sync),
+    ) -> (Vec<Tensor<1>>, f64) {
+        let accumulation = self.options.accumulation;
+        let bf16 = self.options.bf16;
+        let work = |model: M, device: &Device, worker: usize| {
+            let model = match bf16 {
+                true => rounded(model),
+                false => model,
+            };
+            let parts = (0..accumulation).map(|i| {
+                let loss = loss(&model, device, worker * accumulation + i);
+                let value = f64::from(loss.clone().inner().into_scalar::<f32>());
+                (gradients(&model, loss.backward()), value)
+            });
+            parts.reduce(sum).unwrap_or_default()
+        };
+        let (sums, total) = match self.devices.as_slice() {
+            [device] => work(self.model.clone(), device, 0),
+            devices => in_threads(devices, |device| self.model.clone().fork(device), work),
+        };
+        let parts = self.parts() as f64;
+        (sums.into_iter().map(|g| g / parts).collect(), total / parts)
+    }
+}
+
+/// Sum of two lists of gradients and losses.
+fn sum(a: (Vec<Tensor<1>>, f64), b: (Vec<Tensor<1>>, f64)) -> (Vec<Tensor<1>>, f64) {
+    let gradients = a.0.into_iter().zip(b.0).map(|(a, b)| a + b).collect();
+    (gradients, a.1 + b.1)
+}
+
+/// One thread for each device; the results are summed on the first, in the order of the devices.
+fn in_threads<M: Send>(
+    devices: &[Device],
+    copy: impl Fn(&Device) -> M,
+    work: impl Fn(M, &Device, usize) -> (Vec<Tensor<1>>, f64) + Sync,
+) -> (Vec<Tensor<1>>, f64) {
+    let (work, home) = (&work, devices[0].clone().inner());
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = devices
+            .iter()
+            .enumerate()
+            .map(|(i, device)| {
+                let model = copy(device);
+                scope.spawn(move || work(model, device, i))
+            })
+            .collect();
+        let results = workers.into_iter().map(|worker| match worker.join() {
+            Ok((gradients, loss)) => {
+                let home = gradients.into_iter().map(|g| g.to_device(&home)).collect();
+                (home, loss)
+            }
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        results.reduce(sum).unwrap_or_default()
+    })
+}
+
+/// Euclidean norm of all gradients together.
+fn global_norm(gradients: &[Tensor<1>]) -> f64 {
+    let squares = gradients.iter().map(|g| g.clone().square().sum()).collect();
+    f64::from(Tensor::cat(squares, 0).sum().sqrt().into_scalar::<f32>())
+}
+
+impl<M: Module> Trainer<M> {
+    /// Weights, their average and the optimizer's averages after the last step.
+    ///
+    /// - `state`: what a run must have in common with this one to go on from here
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Diverged`] for weights that are no finite numbers.
+    pub fn checkpoint(&self, state: &Value) -> Result<Checkpoint> {
+        let names = names(self.model());
+        let mut tensors = Tensors::new();
+        for (group, values) in GROUPS.iter().zip(self.state()) {
+            for ((name, shape), value) in names.iter().zip(values) {
+                let numbers: Vec<f32> = value.into_data().iter::<f32>().collect();
+                if numbers.iter().any(|number| !number.is_finite()) {
+                    return Err(Error::Diverged {
+                        step: self.step,
+                        what: format!("{group}.{name} holds numbers that are not finite"),
+                    });
+                }
+                tensors.insert(format!("{group}.{name}"), (shape.clone(), numbers));
+            }
+        }
+        Ok(Checkpoint {
+            step: self.step,
+            applied: self.applied,
+            state: state.clone(),
+            tensors,
+        })
+    }
+
+    /// Goes on where a checkpoint left off.
+    ///
+    /// # Errors
+    ///
+    /// [`wake_nn::Error::InvalidOption`] for a checkpoint of another `state`, or without a tensor of the model.
+    pub fn restore(&mut self, checkpoint: Checkpoint, state: &Value) -> Result<()> {
+        if let Some(error) = checkpoint.differs(state) {
+            return Err(error);
+        }
+        let mut tensors = checkpoint.tensors;
+        let devices = self.model().devices();
+        let device = devices.into_iter().next().unwrap_or_default().inner();
+        let names = names(self.model());
+        let mut group = |group: &str| -> Result<Vec<Tensor<1>>> {
+            let take = |(name, shape): &(String, Vec<usize>)| {
+                let name = format!("{group}.{name}");
+                let found = tensors.remove(&name).filter(|(found, _)| found == shape);
+                let (_, numbers) = found.ok_or_else(|| Error::Value(wake_nn::Error::InvalidOption {
+                    option: "checkpoint".to_owned(),
+                    value: format!("without {name} {shape:?}"),
+                    expected: "all tensors of the model".to_owned(),
+                }))?;
+                let length = numbers.len();
+                Ok(Tensor::from_data(
+                    TensorData::new(numbers, [length]),
+                    &device,
+                ))
+            };
+            names.iter().map(take).collect()
+        };
+        let [a, b, c, d] = GROUPS;
+        let state = [group(a)?, group(b)?, group(c)?, group(d)?];
+        let [weights, average, first, second] = state;
+        self.model = replaced(self.model.clone(), weights);
+        self.average = Average::new(average, self.options.average_decay);
+        self.adam = Adam::resumed(self.options.adam, [first, second], checkpoint.applied);
+        (self.step, self.applied, self.lost) = (checkpoint.step, checkpoint.applied, 0);
+        Ok(())
+    }
+}

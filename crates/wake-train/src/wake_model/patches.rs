@@ -1,0 +1,61 @@
+//! The first stage: squares of pixels as latents, in closed form.
+
+use serde_json::json;
+use wake_physics::output;
+
+use super::super::latents::fit_patches;
+use super::super::progress::counted;
+use super::{PATCHES, WakeTraining};
+use crate::error::Result;
+use wake_ldm::network::{PatchTransform, Shares};
+use wake_nn::weights::{Layout, Precision, save_as};
+
+/// Images that the patch transform is fitted to.
+const FITTED: u64 = 400;
+/// Channels of a square of pixels: all of them lose nothing.
+const CHANNELS: usize = 64;
+
+impl WakeTraining<'_> {
+    /// Fits the patch transform to the first 400 pairs, and writes it with what every number of channels keeps
+    /// (`shares.json`).
+    ///
+    /// # Errors
+    ///
+    /// As [`fit_patches`], [`wake_nn::Error::InvalidOption`] without pairs, and for files that cannot be
+    /// written.
+    pub fn autoencoder(&self) -> Result<Shares> {
+        let (pairs, device) = (self.pairs()?, self.options.device());
+        let (source, count) = (pairs.source(), pairs.len().min(FITTED));
+        let fitted = counted(
+            "images for the patch transform",
+            count,
+            self.progress,
+            |done| fit_patches(source, count, &self.config, &device, done),
+        );
+        let (transform, shares) = fitted?;
+        let path = self.out(PATCHES);
+        save_as(&transform, Layout::Diffusers, &path, Precision::F32)?;
+        let row = |channels| {
+            json!({
+                "channels": channels, "variance": shares.kept(channels), "psnr_db": finite(shares.psnr(channels)),
+            })
+        };
+        let rows: Vec<_> = (1..=CHANNELS).map(row).collect();
+        whole_files::write_json(&self.out("shares.json"), &rows)?;
+        Ok(shares)
+    }
+
+    /// The patch transform of an earlier run, or a new one.
+    pub(super) fn patches(&self) -> Result<PatchTransform> {
+        if !self.out(PATCHES).exists() {
+            self.autoencoder()?;
+        }
+        let empty = PatchTransform::zeros(self.config.latent_channels, &self.options.device());
+        self.part(empty, PATCHES)
+    }
+}
+
+/// JSON has no infinity: all components lose nothing.
+fn finite(number: f64) -> Option<f64> {
+    Some(number).filter(|number| number.is_finite())
+}

@@ -1,0 +1,55 @@
+//! The second stage: what prompts state, read from wordings of simulated scenes.
+
+use burn::tensor::Device;
+use serde_json::json;
+
+use super::super::run::Run;
+use super::super::stage_options::StageOptions;
+use super::super::tasks::WordsTask;
+use super::{PARSER, WakeStage, WakeTraining, keep};
+use wake_ldm::conditioning::Vocabulary;
+use wake_dataset::{Prompts, Recipe, Simulated};
+use crate::error::Result;
+use wake_ldm::network::{PromptParser, WakeModelConfig};
+
+/// Ranges that prompts to read are drawn from, beyond those of images.
+const PROMPT_RANGES: [&str; 4] = [
+    "draw.ship.speed = [1.0, 15.0]",
+    "draw.sea.wind_speed = [1.0, 12.0]",
+    "draw.sea.fetch = { log = [1e3, 1e6] }",
+    "draw.radar.incidence = [10.0, 40.0]",
+];
+
+impl WakeTraining<'_> {
+    /// Trains the reader of prompts; it needs no pairs.
+    ///
+    /// # Errors
+    ///
+    /// As [`Stage::train`](super::super::Stage::train).
+    pub fn words(&mut self) -> Result<()> {
+        self.words_with(&self.options.clone())
+    }
+
+    pub(super) fn words_with(&mut self, options: &StageOptions) -> Result<()> {
+        let recipe = Recipe::default().with_assignments(&PROMPT_RANGES)?;
+        let identity = json!({"prompts": recipe});
+        let prompts = Prompts::new(Simulated::new(recipe, options.seed)?);
+        let vocabulary = Vocabulary::new(self.config.vocabulary.iter().copied());
+        let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
+        let run = Run::new(
+            WakeStage::Words.name(),
+            &self.config,
+            init,
+            options.run(&WakeStage::Words.usual(), identity),
+            options.learning_devices()?,
+        )?;
+        let task = WordsTask {
+            prompts: &prompts,
+            vocabulary: &vocabulary,
+        };
+        let file = self.out(PARSER);
+        let show = |run: &Run<PromptParser>| keep(&run.averaged(), &file);
+        let stage = Self::stage(WakeStage::Words, options);
+        stage.train(&mut self.folder, run, &task, self.progress, show)
+    }
+}

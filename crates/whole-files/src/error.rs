@@ -1,0 +1,26 @@
+//! The one error of this crate.
+
+use std::path::{Path, PathBuf};
+
+/// A file or folder that could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot {action} {}: {source}", path.display())]
+pub struct Error {
+    /// What was tried, such as "write".
+    pub action: &'static str,
+    /// Where.
+    pub path: PathBuf,
+    /// What the system says.
+    pub source: std::io::Error,
+}
+
+/// Result of this crate's fallible functions.
+pub type Result<T> = std::result::Result<T, Error>;
+
+pub(crate) fn failed(action: &'static str, path: &Path, source: impl Into<std::io::Error>) -> Error {
+    Error {
+        action,
+        path: path.to_owned(),
+        source: source.into(),
+    }
+}

@@ -1,0 +1,15 @@
+#![doc = include_str!("../README.md")]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod error;
+mod text;
+mod write;
+
+mod folder;
+mod read;
+
+pub use error::{Error, Result};
+pub use folder::{FolderLock, lock_folder, make_folder, sweep};
+pub use read::{fingerprint, read_text};
+pub use text::{quoted, sentence};
+pub use write::{is_temporary, write_atomically, write_json, write_synced, write_with};

@@ -1,0 +1,75 @@
+//! Text files that are read to a limit, and short names of the content of files.
+
+use crate::error::{Result, failed};
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+/// No text file that is read as a whole is longer than this \[bytes\].
+const LONGEST_TEXT: u64 = 16 << 20;
+
+/// Reads a text file of at most 16 MiB, such as a configuration or the labels of a folder.
+///
+/// # Errors
+///
+/// [`Error`](crate::Error) if it is longer, no regular file, no UTF-8, or cannot be read.
+pub fn read_text(path: &Path) -> Result<String> {
+    let io = |source| failed("read", path, source);
+    // Opening a pipe would wait for somebody to write into it.
+    if !fs::metadata(path).map_err(io)?.is_file() {
+        return Err(io(std::io::Error::other("no regular file")));
+    }
+    let mut text = String::new();
+    let mut file = File::open(path).map_err(io)?.take(LONGEST_TEXT + 1);
+    file.read_to_string(&mut text).map_err(io)?;
+    if text.len() as u64 > LONGEST_TEXT {
+        let message = "longer than 16 MiB";
+        return Err(io(std::io::Error::other(message)));
+    }
+    Ok(text)
+}
+
+/// A short name of the content of a file: FNV-1a of 64 bits.
+///
+/// # Errors
+///
+/// [`Error`](crate::Error) if it cannot be read.
+///
+/// # References
+///
+/// Fowler, Noll & Vo, "The FNV Non-Cryptographic Hash Algorithm".
+pub fn fingerprint(path: &Path) -> Result<String> {
+    let bytes = fs::read(path).map_err(|source| failed("read", path, source))?;
+    let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix);
+    Ok(format!("{hash:016x}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_files_and_devices_are_refused() {
+        let path = Path::new("/dev/zero");
+        if path.exists() {
+            let refused = read_text(path).unwrap_err().to_string();
+            assert!(refused.contains("no regular file"), "{refused}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.json");
+        let file = File::create(&path).unwrap();
+        file.set_len(LONGEST_TEXT + 1).unwrap();
+        let refused = read_text(&path).unwrap_err().to_string();
+        assert!(refused.contains("longer than 16 MiB"), "{refused}");
+    }
+
+    /// The values that the algorithm's authors publish for "" and "foobar".
+    #[test]
+    fn fingerprints_are_those_of_the_algorithm() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        assert_eq!(fingerprint(file.path()).unwrap(), "cbf29ce484222325");
+        fs::write(file.path(), "foobar").unwrap();
+        assert_eq!(fingerprint(file.path()).unwrap(), "85944171f73967e8");
+    }
+}
