@@ -155,7 +155,6 @@ impl GreyImage {
     /// # Panics
     ///
     /// When there are not `rows · columns` of them.
-    #[cfg(any(test, feature = "train"))]
     pub fn from_levels(rows: usize, columns: usize, levels: &[f32]) -> Self {
         assert_eq!(levels.len(), rows * columns, "pixels of an image");
         let levels = levels.iter().map(|x| x.round().clamp(0.0, 255.0) as u8);

@@ -1,11 +1,20 @@
 //! Pairs drawn by the wake model instead of the simulator.
 
-use super::pair::Pair;
-use super::scenes::Simulated;
-use super::source::Source;
-use crate::error::Result;
-use crate::sampler::WakeSampler;
+use crate::wake_model::sampler::WakeSampler;
+use crate::wake_model::sea_texture::SeaTexture;
 use std::ops::Range;
+use wake_dataset::{Pair, Result, Sea, Simulated, Source};
+use wake_physics::{Field, Scene};
+
+impl Sea for SeaTexture {
+    fn check_spacing(&self, spacing: f64) -> Result<()> {
+        Ok(Self::check_spacing(self, spacing)?)
+    }
+
+    fn image(&self, scene: &Scene) -> Result<Field> {
+        Ok(Self::image(self, scene)?)
+    }
+}
 
 /// The scenes of a recipe, drawn by the wake model; a batch is sampled at once.
 ///
@@ -69,7 +78,7 @@ impl Source for Sampled {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
-    use crate::dataset::{Loader, Recipe};
+    use wake_dataset::{Loader, Recipe};
     use burn::tensor::Device;
 
     fn sampled(changes: &[&str]) -> Result<Sampled> {

@@ -129,13 +129,13 @@ impl Checkpoint {
         }))?;
         let count = |key: &str| {
             let count = state[key].as_u64().and_then(|n| usize::try_from(n).ok());
-            count.ok_or_else(|| Error::Dataset {
+            count.ok_or_else(|| Error::Data(wake_dataset::Error::Dataset {
                 path: file.clone(),
                 line: 0,
                 message: format!(
                     "no whole number '{key}'; remove this checkpoint to go on from the one before"
                 ),
-            })
+            }))
         };
         let (step, applied) = (count("step")?, count("applied")?);
         let mut tensors = Tensors::new();

@@ -1,6 +1,6 @@
 //! Endless prompts, and what they state.
 
-use super::scenes::Simulated;
+use wake_dataset::Simulated;
 use wake_ldm::conditioning::Conditions;
 use crate::error::Result;
 use wake_nn::noise::NoiseSource;

@@ -14,7 +14,8 @@ use wake_physics::labels::Labels;
 use wake_physics::{Field, Scene, labels_of};
 use wake_text::{Reading, Wording};
 
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 use wake_nn::check_finite;
 use wake_nn::noise::NoiseSource;
 #[cfg(feature = "flex")]
