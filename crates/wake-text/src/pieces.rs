@@ -31,6 +31,8 @@ impl<'p> Text<'p> {
         while let Some(c) = text[at..].chars().next() {
             let (kind, length) = if let Some(read) = number(text, at) {
                 (Some(read.0), read.1)
+            } else if let Some(length) = lettered(&text[at..]) {
+                (Some(Kind::Figure), length)
             } else if let Some((word, length)) = word(&text[at..]) {
                 (Some(Kind::Word(word)), length)
             } else {
@@ -50,10 +52,8 @@ impl<'p> Text<'p> {
     fn mark(&self, at: usize, c: char, last: Option<&Piece<'_>>) -> (Option<Kind<'static>>, usize) {
         let rest = &self.cleaned.text[at..];
         let dots = rest.len() - rest.trim_start_matches('.').len();
-        let marks = ["+/-", "+-"]
-            .into_iter()
-            .filter(|mark| rest.starts_with(mark));
-        let length = marks.map(str::len).next().unwrap_or(dots.max(c.len_utf8()));
+        let mark = LONG_MARKS.into_iter().find(|mark| rest.starts_with(mark));
+        let length = mark.map_or(dots.max(c.len_utf8()), str::len);
         let before_number = || {
             let next = rest[length..].trim_start().chars().next();
             next.is_some_and(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | '\u{2212}'))
@@ -62,8 +62,9 @@ impl<'p> Text<'p> {
         let kind = match c {
             '.' if dots > 1 && before_number() => Some(Kind::Dash),
             '.' if self.is_abbreviation(at, last) => None,
+            '<' | '>' | '=' | '!' if mark.is_some_and(|mark| mark != "==") => Some(Kind::Bound),
             '.' | '!' | '?' => Some(Kind::Stop),
-            ',' | ';' | '(' | ')' | '[' | ']' => Some(Kind::Comma),
+            ',' | ';' | '(' | ')' | '[' | ']' | '{' | '}' | '|' => Some(Kind::Comma),
             ':' | '=' => Some(Kind::Colon),
             '-' | '\u{2010}'..='\u{2015}' | '\u{2212}' | '\u{2026}' => {
                 before_number().then_some(Kind::Dash)
@@ -71,9 +72,11 @@ impl<'p> Text<'p> {
             '~' if after_number() => before_number().then_some(Kind::Dash),
             '\u{B1}' => Some(Kind::PlusMinus),
             '+' if length > 1 => Some(Kind::PlusMinus),
-            '<' | '>' | '\u{2264}' | '\u{2265}' => Some(Kind::Bound),
+            '<' | '>' | '\u{2260}' | '\u{2264}' | '\u{2265}' => Some(Kind::Bound),
             '/' | '\u{D7}' | '*' => Some(Kind::Cross),
-            _ => None,
+            '@' => Some(Kind::Word("at")),
+            _ if is_silent(c) => None,
+            _ => Some(Kind::Symbol),
         };
         (kind, length)
     }
@@ -101,6 +104,26 @@ impl<'p> Text<'p> {
     }
 }
 
+/// Marks of several characters.
+const LONG_MARKS: [&str; 11] = [
+    "+/-", "+-", "<=", ">=", "=<", "=>", "<>", "!=", "==", "<<", ">>",
+];
+
+/// Whether a character that is no letter and no digit says nothing: space, quotes, signs of "about", bullets.
+fn is_silent(c: char) -> bool {
+    c.is_whitespace()
+        || c.is_control()
+        || matches!(
+            c,
+            '"' | '\'' | '`' | '&' | '_' | '~' | '-' | '\u{AD}' | '\u{B4}' | '\u{AB}' | '\u{BB}'
+        )
+        || matches!(
+            c,
+            '\u{2248}' | '\u{2245}' | '\u{223C}' | '\u{2022}' | '\u{B7}' | '\u{FE0F}'
+        )
+        || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2010}'..='\u{201F}' | '\u{2026}' | '\u{2060}'..='\u{2064}')
+}
+
 /// Words that a full stop may follow within a sentence.
 const ABBREVIATIONS: [&str; 32] = [
     "deg", "degs", "kt", "kts", "kn", "m", "km", "nm", "nmi", "mi", "ft", "m/s", "km/h", "kmh",
@@ -125,7 +148,7 @@ pub(crate) struct Piece<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Kind<'a> {
     Number(f64),
-    /// Digits that are not one number, such as `1.2.3`.
+    /// Digits that are not one number, such as `1.2.3` and `l0`.
     Figure,
     /// Letters, with slashes and apostrophes between them; or `°`.
     Word(&'a str),
@@ -138,11 +161,16 @@ pub(crate) enum Kind<'a> {
     /// A dash or dots before a number.
     Dash,
     PlusMinus,
-    /// `<`, `>`, `≤` or `≥`.
+    /// `<`, `>=`, `≤`, `≠` and their like.
     Bound,
     /// `×`, `*`, or a slash that joins no words.
     Cross,
+    /// Any other sign, such as `%` and `→`.
+    Symbol,
 }
+
+/// Marks after which `.5` is a number.
+const OPENING: &str = "([{,;:=<>\u{2264}\u{2265}\u{B1}~+-\u{2212}\u{2013}/@|";
 
 /// The number at a place of a text, and its length. A sign counts where no letter or digit stands before it.
 fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
@@ -155,6 +183,11 @@ fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
         .into_iter()
         .find(|&sign| !after_word && rest.starts_with(sign));
     let sign_length = sign.map_or(0, char::len_utf8);
+    // A point right after a word, a unit or a bracket ends it, and opens no number.
+    let opens = |c: char| c.is_whitespace() || OPENING.contains(c);
+    if rest.starts_with('.') && !text[..at].chars().next_back().is_none_or(opens) {
+        return None;
+    }
     let (value, length) = unsigned(&rest[sign_length..])?;
     let value = if sign.is_some_and(|sign| sign != '+') {
         -value
@@ -200,8 +233,11 @@ fn unsigned(text: &str) -> Option<(f64, usize)> {
 fn decimal(text: &str) -> Option<(f64, usize)> {
     let bytes = text.as_bytes();
     let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
-    let mut length = 0;
-    while digit(length) || (matches!(bytes.get(length), Some(b'.' | b',')) && digit(length + 1)) {
+    // `.5` is a number, `,5` a comma and a number.
+    let mut length = usize::from(bytes.first() == Some(&b'.') && digit(1));
+    while digit(length)
+        || (length > 0 && matches!(bytes.get(length), Some(b'.' | b',')) && digit(length + 1))
+    {
         length += 1;
     }
     if length == 0 {
@@ -390,13 +426,20 @@ fn other_digits(text: &str) -> Option<(f64, usize)> {
     (length > 0).then_some((f64::NAN, length))
 }
 
+/// Length of a letter and the digits right after it, such as `l0` and `u10`.
+fn lettered(text: &str) -> Option<usize> {
+    let letter = text.chars().next().filter(|c| c.is_alphabetic())?;
+    let digits = digits(&text.as_bytes()[letter.len_utf8()..]);
+    (digits > 0).then_some(letter.len_utf8() + digits)
+}
+
 /// The word a text starts with, and its length: without the dots of `m.p.h.` and the `'s` of `ship's`, with the
 /// power of `s-1`.
 fn word(text: &str) -> Option<(&str, usize)> {
     if let Some(sign) = text.chars().next().filter(|c| matches!(c, '°' | 'º' | '˚')) {
         return Some(("°", sign.len_utf8()));
     }
-    if let Some(found) = dotted(text) {
+    if let Some(found) = dotted(text).or_else(|| shortened(text)) {
         return Some(found);
     }
     let end = text.find(|c: char| !(c.is_alphabetic() || matches!(c, '/' | '\'')));
@@ -414,6 +457,16 @@ fn word(text: &str) -> Option<(&str, usize)> {
         Some((per, whole.len() + power.len()))
     });
     Some(power.unwrap_or((whole.strip_suffix("'s").unwrap_or(whole), whole.len())))
+}
+
+/// `w/` and `w/o`, and their length.
+fn shortened(text: &str) -> Option<(&'static str, usize)> {
+    let ends = |length: usize| !text[length..].starts_with(|c: char| c.is_alphabetic() || c == '/');
+    match text.strip_prefix("w/")? {
+        rest if rest.starts_with('o') && ends(3) => Some(("without", 3)),
+        rest if rest.starts_with("out") && ends(5) => Some(("without", 5)),
+        _ => ends(2).then_some(("with", 2)),
+    }
 }
 
 /// An abbreviation such as `m.p.h.` or `n.e.`, and its length.

@@ -3,11 +3,12 @@
 use crate::amounts::{Amount, Dimension, Group, group, is_unit};
 use crate::compass::{Compass, Form, POINT, compass, is_compass};
 use crate::error::Result;
+use crate::modifiers::{modifier_after, modifier_before};
 use crate::pieces::{Kind, Piece, word_at};
 use crate::statement::{PartialScene, Statement, Value};
 use crate::subjects::{
     Denied, Named, Subject, denials, is_at_rest, is_attribute, is_filler, is_link, is_motion,
-    is_unstated, leads, noun, subjects, word_before,
+    is_strength, is_unstated, leads, noun, says_nothing, subjects, word_before,
 };
 use std::ops::Range;
 
@@ -59,6 +60,11 @@ impl<'t, 'a> Sentence<'t, 'a> {
             if self.marks[at] != Mark::Open {
                 at += 1;
             } else if let Some(group) = group(self.pieces, at) {
+                if let Some(changed) = self.changed(at, &group) {
+                    at = changed.end;
+                    self.mark(changed, Mark::Unread);
+                    continue;
+                }
                 at = match group {
                     Group::One(amount, end) => {
                         self.mark(amount.pieces.end..end, Mark::Unread);
@@ -86,6 +92,25 @@ impl<'t, 'a> Sentence<'t, 'a> {
 
     fn mark(&mut self, pieces: Range<usize>, mark: Mark) {
         self.marks[pieces].fill(mark);
+    }
+
+    /// The pieces of a group of numbers with the words that change it, if some do.
+    fn changed(&self, at: usize, group: &Group) -> Option<Range<usize>> {
+        let (turns, end) = match group {
+            Group::One(amount, end) => (amount.dimension == Some(Dimension::Angle), *end),
+            Group::NoValue(end) => (true, *end),
+        };
+        let before = modifier_before(self.pieces, at, true);
+        let after = modifier_after(self.pieces, end, turns);
+        before.or(after)?;
+        Some(before.unwrap_or(at)..after.unwrap_or(end))
+    }
+
+    /// The word that bounds a quantity which its subject does not follow: "wind under 5 m/s", but "under 5 m/s wind".
+    fn bounds(&self, start: usize) -> Option<usize> {
+        let before = self.before(start)?;
+        let word = word_at(self.pieces, before)?;
+        matches!(word, "under" | "over" | "past" | "near").then_some(before)
     }
 
     /// Takes in what is denied; its subjects own nothing.
@@ -133,12 +158,18 @@ impl<'t, 'a> Sentence<'t, 'a> {
             self.mark(pieces, Mark::Unread);
             return Ok(());
         };
+        if let Some(bound) = self.bounds(pieces.start).filter(|_| !right_after) {
+            self.mark(bound..pieces.end, Mark::Unread);
+            return Ok(());
+        }
         let end = if right_after {
             owner.at + 1
         } else {
             pieces.end
         };
-        let (way, start) = self.way(pieces.start);
+        let minus = word_before(self.pieces, pieces.start) == Some("minus");
+        let sign = pieces.start - usize::from(minus);
+        let (way, start) = self.way(sign);
         let turned = value.is_direction() && way == Some(Way::From);
         let number = if turned {
             amount.value + 180.0
@@ -147,11 +178,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         };
         statement.set(value, number, 0.0, self.place(pieces.start..end))?;
         self.mark(
-            if value.is_direction() {
-                start
-            } else {
-                pieces.start
-            }..pieces.end,
+            if value.is_direction() { start } else { sign }..pieces.end,
             Mark::Used,
         );
         self.mark(owner.at..owner.at + 1, Mark::Used);
@@ -162,6 +189,12 @@ impl<'t, 'a> Sentence<'t, 'a> {
     fn point(&mut self, compass: &Compass, statement: &mut Statement<'_>) -> Result<usize> {
         let Range { start, end } = compass.pieces;
         let (way, from) = self.way(start);
+        // An adjective before "north wind" describes the wind.
+        let describes = way.is_none() && self.described(end).is_some();
+        if let Some(changed) = modifier_before(self.pieces, start, !describes && way.is_some()) {
+            self.mark(changed..end, Mark::Unread);
+            return Ok(end);
+        }
         let found = self.direction(compass, way);
         // "se" may be a word of another language; after "wind" or "5 m/s" it is a direction.
         let letters =
@@ -248,14 +281,11 @@ impl<'t, 'a> Sentence<'t, 'a> {
 
     /// The subject that the words from a piece on describe, across its strength and a number.
     fn described(&self, from: usize) -> Option<Subject> {
-        let strengths = [
-            "light", "gentle", "moderate", "fresh", "strong", "stiff", "weak", "steady",
-        ];
         let mut at = from;
         while let Some(Group::One(_, end)) = group(self.pieces, at) {
             at = end;
         }
-        while word_at(self.pieces, at).is_some_and(|word| strengths.contains(&word)) {
+        while word_at(self.pieces, at).is_some_and(|word| is_strength(word) || word == "steady") {
             at += 1;
         }
         let word = word_at(self.pieces, at)?;
@@ -351,20 +381,59 @@ impl<'t, 'a> Sentence<'t, 'a> {
         Ok(())
     }
 
-    /// The places of what was not taken in; neighbours are one.
-    pub(crate) fn unread(&self, scene: &PartialScene) -> Vec<Range<usize>> {
-        let unread = |at: &usize| self.is_unread(*at, scene);
-        let mut places: Vec<Range<usize>> = Vec::new();
+    /// What was not taken in; neighbours are one.
+    pub(crate) fn unread(&self, scene: &PartialScene) -> Vec<Left> {
+        let mut found: Vec<Left> = Vec::new();
         let mut last = usize::MAX;
-        for at in (0..self.pieces.len()).filter(unread) {
-            let place = self.pieces[at].place.clone();
-            match places.last_mut() {
-                Some(before) if last + 1 == at => before.end = place.end,
-                _ => places.push(place),
+        for at in 0..self.pieces.len() {
+            let of_the_field = self.is_unread(at, scene);
+            if !of_the_field && !self.is_unknown(at, scene) {
+                continue;
             }
-            last = at;
+            let place = self.pieces[at].place.clone();
+            match found.last_mut() {
+                Some(before) if last == at => {
+                    before.place.end = place.end;
+                    before.of_the_field |= of_the_field;
+                }
+                _ => found.push(Left {
+                    place,
+                    of_the_field,
+                }),
+            }
+            last = at + 1;
         }
-        places
+        found
+    }
+
+    /// Whether a piece is a sign or a word that no room knows, or tells how much of what no number states.
+    fn is_unknown(&self, at: usize, scene: &PartialScene) -> bool {
+        let word = match (self.marks[at], self.pieces[at].kind) {
+            (Mark::Open, Kind::Symbol | Kind::Bound) => return true,
+            (Mark::Open, Kind::Word(word)) => word,
+            _ => return false,
+        };
+        if word == "flat" {
+            return scene.wind_speed != Some(0.0);
+        }
+        if is_strength(word) {
+            let is_ship = self.strong(at) == Some(Subject::Ship);
+            let speed = if is_ship {
+                scene.ship_speed
+            } else {
+                scene.wind_speed
+            };
+            return speed.is_none();
+        }
+        noun(word).is_none() && !is_attribute(word) && !says_nothing(word)
+    }
+
+    /// The subject whose strength the word at a place tells: the next one nearby, else the last one.
+    fn strong(&self, at: usize) -> Option<Subject> {
+        let next = self.subjects.partition_point(|named| named.at < at);
+        let (before, after) = self.subjects.split_at(next);
+        let near = after.first().filter(|named| named.at - at <= 4);
+        near.or(before.last()).map(|named| named.subject)
     }
 
     fn is_unread(&self, at: usize, scene: &PartialScene) -> bool {
@@ -393,6 +462,13 @@ impl<'t, 'a> Sentence<'t, 'a> {
             None => is_unit(word) || is_compass(word) || is_at_rest(word) || is_unstated(word),
         }
     }
+}
+
+/// A part of a sentence that was not taken in.
+pub(crate) struct Left {
+    pub(crate) place: Range<usize>,
+    /// Whether it has a number or a word of the field.
+    pub(crate) of_the_field: bool,
 }
 
 /// Whether a subject is named with the numbers that stay unread.

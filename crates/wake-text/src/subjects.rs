@@ -2,6 +2,7 @@
 
 use crate::amounts::Dimension;
 use crate::compass::is_compass;
+use crate::filler::is_listed;
 use crate::pieces::{Kind, Piece, word_at};
 use std::ops::Range;
 
@@ -152,11 +153,16 @@ const REACH: usize = 8;
 /// What is denied from a piece on.
 fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
     let word = word_at(sentence, at);
+    if word.is_some_and(opens_condition) {
+        return Some(condition(sentence, at));
+    }
     let named = word.and_then(noun);
     if let Some(subject) = named.filter(|subject| matches!(subject, Subject::Ship | Subject::Wind))
     {
-        let length = denied_after(sentence, at)?;
-        let (subject, pieces) = (Some(subject), at..at + length);
+        let understood = denied_after(sentence, at).map(|length| (Some(subject), length));
+        let (subject, length) =
+            understood.or_else(|| Some((None, perhaps_denied_after(sentence, at)?)))?;
+        let pieces = at..at + length;
         return Some(Denied { subject, pieces });
     }
     let none =
@@ -176,6 +182,8 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
             understood = false;
             continue;
         };
+        // "no lack of ships", "not windless": denied twice.
+        understood &= !denies(word);
         match noun(word) {
             Some(subject) if subject != Subject::Heading && subject != Subject::Bystander => {
                 let compound = noun_after(sentence, end)
@@ -188,6 +196,7 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
                     Subject::Ship | Subject::Wind | Subject::Wake | Subject::Wave
                 );
                 let end = end + 1 + usize::from(compound.is_some());
+                understood &= !is_taken_back(sentence, at, end);
                 let others = (start..end).any(|at| word_at(sentence, at).is_some_and(is_further));
                 let subject = if others { Subject::Bystander } else { subject };
                 let subject = (understood && known).then_some(subject);
@@ -208,10 +217,89 @@ fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
                 plain = 0;
             }
             _ if is_link(word) || is_at_rest(word) || is_compass(word) => understood = false,
-            _ => plain += 1,
+            _ => {
+                understood &= is_plain(word);
+                plain += 1;
+            }
         }
     }
     denied_nothing(sentence, at..sentence.len().min(start + REACH))
+}
+
+/// Whether what follows a denied noun takes the denial back: "not ship-free", "no ships but one".
+fn is_taken_back(sentence: &[Piece<'_>], at: usize, end: usize) -> bool {
+    let counted = |at: usize| {
+        sentence.get(at).is_some_and(|piece| {
+            matches!(
+                piece.kind,
+                Kind::Number(_) | Kind::Figure | Kind::Word("one")
+            )
+        })
+    };
+    denied_after(sentence, end - 1).is_some()
+        || (word_at(sentence, at) != Some("not")
+            && matches!(word_at(sentence, end), Some("but" | "save"))
+            && counted(end + 1))
+}
+
+/// Whether a word denies or tells of an absence.
+fn denies(word: &str) -> bool {
+    matches!(
+        word,
+        "no" | "not"
+            | "without"
+            | "neither"
+            | "never"
+            | "cannot"
+            | "lacking"
+            | "sans"
+            | "non"
+            | "none"
+            | "free"
+            | "devoid"
+            | "absence"
+            | "lack"
+            | "shortage"
+            | "empty"
+            | "clear"
+    ) || word.ends_with("n't")
+        || word.ends_with("less")
+}
+
+/// Whether a word between "no" and a noun leaves the noun denied: "no visible ship", "no large ships".
+fn is_plain(word: &str) -> bool {
+    says_nothing(word)
+        || is_further(word)
+        || matches!(
+            word,
+            "large" | "big" | "small" | "detectable" | "apparent" | "discernible" | "nearby"
+        )
+}
+
+/// Whether a word makes what follows, up to the next comma, a condition or an exception.
+fn opens_condition(word: &str) -> bool {
+    matches!(
+        word,
+        "unless"
+            | "if"
+            | "except"
+            | "excepting"
+            | "excluding"
+            | "instead"
+            | "rather"
+            | "until"
+            | "lest"
+    )
+}
+
+/// A condition or an exception, up to the next comma: nothing of it is stated.
+fn condition(sentence: &[Piece<'_>], at: usize) -> Denied {
+    let ends = |piece: &Piece<'_>| matches!(piece.kind, Kind::Comma | Kind::Stop);
+    let length = sentence[at..].iter().position(ends);
+    Denied {
+        subject: None,
+        pieces: at..length.map_or(sentence.len(), |length| at + length),
+    }
 }
 
 /// A denial of no subject, which matters where it denies numbers or directions.
@@ -256,15 +344,41 @@ fn denied_after(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
         "none" | "absent" | "false" | "missing" => end,
         "no" if word_at(sentence, end + 1).is_none() && end > at + 1 => end,
         word if word == "not" || word.ends_with("n't") => {
-            let seen = [
-                "visible", "present", "seen", "there", "detected", "included", "shown",
-            ];
-            word_at(sentence, end + 1).filter(|word| seen.contains(word))?;
+            word_at(sentence, end + 1).filter(|word| is_presence(word))?;
             end + 1
         }
         _ => return None,
     };
     Some(last + 1 - at)
+}
+
+/// Number of pieces from a noun to a denial that other words keep from being understood: "ship is hardly ever absent".
+fn perhaps_denied_after(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
+    let mut not = false;
+    for end in at + 1..sentence.len().min(at + REACH) {
+        let word = match sentence[end].kind {
+            Kind::Colon => continue,
+            Kind::Word(word) => word,
+            _ => return None,
+        };
+        let absent = matches!(word, "none" | "absent" | "missing" | "false");
+        if absent || (not && is_presence(word)) {
+            return Some(end + 1 - at);
+        }
+        if noun(word).is_some() {
+            return None;
+        }
+        not |= word == "not" || word.ends_with("n't");
+    }
+    None
+}
+
+/// Whether a word says that something is there.
+fn is_presence(word: &str) -> bool {
+    matches!(
+        word,
+        "visible" | "present" | "seen" | "there" | "detected" | "included" | "shown"
+    )
 }
 
 /// What "or" adds to a denial: "no wind or ship".
@@ -273,6 +387,8 @@ fn further(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
     let article = usize::from(word_at(sentence, at + 1).is_some_and(is_article));
     let noun_at = (at + 1 + article..at + 3 + article)
         .find(|&at| word_at(sentence, at).and_then(noun).is_some())?;
+    let between = (at + 1..noun_at).all(|at| word_at(sentence, at).is_some_and(is_plain));
+    between.then_some(())?;
     let subject = word_at(sentence, noun_at).and_then(noun);
     let pieces = at..noun_at + 1;
     let subject = subject.filter(|s| {
@@ -352,6 +468,21 @@ pub(crate) fn is_motion(word: &str) -> bool {
         "heads",
         "head",
         "headed",
+    ]
+    .contains(&word)
+}
+
+/// Whether a word changes no value of a scene.
+pub(crate) fn says_nothing(word: &str) -> bool {
+    is_listed(word) || is_filler(word) || is_motion(word)
+}
+
+/// Whether a word tells how much without a number: "light wind", "a fast ferry".
+pub(crate) fn is_strength(word: &str) -> bool {
+    [
+        "light", "gentle", "moderate", "fresh", "strong", "stiff", "weak", "high", "low", "heavy",
+        "faint", "slight", "brisk", "fast", "slow", "quick", "swift", "rapid", "slowly", "quickly",
+        "swiftly", "rapidly", "gently", "strongly",
     ]
     .contains(&word)
 }
