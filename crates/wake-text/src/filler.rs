@@ -11,14 +11,14 @@ const GRAMMAR: [&str; 29] = [
 ];
 
 /// Prepositions and conjunctions.
-const JOINTS: [&str; 34] = [
+const JOINTS: [&str; 33] = [
     "of", "in", "on", "at", "by", "to", "toward", "towards", "from", "under", "over", "into",
     "onto", "for", "with", "and", "or", "but", "while", "as", "through", "across", "against",
-    "along", "near", "amid", "during", "out", "via", "upon", "where", "so", "also", "then",
+    "along", "near", "amid", "during", "out", "via", "upon", "where", "so", "also",
 ];
 
 /// Words of images and of how they come about.
-const PICTURES: [&str; 56] = [
+const PICTURES: [&str; 52] = [
     "image",
     "images",
     "imagery",
@@ -37,7 +37,6 @@ const PICTURES: [&str; 56] = [
     "simulation",
     "simulate",
     "sentinel",
-    "sensor",
     "prompt",
     "capture",
     "captured",
@@ -71,9 +70,6 @@ const PICTURES: [&str; 56] = [
     "please",
     "give",
     "want",
-    "look",
-    "looking",
-    "illuminated",
     "present",
 ];
 

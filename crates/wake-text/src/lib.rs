@@ -6,14 +6,17 @@ mod error;
 
 // Scene → prompt → what it states.
 mod cleaning;
+mod numbers;
 mod pieces;
 mod amounts;
 mod compass;
 mod filler;
 mod subjects;
+mod denials;
 mod modifiers;
 mod statement;
 mod wording;
+mod leftovers;
 mod sentence;
 mod reading;
 

@@ -7,8 +7,7 @@ use crate::amounts::is_unit;
 use crate::compass::may_be_compass;
 use crate::pieces::{Kind, Piece, word_at};
 use crate::subjects::{
-    is_at_rest, is_attribute, is_filler, is_motion, is_strength, is_unstated, noun, says_nothing,
-    word_before,
+    is_at_rest, is_attribute, is_filler, is_motion, is_strength, noun, says_nothing, word_before,
 };
 
 /// Pieces before a number among which a modifier is sought.
@@ -99,7 +98,6 @@ fn is_known(word: &str) -> bool {
         || noun(word).is_some()
         || is_attribute(word)
         || is_strength(word)
-        || is_unstated(word)
         || is_at_rest(word)
         || is_unit(word)
         || may_be_compass(word)

@@ -2,28 +2,20 @@
 
 use crate::amounts::{Amount, Dimension, Group, group, is_unit};
 use crate::compass::{Compass, Form, POINT, compass, is_compass};
+use crate::denials::{Denied, denials};
 use crate::error::Result;
+use crate::leftovers::{Left, Mark, Marked};
 use crate::modifiers::{modifier_after, modifier_before};
 use crate::pieces::{Kind, Piece, word_at};
 use crate::statement::{PartialScene, Statement, Value};
 use crate::subjects::{
-    Denied, Named, Subject, denials, is_at_rest, is_attribute, is_filler, is_link, is_motion,
-    is_strength, is_unstated, leads, noun, says_nothing, subjects, word_before,
+    Named, Subject, is_approximate, is_at_rest, is_attribute, is_filler, is_link, is_motion,
+    is_strength, leads, noun, subjects, word_before,
 };
 use std::ops::Range;
 
 /// Subjects on each side among which the owner of a number is sought.
 const NEAR: usize = 64;
-
-/// Whether a piece has been taken in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Mark {
-    Open,
-    Used,
-    Unread,
-    /// Says that there is no wake: used where there is no ship.
-    NoWake,
-}
 
 /// Where a direction points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +64,8 @@ impl<'t, 'a> Sentence<'t, 'a> {
                         end
                     }
                     Group::NoValue(end) => {
-                        self.mark(at..end, Mark::Unread);
+                        let start = self.bounds(at).unwrap_or(at);
+                        self.mark(start..end, Mark::Unread);
                         end
                     }
                 };
@@ -170,6 +163,13 @@ impl<'t, 'a> Sentence<'t, 'a> {
         let minus = word_before(self.pieces, pieces.start) == Some("minus");
         let sign = pieces.start - usize::from(minus);
         let (way, start) = self.way(sign);
+        if let Some(from) = self
+            .lost_from(sign)
+            .filter(|_| value.is_direction() && way.is_none())
+        {
+            self.mark(from..pieces.end, Mark::Unread);
+            return Ok(());
+        }
         let turned = value.is_direction() && way == Some(Way::From);
         let number = if turned {
             amount.value + 180.0
@@ -195,6 +195,10 @@ impl<'t, 'a> Sentence<'t, 'a> {
             self.mark(changed..end, Mark::Unread);
             return Ok(end);
         }
+        if let Some(quadrant) = self.quadrant(end) {
+            self.mark(start..quadrant, Mark::Unread);
+            return Ok(quadrant);
+        }
         let found = self.direction(compass, way);
         // "se" may be a word of another language; after "wind" or "5 m/s" it is a direction.
         let letters =
@@ -219,6 +223,14 @@ impl<'t, 'a> Sentence<'t, 'a> {
             }
         }
         Ok(end)
+    }
+
+    /// The end of a bearing in a quadrant, "north 45 degrees west", whose compass word ends at a piece.
+    fn quadrant(&self, end: usize) -> Option<usize> {
+        let number = self.pieces.get(end)?;
+        matches!(number.kind, Kind::Number(_)).then_some(())?;
+        let unit = usize::from(word_at(self.pieces, end + 1).is_some_and(is_unit));
+        Some(compass(self.pieces, end + 1 + unit)?.pieces.end)
     }
 
     /// Which direction a compass word states.
@@ -328,6 +340,21 @@ impl<'t, 'a> Sentence<'t, 'a> {
         }
     }
 
+    /// A "from" before a direction that describing words keep from it: "from a stormy 30 degrees".
+    fn lost_from(&self, start: usize) -> Option<usize> {
+        let describes = |at: &usize| {
+            word_at(self.pieces, *at).is_some_and(|word| {
+                is_filler(word)
+                    || !(is_link(word) || is_unit(word) || is_attribute(word))
+                        && noun(word).is_none()
+            })
+        };
+        let from = (start.saturating_sub(NEAR)..start)
+            .rev()
+            .find(|at| !describes(at))?;
+        (word_at(self.pieces, from) == Some("from")).then_some(from)
+    }
+
     /// The subject that a quantity belongs to, and whether it stands right after it.
     fn owner(&self, quantity: Range<usize>, dimension: Dimension) -> Option<(Named, bool)> {
         let able = |named: &&Named| named.subject.can_have(dimension);
@@ -375,6 +402,10 @@ impl<'t, 'a> Sentence<'t, 'a> {
             .any(|named| named.subject == Subject::Ship);
         if has_ship && (two || is_at_rest(word)) {
             let pieces = at..at + 1 + usize::from(two);
+            if word_before(self.pieces, at).is_some_and(is_approximate) {
+                self.mark(at - 1..pieces.end, Mark::Unread);
+                return Ok(());
+            }
             statement.set(Value::ShipSpeed, 0.0, 0.0, self.place(pieces.clone()))?;
             self.mark(pieces, Mark::Used);
         }
@@ -383,92 +414,13 @@ impl<'t, 'a> Sentence<'t, 'a> {
 
     /// What was not taken in; neighbours are one.
     pub(crate) fn unread(&self, scene: &PartialScene) -> Vec<Left> {
-        let mut found: Vec<Left> = Vec::new();
-        let mut last = usize::MAX;
-        for at in 0..self.pieces.len() {
-            let of_the_field = self.is_unread(at, scene);
-            if !of_the_field && !self.is_unknown(at, scene) {
-                continue;
-            }
-            let place = self.pieces[at].place.clone();
-            match found.last_mut() {
-                Some(before) if last == at => {
-                    before.place.end = place.end;
-                    before.of_the_field |= of_the_field;
-                }
-                _ => found.push(Left {
-                    place,
-                    of_the_field,
-                }),
-            }
-            last = at + 1;
-        }
-        found
-    }
-
-    /// Whether a piece is a sign or a word that no room knows, or tells how much of what no number states.
-    fn is_unknown(&self, at: usize, scene: &PartialScene) -> bool {
-        let word = match (self.marks[at], self.pieces[at].kind) {
-            (Mark::Open, Kind::Symbol | Kind::Bound) => return true,
-            (Mark::Open, Kind::Word(word)) => word,
-            _ => return false,
+        let sentence = Marked {
+            pieces: self.pieces,
+            marks: &self.marks,
+            subjects: &self.subjects,
         };
-        if word == "flat" {
-            return scene.wind_speed != Some(0.0);
-        }
-        if is_strength(word) {
-            let is_ship = self.strong(at) == Some(Subject::Ship);
-            let speed = if is_ship {
-                scene.ship_speed
-            } else {
-                scene.wind_speed
-            };
-            return speed.is_none();
-        }
-        noun(word).is_none() && !is_attribute(word) && !says_nothing(word)
+        sentence.left(scene)
     }
-
-    /// The subject whose strength the word at a place tells: the next one nearby, else the last one.
-    fn strong(&self, at: usize) -> Option<Subject> {
-        let next = self.subjects.partition_point(|named| named.at < at);
-        let (before, after) = self.subjects.split_at(next);
-        let near = after.first().filter(|named| named.at - at <= 4);
-        near.or(before.last()).map(|named| named.subject)
-    }
-
-    fn is_unread(&self, at: usize, scene: &PartialScene) -> bool {
-        let word = match (self.marks[at], self.pieces[at].kind) {
-            (Mark::Used, _) => return false,
-            (Mark::NoWake, _) => return scene.ship != Some(false),
-            (Mark::Unread, _) | (_, Kind::Number(_) | Kind::Figure | Kind::PlusMinus) => {
-                return true;
-            }
-            (Mark::Open, Kind::Word(word)) => word,
-            _ => return false,
-        };
-        let near = |way: usize| {
-            let near = at.saturating_sub(way)..self.pieces.len().min(at + way + 1);
-            self.marks[near].contains(&Mark::Used)
-        };
-        match noun(word) {
-            Some(Subject::Ship | Subject::Wake | Subject::Bystander) => false,
-            Some(Subject::Wind) => scene.wind_speed.or(scene.wind_toward).is_none(),
-            Some(Subject::Wave) => scene.wind_speed.is_none(),
-            Some(Subject::Fetch) => scene.fetch.is_none(),
-            Some(Subject::Incidence) => scene.incidence.is_none(),
-            Some(Subject::Heading | Subject::Angle) => !near(4),
-            Some(_) => true,
-            None if is_attribute(word) => !near(4),
-            None => is_unit(word) || is_compass(word) || is_at_rest(word) || is_unstated(word),
-        }
-    }
-}
-
-/// A part of a sentence that was not taken in.
-pub(crate) struct Left {
-    pub(crate) place: Range<usize>,
-    /// Whether it has a number or a word of the field.
-    pub(crate) of_the_field: bool,
 }
 
 /// Whether a subject is named with the numbers that stay unread.
