@@ -11,10 +11,10 @@ const GRAMMAR: [&str; 29] = [
 ];
 
 /// Prepositions and conjunctions.
-const JOINTS: [&str; 33] = [
-    "of", "in", "on", "at", "by", "to", "toward", "towards", "from", "under", "over", "into",
-    "onto", "for", "with", "and", "or", "but", "while", "as", "through", "across", "against",
-    "along", "near", "amid", "during", "out", "via", "upon", "where", "so", "also",
+const JOINTS: [&str; 29] = [
+    "of", "in", "on", "at", "by", "to", "toward", "towards", "from", "under", "over", "onto",
+    "for", "with", "and", "or", "but", "while", "as", "along", "near", "amid", "during", "out",
+    "via", "upon", "where", "so", "also",
 ];
 
 /// Words of images and of how they come about.

@@ -25,9 +25,12 @@ const PROMPTS: [&str; 16] = [
 ];
 
 /// Words of every kind that say something, but nothing that a scene can have.
-const WORDS: [&str; 68] = [
+const WORDS: [&str; 71] = [
     "abeam",
     "above",
+    "across",
+    "against",
+    "into",
     "accelerating",
     "volte-face",
     "aft",
