@@ -43,6 +43,9 @@ const ONSET: f64 = 3.0;
 /// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp: chosen.
 const LONG: [f64; 2] = [0.6, 1.0];
 
+/// Rings whose transforms are planned at once: a plan takes as much memory as the waves of its ring.
+const PLANNED_AT_ONCE: usize = 64;
+
 /// Which waves of a turning ship are summed: rings of wavenumbers, each as many directions as the raster asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rings {
@@ -135,21 +138,19 @@ impl Rings {
 
     /// The waves.
     pub(super) fn waves(&self, wake: &KelvinWake) -> PlaneWaves {
-        let mut planner = Circle::planner();
-        let circles: Vec<Circle> = (0..self.count)
-            .map(|ring| Circle::planned(&mut planner, self.directions(ring)))
-            .collect();
-        let rings: Vec<Vec<Complex64>> = circles
-            .par_iter()
-            .enumerate()
-            .map(|(ring, circle)| self.amplitudes(wake, ring, circle))
+        let rings: Vec<Vec<Complex64>> = (0..self.count)
+            .step_by(PLANNED_AT_ONCE)
+            .flat_map(|first| {
+                let some = first..(first + PLANNED_AT_ONCE).min(self.count);
+                self.amplitudes_of(wake, &some.collect::<Vec<_>>())
+            })
             .collect();
         let amplitudes = || rings.iter().flatten().map(Complex64::norm_sqr);
         let count = rings.iter().map(Vec::len).sum::<usize>().max(1);
         let least = self.least.powi(2) * amplitudes().sum::<f64>() / count as f64;
-        let mut out = PlaneWaves::default();
+        let mut out = PlaneWaves::with_capacity(amplitudes().filter(|&a| a > least).count());
         let centre = self.centre(wake);
-        for (ring, amplitudes) in rings.iter().enumerate() {
+        for (ring, amplitudes) in rings.into_iter().enumerate() {
             let k = self.wavenumber(ring);
             let omega = angular_frequency(k, wake.depth);
             let turn = TAU / amplitudes.len() as f64;
@@ -164,6 +165,15 @@ impl Rings {
             }
         }
         out
+    }
+
+    /// The amplitudes of some rings.
+    fn amplitudes_of(&self, wake: &KelvinWake, rings: &[usize]) -> Vec<Vec<Complex64>> {
+        let mut planner = Circle::planner();
+        let plan = |&ring: &usize| Circle::planned(&mut planner, self.directions(ring));
+        let circles: Vec<Circle> = rings.iter().map(plan).collect();
+        let of_ring = |(&ring, circle)| self.amplitudes(wake, ring, circle);
+        rings.par_iter().zip(&circles).map(of_ring).collect()
     }
 
     /// The centre of the circle (x, y) \[m\].
