@@ -25,6 +25,7 @@ use crate::waves::{PlaneWaves, Quantity, Transfer, strengths};
 use crate::workspace::Workspace;
 use gridding::{Demand, Gridding, Size};
 use num_complex::{Complex, Complex64};
+use rayon::prelude::*;
 use spread::{Before, Footprints};
 use std::f64::consts::TAU;
 
@@ -111,9 +112,11 @@ pub(crate) fn synthesize_each(
     reached
 }
 
-/// Waves that are spread at once: beyond them memory does not grow with the waves \[bytes: some 230 a wave, and more where
-/// fields are asked for more exactly\]. Chosen.
-pub(crate) const WAVES_AT_ONCE: usize = 1 << 20;
+/// Waves that one thread looks at by itself.
+const MANY: usize = 1 << 12;
+
+/// Waves that are spread at once: of more, only the waves themselves are held. Chosen: about a gibibyte.
+pub(crate) const WAVES_AT_ONCE: usize = 1 << 22;
 
 /// Waves with their phases counted from the raster's middle pixel.
 struct CentredSums<'a> {
@@ -136,6 +139,8 @@ impl Part {
     fn new((waves, transfer, quantities, raster): Summands<'_>) -> Self {
         let (x, y) = (raster.x(raster.columns / 2), raster.y(raster.rows / 2));
         let phases: Vec<Complex64> = (0..waves.len())
+            .into_par_iter()
+            .with_min_len(MANY)
             .map(|n| Complex64::cis(waves.kx[n] * x + waves.ky[n] * y))
             .collect();
         let mut strengths = strengths(waves, transfer, quantities);
@@ -192,7 +197,7 @@ impl<'a> CentredSums<'a> {
             whole: (waves.len() <= WAVES_AT_ONCE).then(|| Part::new(summands)),
         };
         let mut totals = vec![[0.0; 2]; quantities.len()];
-        sums.each_part(quantities, |part| {
+        sums.each_part(|part| {
             for (total, strengths) in totals.iter_mut().zip(&part.strengths) {
                 for strength in strengths {
                     total[0] += strength.norm();
@@ -208,12 +213,12 @@ impl<'a> CentredSums<'a> {
         sums
     }
 
-    /// Looks at the waves, part by part; strengths are those of some quantities, or of all where all waves are one part.
-    fn each_part(&self, quantities: &[Quantity], mut look: impl FnMut(&Part)) {
+    /// Looks at the waves, part by part.
+    fn each_part(&self, mut look: impl FnMut(&Part)) {
         if let Some(part) = &self.whole {
             return look(part);
         }
-        let (waves, transfer, _, raster) = self.summands;
+        let (waves, transfer, quantities, raster) = self.summands;
         for start in (0..waves.len()).step_by(WAVES_AT_ONCE) {
             let some = waves.part(start..(start + WAVES_AT_ONCE).min(waves.len()));
             look(&Part::new((&some, transfer, quantities, raster)));
@@ -228,16 +233,11 @@ impl<'a> CentredSums<'a> {
         todo: &[usize],
         mut done: impl FnMut(usize, &mut Field),
     ) {
-        let (_, _, quantities, raster) = self.summands;
+        let raster = self.summands.3;
         let [rows, columns] = gridding.lattice;
-        let whole = self
-            .whole
-            .as_ref()
-            .map(|part| part.footprints::<T>(gridding));
         let mut fields = [(); 2].map(|()| workspace.field(raster));
         let (blocks, planner) = T::of(workspace);
         let synthesis = Synthesis::<T>::planned(planner, rows, columns);
-        let mut lattice = blocks.take(rows * columns);
         let correct = |pixels, lattice| -> Vec<T> {
             let factors = gridding.kernel.correction(pixels, lattice);
             factors.into_iter().map(<T as Real>::from_f64).collect()
@@ -246,22 +246,9 @@ impl<'a> CentredSums<'a> {
         let right = correct(raster.columns, columns);
         let start = [rows / 2 - raster.rows / 2, columns / 2 - raster.columns / 2];
         let keep = [raster.rows, raster.columns];
-        for pair in todo.chunks(2) {
+        let mut transform = |pair: &[usize], lattice: &mut [Complex<T>]| {
             let [re, im] = fields.each_mut().map(|field| &mut field.values[..]);
-            if let Some((part, footprints)) = self.whole.as_ref().zip(whole.as_ref()) {
-                footprints.spread(&part.paired::<T>(pair), &mut lattice, Before::Nothing);
-            } else {
-                let of_pair: Vec<Quantity> = pair.iter().map(|&q| quantities[q]).collect();
-                let numbers: Vec<usize> = (0..pair.len()).collect();
-                let mut before = Before::Nothing;
-                self.each_part(&of_pair, |part| {
-                    let strengths = part.paired::<T>(&numbers);
-                    let footprints = part.footprints::<T>(gridding);
-                    footprints.spread(&strengths, &mut lattice, before);
-                    before = Before::Waves;
-                });
-            }
-            synthesis.run_window(&mut lattice, start, keep, (re, im), |i, row| {
+            synthesis.run_window(lattice, start, keep, (re, im), |i, row| {
                 for (v, &factor) in row.iter_mut().zip(&right) {
                     *v = *v * (factor * down[i]);
                 }
@@ -269,8 +256,35 @@ impl<'a> CentredSums<'a> {
             for (&q, field) in pair.iter().zip(&mut fields) {
                 done(q, field);
             }
+        };
+        if let Some(part) = &self.whole {
+            let footprints = part.footprints::<T>(gridding);
+            let mut lattice = blocks.take(rows * columns);
+            for pair in todo.chunks(2) {
+                let before = Before::Nothing;
+                footprints.spread(&part.paired::<T>(pair), &mut lattice, before);
+                transform(pair, &mut lattice);
+            }
+            blocks.give(lattice);
+        } else {
+            // A lattice a pair, so that no part is looked at twice.
+            let mut lattices: Vec<Vec<Complex<T>>> = todo
+                .chunks(2)
+                .map(|_| blocks.take(rows * columns))
+                .collect();
+            let mut before = Before::Nothing;
+            self.each_part(|part| {
+                let footprints = part.footprints::<T>(gridding);
+                for (pair, lattice) in todo.chunks(2).zip(&mut lattices) {
+                    footprints.spread(&part.paired::<T>(pair), lattice, before);
+                }
+                before = Before::Waves;
+            });
+            for (pair, mut lattice) in todo.chunks(2).zip(lattices) {
+                transform(pair, &mut lattice);
+                blocks.give(lattice);
+            }
         }
-        blocks.give(lattice);
         fields.into_iter().for_each(|field| workspace.give(field));
     }
 }

@@ -225,6 +225,8 @@ pub fn strengths(
 ) -> Vec<Vec<Complex64>> {
     let one = |&quantity: &Quantity| {
         (0..waves.len())
+            .into_par_iter()
+            .with_min_len(1 << 12)
             .map(|n| {
                 let factor = transfer.factor(quantity, [waves.kx[n], waves.ky[n]], waves.omega[n]);
                 factor * waves.amplitude[n]
