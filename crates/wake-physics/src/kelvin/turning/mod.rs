@@ -43,6 +43,26 @@ const ONSET: f64 = 3.0;
 /// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp: chosen.
 const LONG: [f64; 2] = [0.6, 1.0];
 
+/// Rings that are counted one by one.
+const MOST_COUNTED: usize = 1 << 14;
+
+/// Rings from which the number of waves that are kept is foreseen, and waves that are looked at for it at most: chosen.
+const LOOKED_AT: usize = 12;
+const MOST_LOOKED_AT: f64 = 2e6;
+
+/// Waves of ships that turn, as counted before they are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct RingWork {
+    /// Waves, of all ships and of the ship that has most.
+    pub(crate) nodes: f64,
+    pub(crate) most_nodes: f64,
+    /// Waves that are strong enough to be summed, likewise.
+    pub(crate) kept: f64,
+    pub(crate) most_kept: f64,
+    /// Bessel functions, and sums of them.
+    pub(crate) terms: f64,
+}
+
 /// Rings whose transforms are planned at once: a plan takes as much memory as the waves of its ring.
 const PLANNED_AT_ONCE: usize = 64;
 
@@ -129,11 +149,43 @@ impl Rings {
 
     /// Waves of all rings up to a wavenumber, and beyond it, before the weak ones are left out.
     pub(super) fn nodes(&self, cusp: f64) -> [usize; 2] {
+        // Rings change little from one to the next: of very many only some are counted, each for its neighbours.
+        let every = self.count.div_ceil(MOST_COUNTED).max(1);
         let mut nodes = [0; 2];
-        for ring in 0..self.count {
-            nodes[usize::from(self.wavenumber(ring) >= cusp)] += self.directions(ring);
+        for first in (0..self.count).step_by(every) {
+            let some = every.min(self.count - first);
+            let ring = first + some / 2;
+            nodes[usize::from(self.wavenumber(ring) >= cusp)] += some * self.directions(ring);
         }
         nodes
+    }
+
+    /// What the rings take to compute.
+    pub(super) fn work(&self, wake: &KelvinWake) -> RingWork {
+        let [count, mean] = [self.count as f64, 0.5 * self.step * self.count as f64];
+        let nodes = self.nodes(f64::INFINITY)[0] as f64;
+        let kept = (self.kept_share(wake, nodes) * nodes).ceil();
+        RingWork {
+            nodes,
+            most_nodes: nodes,
+            kept,
+            most_kept: kept,
+            terms: 2.0 * count * mean * self.radius,
+        }
+    }
+
+    /// Share of the waves that are not weak, from a few rings; all of them where even a few are too many to look at.
+    fn kept_share(&self, wake: &KelvinWake, nodes: f64) -> f64 {
+        let every = self.count.div_ceil(LOOKED_AT).max(1);
+        let rings: Vec<usize> = (every / 2..self.count).step_by(every).collect();
+        if nodes / every as f64 > MOST_LOOKED_AT || rings.is_empty() {
+            return 1.0;
+        }
+        let rings = self.amplitudes_of(wake, &rings);
+        let squares = || rings.iter().flatten().map(Complex64::norm_sqr);
+        let count = squares().count().max(1) as f64;
+        let least = self.least.powi(2) * squares().sum::<f64>() / count;
+        squares().filter(|&square| square > least).count() as f64 / count
     }
 
     /// The waves.
