@@ -2,8 +2,8 @@
 
 use crate::raster::Raster;
 
-/// The rectangle of the pixel centres \[m\]; where an image has one row or one column, that of the pixel's edges there, so that
-/// what crosses it has a length and a box.
+/// The rectangle of the pixel centres \[m\]; where an image has one row or one column of several pixels, that of their
+/// edges there, so that what crosses it has a length and a box.
 pub(super) struct Rectangle {
     low: [f64; 2],
     high: [f64; 2],
@@ -11,11 +11,12 @@ pub(super) struct Rectangle {
 
 impl Rectangle {
     pub(super) fn of(raster: &Raster) -> Self {
-        let edge = |count: usize| match count {
-            0 | 1 => 0.5 * raster.spacing,
+        let edge = |count: usize, other: usize| match (count, other) {
+            (1, 2..) => 0.5 * raster.spacing,
             _ => 0.0,
         };
-        let [x, y] = [edge(raster.columns), edge(raster.rows)];
+        let x = edge(raster.columns, raster.rows);
+        let y = edge(raster.rows, raster.columns);
         let (right, bottom) = (
             raster.x(raster.columns.saturating_sub(1)),
             raster.y(raster.rows.saturating_sub(1)),

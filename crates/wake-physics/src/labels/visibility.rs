@@ -443,8 +443,48 @@ struct Row {
 
 #[cfg(test)]
 mod tests {
-    use super::bunched;
+    use super::{bunched, rows_in};
+    use crate::raster::Raster;
+    use crate::track::Track;
     use std::f64::consts::TAU;
+
+    /// The rows of windows in which a place of the image may lie hold all of them, and are no more for a ship far away.
+    #[test]
+    fn rows_of_windows_do_not_grow_with_the_distance() {
+        let raster = Raster::image(64, 48, 5.0);
+        let step = 80.0;
+        let count = |track: &Track| -> u64 {
+            let rows = rows_in(track, &raster, 50.0, step);
+            rows.into_iter().map(|rows| rows.end - rows.start).sum()
+        };
+        for curvature in [0.0, 1.0 / 400.0, -1.0 / 900.0] {
+            for (position, heading) in [
+                ([40.0, 90.0], 20.0),
+                ([900.0, 700.0], 200.0),
+                ([5e3, 4e3], 50.0),
+            ] {
+                let track = Track::turning(position, heading, 0.0, curvature);
+                let rows = rows_in(&track, &raster, 50.0, step);
+                for (i, j) in (0..64).flat_map(|i| (0..48).map(move |j| (i, j))) {
+                    let [ahead, _] = track.seen_from_ship([raster.x(j), raster.y(i)]);
+                    // Within half a step of the middle of a row, which lies half a step astern of its beginning.
+                    let row = ((-ahead - 50.0) / step).floor();
+                    let inside = rows.iter().any(|rows| rows.contains(&(row as u64)));
+                    assert!(
+                        row < 0.0 || inside,
+                        "{curvature} {position:?}: {row} {rows:?}"
+                    );
+                }
+            }
+        }
+        for far in [1e7, 1e13, 1e30, 1e100] {
+            let straight = Track::new([far, far], 45.0, 0.0);
+            // 400 m from corner to corner, and three rows to spare; half a circle of 1260 m.
+            assert!(count(&straight) <= 8, "{far}");
+            let turning = Track::turning([far, far], 225.0, 0.0, 1.0 / 400.0);
+            assert!(count(&turning) <= 8 + 20, "{far}");
+        }
+    }
 
     /// The fundamental of displaced echoes by counting them: places y + (C/k) sin(ky) of even sources.
     #[test]

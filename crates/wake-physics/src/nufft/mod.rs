@@ -80,7 +80,7 @@ pub(crate) fn synthesize_each(
     tolerance: f64,
     mut take: impl FnMut(usize, &mut Field),
 ) -> f64 {
-    let sums = CentredSums::new(waves, transfer, quantities, raster);
+    let sums = CentredSums::new((waves, transfer, quantities, raster), WAVES_AT_ONCE);
     let mut rms: Vec<f64> = sums.sizes.iter().map(|s| s.expected_rms()).collect();
     let mut todo: Vec<usize> = (0..quantities.len()).filter(|&q| rms[q] > 0.0).collect();
     let mut reached = 0.0f64;
@@ -125,6 +125,8 @@ struct CentredSums<'a> {
     sizes: Vec<Size>,
     /// All waves, where they are spread at once.
     whole: Option<Part>,
+    /// Waves of a part where they are not.
+    at_once: usize,
 }
 
 /// Some of the waves.
@@ -184,17 +186,14 @@ impl Part {
 }
 
 impl<'a> CentredSums<'a> {
-    fn new(
-        waves: &'a PlaneWaves,
-        transfer: &'a Transfer,
-        quantities: &'a [Quantity],
-        raster: &'a Raster,
-    ) -> Self {
-        let summands = (waves, transfer, quantities, raster);
+    /// - `at_once`: waves that are spread at once
+    fn new(summands: Summands<'a>, at_once: usize) -> Self {
+        let (waves, _, quantities, _) = summands;
         let mut sums = Self {
             summands,
             sizes: Vec::new(),
-            whole: (waves.len() <= WAVES_AT_ONCE).then(|| Part::new(summands)),
+            whole: (waves.len() <= at_once).then(|| Part::new(summands)),
+            at_once,
         };
         let mut totals = vec![[0.0; 2]; quantities.len()];
         sums.each_part(|part| {
@@ -219,8 +218,8 @@ impl<'a> CentredSums<'a> {
             return look(part);
         }
         let (waves, transfer, quantities, raster) = self.summands;
-        for start in (0..waves.len()).step_by(WAVES_AT_ONCE) {
-            let some = waves.part(start..(start + WAVES_AT_ONCE).min(waves.len()));
+        for start in (0..waves.len()).step_by(self.at_once) {
+            let some = waves.part(start..(start + self.at_once).min(waves.len()));
             look(&Part::new((&some, transfer, quantities, raster)));
         }
     }

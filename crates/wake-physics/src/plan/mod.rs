@@ -244,6 +244,57 @@ mod tests {
         assert_eq!(strips(&raster(1 << 20, 1 << 10), &raster(3, 9)), 3);
     }
 
+    /// What is counted grows with what makes it: pixels, looks, waves of a turn, nodes of a table, and the distance of a ship with
+    /// none of it.
+    #[test]
+    fn work_is_counted() {
+        let base = plan(&[]).cost();
+        let looks = ["radar.sensor=sentinel-1-iw", "radar.looks=1000"];
+        let [few, many] = [&looks[..1], &looks].map(|keys| plan(keys).cost());
+        assert!(
+            many.core_seconds > 1.5 * few.core_seconds,
+            "{few:?} {many:?}"
+        );
+        assert_eq!(many.bytes, few.bytes);
+        assert!(many.to_string().contains("radar.looks"), "{many}");
+        for rate in ["0.9", "-0.1"] {
+            let turn = plan(&[&format!("ship.turn_rate={rate}")]).cost();
+            assert!(turn.core_seconds > 2.0 * base.core_seconds && turn.bytes > base.bytes);
+            assert!(turn.to_string().contains("ship.turn_rate"), "{turn}");
+        }
+        let finest = plan(&["model.tolerance=1e-6", "radar.sensor=terrasar-x-sm"]);
+        assert!(finest.work.table > 1e6 && finest.work.table <= (1u64 << 22) as f64);
+        for far in ["1e7", "1e300"] {
+            let cost = plan(&[&format!("ship.position=[{far}, {far}]")]).cost();
+            assert!(
+                cost.core_seconds < 2.0 * base.core_seconds && cost.bytes <= 2 * base.bytes,
+                "{far}"
+            );
+        }
+        // Strips hold a part of the pixels at once.
+        let large = plan(&["grid.rows=16384", "grid.columns=4096", "model.terms=[]"]);
+        assert!(large.sizes.strips > 2 && large.work.at_once < 0.5 * large.work.whole[0]);
+        assert!(large.work.computed >= large.work.whole[0]);
+    }
+
+    /// A wide turn of a large image has more waves than memory holds: refused, with what to change.
+    #[test]
+    fn waves_of_a_turn_count_as_memory() {
+        let keys = [
+            "grid.rows=16384",
+            "grid.columns=8",
+            "radar.sensor=sentinel-1-ew",
+            "ship.heading=180",
+            "ship.turn_rate=0.006",
+        ];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        match Plan::new(&scene) {
+            Err(error) => assert!(error.to_string().contains("ship.turn_rate"), "{error}"),
+            // Where there is as much, or the system does not tell.
+            Ok(plan) => assert!(plan.cost().bytes > 10 << 30),
+        }
+    }
+
     /// Only terms that are not used are left out, and speckle is no part of the image before speckle.
     #[test]
     fn what_is_left_out_is_summed_without_speckle() {

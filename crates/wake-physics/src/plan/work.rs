@@ -62,7 +62,7 @@ mod seconds {
     pub(super) const SHIP: f64 = 0.02;
     /// A pixel: σ⁰ and the fields; what one tap of the imaging adds.
     pub(super) const PIXEL: f64 = 6e-8;
-    pub(super) const TAP: f64 = 4e-10;
+    pub(super) const TAP: f64 = 3e-10;
     /// A pixel steeper than the table of σ⁰.
     pub(super) const STEEP: f64 = 1e-4;
     /// A point of the sea's lattice, all fields.
@@ -107,7 +107,7 @@ mod bytes {
     /// A wave of a ring, one that is kept, and one of those spread at once.
     pub(super) const RING: f64 = 18.0;
     pub(super) const KEPT: f64 = 40.0;
-    pub(super) const SPREAD: f64 = 340.0;
+    pub(super) const SPREAD: [f64; 2] = [400.0, 640.0];
 }
 
 impl Work {
@@ -143,9 +143,10 @@ impl Work {
         // Transverse and divergent waves, both as steep as they can be.
         let short_waves = when(uses(Term::Unresolved)) * 2.0 * LARGEST_SLOPE_VARIANCE;
         let leans = if uses(Term::RangeBunching) { 2.0 } else { 1.0 };
-        let taps = leans * taps(models, survey, &uses, tolerance);
         let backscatter = models.backscatter(uses(Term::TiltAverage), false);
         let moves = uses(Term::Sea) || swell || waves > 0;
+        let coherent = uses(Term::Coherence);
+        let taps = leans * taps(models, survey, (coherent, moves), tolerance);
         let slopes = if moves {
             survey.resolved
         } else {
@@ -179,7 +180,7 @@ impl Work {
                     raster.len(),
                 ),
             ),
-            steep: all * backscatter.steep_share(&slopes),
+            steep: all * backscatter.steep_share(&survey.resolved_sea().0) * when(moves),
             summed: (taps / leans * FARTHEST_MOVED) * (models.image.columns + BLOCK) as f64,
             sources: models.response.map_or(0.0, |_| models.image.len() as f64),
             looks: looks(scene, models, uses(Term::Speckle)),
@@ -243,8 +244,9 @@ impl Work {
             + SUMMED * self.summed
             + SOURCE * self.sources;
         let kept = self.rings.most_kept;
-        let rings =
-            RING * self.rings.most_nodes + KEPT * kept + SPREAD * kept.min(WAVES_AT_ONCE as f64);
+        let rings = RING * self.rings.most_nodes
+            + KEPT * kept
+            + SPREAD[precise] * kept.min(WAVES_AT_ONCE as f64);
         let table = NODE * self.table;
         let advice = if rings > pixels {
             Advice::Turn
@@ -256,8 +258,7 @@ impl Work {
 }
 
 /// Pixels over which the imaging spreads one that moves as most do.
-fn taps(models: &Models, survey: &Survey, uses: &impl Fn(Term) -> bool, tolerance: f64) -> f64 {
-    let coherent = uses(Term::Coherence);
+fn taps(models: &Models, survey: &Survey, (coherent, moves): (bool, bool), tolerance: f64) -> f64 {
     let imaging = Imaging {
         range_to_velocity: models.range_to_velocity,
         incidence: models.incidence,
@@ -267,7 +268,11 @@ fn taps(models: &Models, survey: &Survey, uses: &impl Fn(Term) -> bool, toleranc
             models.resolution_at_rest()
         },
     };
-    let acceleration = if coherent { survey.acceleration() } else { 0.0 };
+    let acceleration = if coherent && moves {
+        survey.acceleration()
+    } else {
+        0.0
+    };
     let tolerance = super::SHARES.kernels * tolerance;
     imaging.taps(acceleration, models.image.spacing, tolerance)
 }

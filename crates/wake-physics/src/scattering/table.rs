@@ -199,7 +199,8 @@ impl BackscatterTable {
         (slopes, variance): (&SlopeCovariance, f64),
         (error, pixels): (f64, usize),
     ) -> f64 {
-        if error <= 0.0 {
+        // What fields of `f32` do not hold has no table.
+        if error < f64::from(f32::MIN_POSITIVE) {
             return 0.0;
         }
         let axes = backscatter.tilt.principal_axes();
@@ -536,6 +537,7 @@ mod tests {
             facets,
             variance: 0.0,
             error,
+            most_nodes: MOST_NODES,
         }
     }
 
