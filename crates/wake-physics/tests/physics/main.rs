@@ -7,6 +7,7 @@
     reason = "a scene is a default with some values changed"
 )]
 
+mod any_scene;
 mod attack;
 mod expected;
 mod hard_cases;
