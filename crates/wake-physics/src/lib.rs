@@ -26,7 +26,7 @@
 //!
 //! | of | modules |
 //! | --- | --- |
-//! | all | [`constants`], [`output`], [`export`], [`correlated`], [`dispersion`], [`window`] |
+//! | all | [`constants`], [`checksum`], [`output`], [`export`], [`correlated`], [`dispersion`], [`window`] |
 //! | what is asked | [`scene`] |
 //! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`swell`], [`surface`] |
 //! | the ship | [`hull`], [`nufft`], [`kelvin`], [`turbulent`] |
@@ -59,6 +59,7 @@ mod raster;
 mod quadrature;
 mod memory;
 mod workspace;
+pub mod checksum;
 pub mod output;
 pub mod export;
 mod fft;

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use wake_physics::checksum::{sealed, unsealed};
 
 const COUNT: u64 = 7;
 
@@ -513,12 +514,6 @@ fn a_folder_is_read_back() {
     assert!(refused(set.pair(COUNT), folder.path()).contains("no pair 7, there are 7"));
     fs::write(folder.path().join("images/000001.png"), "no picture").unwrap();
     refused(set.pair(1), folder.path());
-    fs::copy(
-        folder.path().join("images/000000.png"),
-        folder.path().join("images/000001.png"),
-    )
-    .unwrap();
-    assert!(set.pair(1).is_ok());
 }
 
 #[test]
@@ -680,7 +675,9 @@ fn grey_in_amplitude_can_be_undone() {
     // Two mappings in one manifest are none.
     let path = folder.path().join("dataset.json");
     let text = fs::read_to_string(&path).unwrap();
-    fs::write(&path, text.replacen("-60.0", "-50.0", 1)).unwrap();
+    let object = unsealed(text.trim_end()).unwrap();
+    let differs = sealed(&object.replacen("-60.0", "-50.0", 1)) + "\n";
+    fs::write(&path, differs).unwrap();
     let error = Folder::open(folder.path()).unwrap_err().to_string();
     assert!(error.contains("grey and recipe.grey differ"), "{error}");
 }
@@ -688,8 +685,14 @@ fn grey_in_amplitude_can_be_undone() {
 /// A learnt sea of white noise and a flow without training.
 #[cfg(feature = "flex")]
 fn white_sea(spacing: Option<f64>) -> crate::sea_texture::SeaTexture {
+    noisy_sea(2, spacing)
+}
+
+/// The same of other noise.
+#[cfg(feature = "flex")]
+fn noisy_sea(seed: u64, spacing: Option<f64>) -> crate::sea_texture::SeaTexture {
     use crate::sea_texture::{SeaFlow, SeaStyle, SeaTexture};
-    let white = crate::noise::NoiseSource::new(2).normal(0, 128 * 128);
+    let white = crate::noise::NoiseSource::new(seed).normal(0, 128 * 128);
     let patch = wake_physics::Field {
         rows: 128,
         columns: 128,
@@ -715,7 +718,23 @@ fn a_learnt_sea_changes_images_alone() {
     let folder = TempDir::new().unwrap();
     super::write(folder.path(), &of_sea("one"), &on_sea, 2, |_| ()).unwrap();
     let (plain, drawn) = (whole(), tree(folder.path()));
+    // Lines have the checksums of their images; all else in them is the same.
+    let lines = |tree: &Tree| -> Vec<serde_json::Value> {
+        let text = String::from_utf8_lossy(&tree[Path::new("metadata.jsonl")]).into_owned();
+        let mut lines: Vec<serde_json::Value> = text
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        for line in &mut lines {
+            ["image_crc32", "crc32"].map(|key| line[key].take());
+        }
+        lines
+    };
+    assert_eq!(lines(&plain), lines(&drawn));
     for (path, content) in &plain {
+        if path.ends_with("metadata.jsonl") {
+            continue;
+        }
         let differs = path.starts_with("images") || path.ends_with("dataset.json");
         assert_eq!(drawn[path] != *content, differs, "{}", path.display());
     }
@@ -740,3 +759,7 @@ fn a_learnt_sea_changes_images_alone() {
         .to_string();
     assert!(fine.contains("20 m") && fine.contains("4 m"), "{fine}");
 }
+
+mod damage;
+mod numbers;
+mod recipes;
