@@ -166,7 +166,6 @@ impl GreyImage {
     }
 
     /// The image rotated by a quarter clockwise.
-    #[cfg(test)]
     pub fn turned(&self) -> Self {
         let turn = |value: &dyn Fn(usize, usize) -> f32| -> Vec<f32> {
             let places = (0..self.columns).flat_map(|r| (0..self.rows).map(move |c| (r, c)));

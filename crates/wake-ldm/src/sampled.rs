@@ -112,6 +112,23 @@ mod tests {
         assert_eq!(batches(1), batches(2));
     }
 
+    /// A run that goes on after its first step has the images of one that was never stopped, bit for bit.
+    #[test]
+    fn batches_of_a_resumed_run_are_the_same() {
+        let sampler = WakeSampler::pretrained(&Device::flex()).unwrap();
+        let recipe = Recipe::detector().unwrap();
+        let scenes = Simulated::new(recipe, 3).unwrap();
+        let source = Sampled::new(sampler.with_steps(1).unwrap(), scenes).unwrap();
+        let second = |start: u64| -> Vec<u32> {
+            let loader = Loader::new(source.clone()).batch(2).start(start);
+            let mut batches = loader.on(&Device::flex()).unwrap();
+            let batch = batches.nth(1 - start as usize).unwrap().unwrap();
+            let pixels = batch.images.into_data().try_to_vec::<f32>().unwrap();
+            pixels.into_iter().map(f32::to_bits).collect()
+        };
+        assert!(second(0) == second(1));
+    }
+
     #[test]
     fn scenes_that_the_model_never_saw_are_refused_before_the_first_image() {
         let message = sampled(&["scene.grid.rows = 128"]).unwrap_err().to_string();

@@ -65,7 +65,7 @@ fn rearranged(text: &str, draw: impl Fn(u64) -> f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::recipe::Recipe;
+    use wake_dataset::Recipe;
     use super::*;
 
     fn prompts() -> Prompts {

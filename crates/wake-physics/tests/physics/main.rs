@@ -12,6 +12,7 @@ mod attack;
 mod expected;
 mod hard_cases;
 mod methods;
+mod numbers;
 mod plan;
 mod refinement;
 mod satellite;
