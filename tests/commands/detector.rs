@@ -214,7 +214,9 @@ const PRINTING: [&[&str]; 5] = [
     &["detect", "a.png", "--out", "out"],
     &["detect", "a.png", "--json", "--out", "out"],
     &["evaluate", "--images", "1", "--out", "out"],
-    &["train", "--images", "16", "--recipe", "painted", "--out", "out"],
+    &[
+        "train", "--images", "16", "--recipe", "painted", "--out", "out",
+    ],
     &[],
 ];
 
@@ -231,7 +233,11 @@ fn a_closed_pipe_is_no_error_for_any_subcommand() {
         assert!(output.status.success(), "{arguments:?}: {message}");
         assert_eq!(message, "", "{arguments:?}");
     }
-    for written in ["out/a.png.wakes.png", "out/report.md", "out/detector.safetensors"] {
+    for written in [
+        "out/a.png.wakes.png",
+        "out/report.md",
+        "out/detector.safetensors",
+    ] {
         assert!(folder.path().join(written).is_file(), "no {written}");
     }
 }
@@ -272,7 +278,11 @@ fn every_image_of_a_folder_has_its_own_picture_and_its_own_entry() {
     let told: Vec<&String> = told["images"].as_object().expect("images").keys().collect();
     let drawn = files(&folder.path().join("out"));
     let count = 1 + odd_names().len();
-    assert_eq!((told.len(), drawn.len()), (count, count), "{told:?} {drawn:?}");
+    assert_eq!(
+        (told.len(), drawn.len()),
+        (count, count),
+        "{told:?} {drawn:?}"
+    );
     assert!(told.iter().any(|name| *name == "a.tif"), "{told:?}");
     #[cfg(unix)]
     assert!(told.iter().any(|name| *name == r"b\xFF.png"), "{told:?}");
@@ -307,7 +317,11 @@ fn broken_images_of_a_folder_are_told_and_the_others_are_searched() {
         let made = Command::new("mkfifo").arg(images.join("d.tif")).status();
         assert!(made.expect("mkfifo").success());
     }
-    let broken = if cfg!(unix) { vec!["b.png", "d.tif"] } else { vec!["b.png"] };
+    let broken = if cfg!(unix) {
+        vec!["b.png", "d.tif"]
+    } else {
+        vec!["b.png"]
+    };
     let output = inside(
         folder.path(),
         &["detect", "images", "--json", "--out", "out"],
@@ -317,9 +331,8 @@ fn broken_images_of_a_folder_are_told_and_the_others_are_searched() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert_eq!(message.lines().count(), broken.len() + 1, "{message}");
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let keys = |part: &str| -> Vec<&String> {
-        told[part].as_object().expect("names").keys().collect()
-    };
+    let keys =
+        |part: &str| -> Vec<&String> { told[part].as_object().expect("names").keys().collect() };
     assert_eq!(keys("images"), ["a.png", "c.png"]);
     assert_eq!(keys("unread"), broken);
     for name in broken {
@@ -331,7 +344,11 @@ fn broken_images_of_a_folder_are_told_and_the_others_are_searched() {
     for name in ["a.png", "c.png"] {
         std::fs::write(images.join(name), "").expect("a file");
     }
-    let output = inside(folder.path(), &["detect", "images", "--out", "none"], Stdio::piped());
+    let output = inside(
+        folder.path(),
+        &["detect", "images", "--out", "none"],
+        Stdio::piped(),
+    );
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stdout.is_empty() && !folder.path().join("none").exists());
 }
@@ -342,7 +359,11 @@ fn pictures_of_wakes_are_not_searched_again() {
     let folder = tempfile::tempdir().expect("a folder");
     eight_bits(&folder.path().join("a.png"), 64);
     let run = || {
-        let output = inside(folder.path(), &["detect", ".", "--json", "--out", "."], Stdio::piped());
+        let output = inside(
+            folder.path(),
+            &["detect", ".", "--json", "--out", "."],
+            Stdio::piped(),
+        );
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{message}");
         output.stdout
@@ -369,7 +390,11 @@ fn weights_that_find_nothing_anywhere_are_refused() {
         }
         std::fs::write(&weights, bytes).expect("a file");
         let words = ["weights.safetensors", "plain wake", "train"];
-        refused_by("detector", &["detect", text(&image), "--weights", text(&weights)], &words);
+        refused_by(
+            "detector",
+            &["detect", text(&image), "--weights", text(&weights)],
+            &words,
+        );
         refused_by("detector", &["train", "--weights", text(&weights)], &words);
     }
 }

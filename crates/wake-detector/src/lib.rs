@@ -9,6 +9,7 @@ mod scaling;
 mod wake;
 
 mod network;
+mod self_check;
 
 mod maps;
 mod search;
@@ -29,7 +30,7 @@ pub mod train;
 pub use burn;
 pub use detector::Detector;
 pub use error::{Error, Result};
-pub use files::image_files;
+pub use files::{image_files, image_name, picture_name};
 pub use finder::Finder;
 pub use image::GreyImage;
 pub use wake::{Detection, Wake};

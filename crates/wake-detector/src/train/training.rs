@@ -18,6 +18,7 @@ use super::sample::Sample;
 use super::targets::{Batch, Prepared};
 use crate::error::{Error, Result};
 use crate::network::Network;
+use crate::self_check::self_check;
 
 /// Images of a step.
 const BATCH: usize = 16;
@@ -92,7 +93,7 @@ impl Training {
 /// # Errors
 ///
 /// [`Error::Model`] for numbers out of range, a folder that cannot be written, checkpoints of another run, and gradients that
-/// stay infinite.
+/// stay infinite; [`Error::WrongMaps`] for first weights as [`Detector::load`](crate::Detector::load).
 pub fn train(
     training: &Training,
     device: &Device,
@@ -105,7 +106,11 @@ pub fn train(
     device.seed(training.seed);
     let steps = training.steps();
     let network = match &training.weights {
-        Some(file) => load(Network::new(&device), Layout::Diffusers, file)?,
+        Some(file) => {
+            let network = load(Network::new(&device), Layout::Diffusers, file)?;
+            self_check(&network, file, &device)?;
+            network
+        }
         None => Network::new(&device),
     };
     let mut trainer = Trainer::new(network, options, vec![device]);

@@ -10,6 +10,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use safetensors::{Dtype, SafeTensors};
 
 use crate::error::{Error, Mismatch, Misshapen, Result};
+use crate::files::read_bytes;
 
 /// The network whose features are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -291,11 +292,7 @@ fn read(
     path: &Path,
     wanted: impl Fn(&SafeTensors<'_>) -> Vec<(String, Vec<usize>)>,
 ) -> Result<Vec<(String, TensorData)>> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = read_bytes(path)?;
     let file = SafeTensors::deserialize(&bytes).map_err(|error| Error::InvalidSafetensors {
         path: path.to_owned(),
         reason: error.into(),
