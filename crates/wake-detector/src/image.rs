@@ -253,10 +253,7 @@ mod tests {
         };
         let mut good = Vec::new();
         image::GrayImage::new(40, 40)
-            .write_to(
-                &mut std::io::Cursor::new(&mut good),
-                image::ImageFormat::Png,
-            )
+            .write_to(&mut std::io::Cursor::new(&mut good), ImageFormat::Png)
             .expect("a PNG");
         for bytes in [
             &b""[..],
