@@ -11,6 +11,8 @@
 //! Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (the same with oriented boxes), `labelTxt/*.txt` (DOTA),
 //! `metadata.jsonl`, `coco.json`, `data.yaml` with `trainset.txt` and `valset.txt`, and `dataset.json`; see docs/dataset.md. A run that was killed continues where it stopped.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[path = "make_dataset/arguments.rs"]
 mod arguments;
 #[path = "common/exit.rs"]

@@ -5,6 +5,8 @@
 //! cargo run --no-default-features --example prompt -- --text "A ship at 8 m/s in 5 m/s wind" --json
 //! ```
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[path = "common/exit.rs"]
 mod exit;
 

@@ -11,6 +11,8 @@
 //! the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
 //! `comparison.json`, and quick-looks of what was simulated, `sheet.png`.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[path = "simulate/across.rs"]
 mod across;
 #[path = "simulate/arguments.rs"]

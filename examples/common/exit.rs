@@ -40,6 +40,10 @@ fn is_fault(error: &(dyn Error + 'static)) -> bool {
             _ => false,
         };
     }
+    #[cfg(feature = "detector")]
+    if let Some(wake_detector::Error::Model(error)) = error.downcast_ref() {
+        return is_fault(error);
+    }
     match error.downcast_ref::<wake_physics::Error>() {
         Some(wake_physics::Error::File { action, .. }) => is_of_writing(action),
         Some(_) => false,
@@ -52,7 +56,7 @@ fn is_of_writing(action: &str) -> bool {
     matches!(action, "write" | "encode")
 }
 
-/// Prints a result. That its reader has left, as `head` does, is no error; that a disk is full is one.
+/// Prints a result: nothing else writes to standard output. That its reader has left, as `head` does, is no error; that a disk is full is one.
 pub(crate) fn say(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {

@@ -1,13 +1,18 @@
 //! `detect`: searches images, draws them with their wakes, and tells them as JSON.
 
 use std::error::Error;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use indicatif::ProgressBar;
 use serde_json::{Map, Value, json};
 use wake_detector::drawing::Drawing;
-use wake_detector::{Detection, Detector, Finder, GreyImage, image_files};
+use wake_detector::{
+    Detection, Detector, Finder, GreyImage, image_files, image_name, picture_name,
+};
+use wake_physics::output::make_folder;
 
-use super::{exit, named, progress};
+use super::{exit, named, picture, progress};
 
 /// How wakes are looked for.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +25,7 @@ enum Method {
 
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
-    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them
+    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them, whose *.wakes.png are left out
     #[arg(required = true, value_name = "FILE|DIR")]
     images: Vec<PathBuf>,
     /// Pixel spacing [m]; without it the scale comes from the image
@@ -48,46 +53,77 @@ pub(crate) struct Options {
 
 pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
     let files = image_files(&options.images)?;
-    let finder = match options.method {
-        Method::Radon => Finder::Radon,
+    let finder = finder(options)?;
+    let bar = progress::bar(files.len() as u64, "images");
+    let mut told = Told::default();
+    let searched = search(&files, &finder, options, &mut told, &bar);
+    bar.finish_and_clear();
+    // Also when the search ended early: what was found until then is told.
+    if options.json && !told.images.is_empty() {
+        let told = json!({ "images": told.images, "unread": told.unread });
+        exit::say(&format!("{told:#}"))?;
+    }
+    searched?;
+    match told.unread.len() {
+        0 => Ok(()),
+        count => Err(format!("{count} of {} images were not read; see above", files.len()).into()),
+    }
+}
+
+fn finder(options: &Options) -> Result<Finder, Box<dyn Error>> {
+    match options.method {
+        Method::Radon => Ok(Finder::Radon),
         Method::Network => {
             let weights = options.weights.as_deref();
             let detector = named::network(weights, &options.device, options.least_score)?;
-            Finder::from(match options.spacing {
+            Ok(Finder::from(match options.spacing {
                 Some(metres) => detector.with_spacing(metres)?,
                 None => detector,
-            })
+            }))
         }
-    };
-    // What cannot be read leaves no folder behind.
-    let first = GreyImage::read(&files[0])?;
-    std::fs::create_dir_all(&options.out)
-        .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
-    let bar = progress::bar(files.len() as u64, "images");
-    let mut told = Map::new();
-    let mut next = Some(first);
-    for file in &files {
-        let image = match next.take() {
-            Some(image) => image,
-            None => GreyImage::read(file)?,
+    }
+}
+
+/// Results by the names of the images.
+#[derive(Default)]
+struct Told {
+    /// The wakes of each image.
+    images: Map<String, Value>,
+    /// Why an image was not read.
+    unread: Map<String, Value>,
+}
+
+/// Searches and draws all files that can be read. A single one that cannot is an error, one of several is noted.
+fn search(
+    files: &[PathBuf],
+    finder: &Finder,
+    options: &Options,
+    told: &mut Told,
+    bar: &ProgressBar,
+) -> Result<(), Box<dyn Error>> {
+    for file in files {
+        let name = image_name(file);
+        bar.inc(1);
+        let image = match GreyImage::read(file) {
+            Ok(image) => image,
+            Err(error) if files.len() == 1 => return Err(error.into()),
+            Err(error) => {
+                bar.suspend(|| exit::note(&format!("error: {error}")));
+                told.unread.insert(name, error.to_string().into());
+                continue;
+            }
         };
+        // What cannot be read leaves no folder behind.
+        if told.images.is_empty() {
+            make_folder(&options.out)?;
+        }
         let found = finder.find(&image);
         draw(&image, &found, options, file)?;
-        let name = file
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
         if !options.json {
-            bar.suspend(|| print(&name, &found));
+            bar.suspend(|| exit::say(&summary(&name, &found)))?;
         }
-        told.insert(name, found.iter().map(as_json).collect());
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    let told = json!({ "images": told });
-    if options.json {
-        exit::say(&format!("{told:#}"))?;
+        told.images
+            .insert(name, found.iter().map(as_json).collect());
     }
     Ok(())
 }
@@ -104,28 +140,27 @@ fn draw(
         options.method == Method::Radon || one.score >= Detector::OPERATING_POINT
     };
     drawing.found(found.iter().filter(sure));
-    let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let path = options.out.join(format!("{name}.wakes.png"));
-    drawing
-        .into_picture()
-        .save(&path)
-        .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-    Ok(())
+    let path = options.out.join(picture_name(file));
+    picture::write(&drawing.into_picture(), &path)
 }
 
-fn print(name: &str, found: &[Detection]) {
-    let sure = || {
-        let sure = |one: &&Detection| one.score >= Detector::OPERATING_POINT;
-        found.iter().filter(sure)
-    };
-    println!("{name}: {} wakes", sure().count());
-    for one in sure() {
+/// The wakes of an image that are likely ones, a line each.
+fn summary(name: &str, found: &[Detection]) -> String {
+    let sure: Vec<&Detection> = found
+        .iter()
+        .filter(|one| one.score >= Detector::OPERATING_POINT)
+        .collect();
+    let mut text = format!("{name}: {} wakes", sure.len());
+    for one in sure {
         let (wake, [column, row]) = (&one.wake, one.wake.tip);
-        println!(
-            "  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
+        // Writing into a string cannot fail.
+        let _ = write!(
+            text,
+            "\n  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
             one.score, wake.axis_deg, wake.length
         );
     }
+    text
 }
 
 /// A detection as the program prints it.

@@ -8,10 +8,11 @@ use wake_detector::Finder;
 use wake_detector::drawing::sheet;
 use wake_detector::judging::{Searched, compared};
 use wake_detector::train::Recipe;
+use wake_physics::output::make_folder;
 
 use super::recall::{by_scene, by_visibility};
 use super::report::Report;
-use super::{exit, named, progress, real, real_sea};
+use super::{exit, named, picture, progress, real, real_sea};
 
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
@@ -38,10 +39,12 @@ pub(crate) struct Options {
 /// A name and a file.
 fn rung(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
-        Some((name, file)) if !name.is_empty() && !file.is_empty() => {
+        Some((name, file))
+            if !name.is_empty() && !name.contains(['/', '\\']) && !file.is_empty() =>
+        {
             Ok((name.to_owned(), PathBuf::from(file)))
         }
-        _ => Err("expected NAME=FILE".to_owned()),
+        _ => Err("expected NAME=FILE, with a name that can be part of a file's".to_owned()),
     }
 }
 
@@ -67,6 +70,13 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
         ("Radon", Finder::Radon),
     ];
     for (name, file) in &options.rung {
+        // Pictures bear these names, in small letters.
+        if finders
+            .iter()
+            .any(|(other, _)| other.eq_ignore_ascii_case(name))
+        {
+            return Err(format!("--rung {name} has the name of another finder; rename it").into());
+        }
         finders.push((name, network(Some(file))?));
     }
     let (tiles, sea) = match &options.real {
@@ -77,14 +87,14 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
             (tiles, sea)
         }
     };
-    std::fs::create_dir_all(&options.out)
-        .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
+    make_folder(&options.out)?;
     let mut report = Report {
         rungs: options.rung.iter().map(|(name, _)| name.clone()).collect(),
         ..Report::default()
     };
+    let mut speeds = String::new();
     for recipe in [Recipe::Detector, Recipe::Painted] {
-        simulated(&finders, recipe, options, &mut report)?;
+        speeds.push_str(&simulated(&finders, recipe, options, &mut report)?);
     }
     for (name, finder) in &finders {
         if !tiles.is_empty() {
@@ -95,15 +105,16 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
         report.sea = real_sea::told_apart(&sea)?;
     }
     report.write(&options.out)?;
-    Ok(exit::say(&report.text())?)
+    Ok(exit::say(&format!("{speeds}{}", report.text()))?)
 }
 
+/// Adds the rows of a recipe, and draws its first images; gives a line with the speed of the search.
 fn simulated(
     finders: &[(&str, Finder)],
     recipe: Recipe,
     options: &Options,
     report: &mut Report,
-) -> Result<(), Box<dyn Error>> {
+) -> Result<String, Box<dyn Error>> {
     let source = recipe.source(HELD_OUT, SIZE)?;
     let count = u64::from(options.images);
     let bar = progress::bar(count, recipe.name());
@@ -130,11 +141,11 @@ fn simulated(
         report.scenes = by_scene(recipe, &names, &searched);
     }
     let megapixels = (SIZE * SIZE) as f64 * 1e-6;
-    println!(
-        "{}: {:.2} megapixels a second",
-        recipe.name(),
-        megapixels / searched.seconds
-    );
     let path = options.out.join(format!("{}.png", recipe.name()));
-    Ok(sheet(&pictures, 4).save(path)?)
+    picture::write(&sheet(&pictures, 4), &path)?;
+    let speed = megapixels / searched.seconds;
+    Ok(format!(
+        "{}: {speed:.2} megapixels a second\n",
+        recipe.name()
+    ))
 }

@@ -6,17 +6,21 @@
 //! cargo run --release --example detector -- evaluate --real DIR
 //! ```
 //!
-//! `detect` tells every wake by tip, axis, half-angle, visible length and score, and draws each image with its wakes into
-//! `--out`; `--method radon` does the same by the classical transform. `train` makes its images on the fly, and a run
+//! `detect` tells every wake by tip, axis, half-angle, visible length and score, and draws the wakes of `NAME` into
+//! `NAME.wakes.png` in `--out`; `--method radon` does the same by the classical transform. Files of a folder that cannot be
+//! read are named, and the others are searched. `train` makes its images on the fly, and a run
 //! that was killed goes on when it is started again. `evaluate` measures both methods on held-out images and on real
 //! tiles with labels, and writes `report.md`. Without a command, wakes are found in a few simulated images and drawn
 //! into `out/detector/simulated.png`.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod detect;
 mod evaluate;
 #[path = "../common/exit.rs"]
 mod exit;
 mod named;
+mod picture;
 #[path = "../common/progress.rs"]
 mod progress;
 mod real;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use wake_detector::judging::{Tile, compared};
 use wake_detector::{Detection, Finder};
 
+use super::picture;
 use super::report::Report;
 
 /// The tiles of a folder with their labels.
@@ -39,7 +40,10 @@ pub(crate) fn judge(
     report.add("real, clear and probable wakes", name, &both);
     for (i, (tile, found)) in searched().enumerate() {
         let file = format!("real-{}-{:02}.png", name.to_lowercase(), i + 1);
-        compared(&tile.image, &tile.wakes(), found).save(out.join(file))?;
+        picture::write(
+            &compared(&tile.image, &tile.wakes(), found),
+            &out.join(file),
+        )?;
     }
     Ok(())
 }

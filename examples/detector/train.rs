@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use wake_detector::train::{Recipe, Training, train};
 use wake_ldm::device_named;
 
-use super::{named, progress};
+use super::{exit, named, progress};
 
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
@@ -57,6 +57,6 @@ pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         bar.set_position(step as u64);
     })?;
     bar.finish_and_clear();
-    println!("{steps} steps, weights in {}", options.out.display());
-    Ok(())
+    let out = options.out.display();
+    Ok(exit::say(&format!("{steps} steps, weights in {out}"))?)
 }

@@ -11,6 +11,8 @@
 //! figure means. `domain` judges the model over a recipe and writes `domain.json`, `domain.md` and `domain.png`. `sea` sets a
 //! learnt sea beside real images instead, and writes `report.json`, `report.md` and `learned_sea.png`.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[path = "../common/exit.rs"]
 mod exit;
 mod domain;

@@ -6,6 +6,8 @@
 //!
 //! Writes `gallery.png`, `stages.png` and `wake.gif`.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[path = "../common/exit.rs"]
 mod exit;
 mod film;

@@ -12,6 +12,8 @@
 //! and says which scene it drew (what the prompt states, and the default values of what it leaves open) and which parts of
 //! the prompt it did not read. A prompt that states nothing of a scene is an error.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod diffusers;
 #[path = "../common/exit.rs"]
 mod exit;

@@ -15,6 +15,8 @@
 //! second part is the model, where it is built in: steps, batch size and weights against many steps from the same noise. The
 //! third is the loader: images a second that a training loop gets of the simulator and of the model, by threads.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod arguments;
 #[path = "../common/exit.rs"]
 mod exit;

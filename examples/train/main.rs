@@ -33,6 +33,8 @@
 //! `text-to-image` learns a small model of that layout from nothing, from images and prompts alone: the autoencoder, then
 //! text encoder and U-Net together. `generate --weights`, `evaluate --text-to-image` and `fine-tune` read it.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[path = "../common/exit.rs"]
 mod exit;
 mod fine_tune;

@@ -2,14 +2,14 @@
 
 use super::distribution::{Distribution, Value, choose, refused};
 use crate::error::{Error, Result};
-use wake_nn::noise::NoiseSource;
 use crate::streams;
 use serde::de::Error as _;
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
-use wake_physics::scene::Ship;
+use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
+use wake_physics::scene::Ship;
 use whole_files::sentence;
 
 /// Distributions by the path of their value, such as `ship.speed`.

@@ -2,10 +2,10 @@
 
 use super::recipe::{Draw, Recipe};
 use crate::error::Result;
-use wake_nn::noise::NoiseSource;
-use crate::streams;
 use crate::sea::Sea;
+use crate::streams;
 use std::sync::Arc;
+use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
 use wake_physics::scene::paper_grid;
 use wake_text::{PartialScene, Wording};
