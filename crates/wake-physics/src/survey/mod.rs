@@ -275,8 +275,7 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
     let response = match (&models.response, scene.radar.range_resolution) {
         (Some(_), _) => None,
         (None, None) => Some("not asked for"),
-        (None, Some(_)) if !scene.model.terms.allow(Term::Response) => Some("not in model.terms"),
-        (None, Some(_)) => Some("pixels correlate too little to tell"),
+        (None, Some(_)) => Some("not in model.terms"),
     };
     [
         (Term::Swell, swell),
