@@ -416,6 +416,28 @@ mod tests {
         }
     }
 
+    /// Echo and roll, edges and their response are drawn apart: a ship without the one has none of the other, as a scene
+    /// must.
+    #[test]
+    fn a_ship_has_only_the_keys_that_act() {
+        let changes = [
+            "draw.count = 1",
+            "draw.ship.roll = [0.1, 0.4]",
+            "draw.ship.edge_time = [100, 200]",
+            "draw.ship.echo = { one_of = [true, false] }",
+            "draw.ship.edge = { one_of = [false, true] }",
+        ];
+        let recipe = Recipe::default().with_assignments(&changes).unwrap();
+        let source = Simulated::new(recipe, 1).unwrap();
+        let mut seen = BTreeSet::new();
+        for index in 0..40 {
+            let ship = &source.scene(index).unwrap().ships[0];
+            assert_eq!((ship.roll > 0.0, ship.edge_time.is_some()), (ship.echo, ship.edge));
+            seen.insert((ship.echo, ship.edge));
+        }
+        assert_eq!(seen.len(), 4);
+    }
+
     #[test]
     fn assignments_take_toml_values_and_bare_words() {
         let changes = [

@@ -267,7 +267,9 @@ impl SeaTexture {
         self.check_spacing(scene.grid.spacing)?;
         let all = expected_intensity(scene)?;
         let mut silent = scene.clone();
-        silent.ships.iter_mut().for_each(|ship| ship.echo = false);
+        for ship in &mut silent.ships {
+            (ship.echo, ship.roll) = (false, 0.0);
+        }
         let sea = match silent == *scene {
             true => all.clone(),
             false => expected_intensity(&silent)?,
