@@ -17,13 +17,13 @@ use std::time::Duration;
 
 use arbtest::arbtest;
 use burn::tensor::Device;
-use wake_ldm::dataset::{Folder, Recipe};
+use wake_dataset::{Folder, Recipe};
 use wake_ldm::network::{PatchTransform, WakeModelConfig};
 use wake_ldm::pipeline::Pipeline;
 use wake_ldm::scheduler::SchedulerConfig;
-use wake_ldm::train::{Checkpoint, Metrics};
+use wake_train::{Checkpoint, Metrics};
 use wake_ldm::unet::UNetConfig;
-use wake_ldm::weights::{Layout, load};
+use wake_nn::weights::{Layout, load};
 use wake_physics::Scene;
 use wake_text::{PartialScene, TOKENS, Tokenizer};
 
@@ -199,7 +199,7 @@ fn configurations() {
 fn lines_of_data_sets() {
     let folder = tempfile::tempdir().expect("a folder");
     let recipe = Recipe::default();
-    let manifest = wake_ldm::dataset::Manifest::new(recipe, 7, 1).expect("a manifest");
+    let manifest = wake_dataset::Manifest::new(recipe, 7, 1).expect("a manifest");
     let text = serde_json::to_string(&manifest).expect("JSON");
     std::fs::write(folder.path().join("dataset.json"), text).expect("a file");
     attack("metadata", |input| {

@@ -7,7 +7,7 @@ use wake_ldm::Error;
 use wake_ldm::lora::merge_lora;
 use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
-use wake_ldm::weights::Layout;
+use wake_nn::weights::Layout;
 
 use crate::golden::{Golden, devices, expect, largest, numbers, own_folder};
 

@@ -3,7 +3,7 @@
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Device, Gradients, Tensor};
 use wake_ldm::unet::{UNet, UNetInput};
-use wake_ldm::weights::{self, Layout};
+use wake_nn::weights::{self, Layout};
 
 use crate::golden::{Golden, devices, difference, folder, json, numbers};
 

@@ -4,8 +4,8 @@
 //! guidance 0 to 1000 and hard prompts in `requests.rs`, hostile weight files in `weight_files.rs`.
 
 use burn::tensor::{DType, Device, Distribution, FloatDType, Tensor};
-use wake_ldm::nn::attention::attention;
-use wake_ldm::nn::norm::GroupNorm;
+use wake_nn::attention::attention;
+use wake_nn::norm::GroupNorm;
 
 use crate::golden::{devices, difference, largest, numbers};
 

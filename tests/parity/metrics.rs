@@ -3,7 +3,7 @@
 use crate::golden::{Golden, folder, json};
 use burn::tensor::{Device, Tensor, TensorData};
 use serde_json::Value;
-use wake_ldm::metrics::{
+use wake_train::metrics::{
     Lpips, LpipsNetwork, Plane, SsimWindow, mean_square_error, psnr, ssim, ssim_map,
 };
 use wake_physics::Field;

@@ -9,7 +9,7 @@ use serde_json::Value;
 use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
 use wake_ldm::text::{ClipText, ClipTextConfig};
 use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
-use wake_ldm::weights::{self, Layout};
+use wake_nn::weights::{self, Layout};
 
 use crate::golden::{Golden, devices, expect, folder, json, numbers};
 

@@ -4,7 +4,7 @@ use burn::tensor::{DType, Tensor};
 use wake_ldm::Error;
 use wake_ldm::autoencoder::AutoencoderKl;
 use wake_ldm::unet::UNetInput;
-use wake_ldm::weights::{self, Layout, Precision};
+use wake_nn::weights::{self, Layout, Precision};
 
 use crate::golden::{Golden, devices, difference, folder, json, largest, numbers};
 

@@ -8,7 +8,7 @@ use wake_ldm::pipeline::{Pipeline, PipelineParts, Request};
 use wake_ldm::scheduler::SchedulerConfig;
 use wake_ldm::text::ClipTextConfig;
 use wake_ldm::unet::UNetConfig;
-use wake_ldm::weights::Precision;
+use wake_nn::weights::Precision;
 
 use crate::golden::{Golden, devices, difference, folder, json, largest, numbers};
 

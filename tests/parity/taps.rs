@@ -11,15 +11,15 @@ use burn::tensor::activation::silu;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use safetensors::tensor::TensorView;
 use serde_json::Value;
-use wake_ldm::nn::attention::CrossAttention;
-use wake_ldm::nn::feed_forward::FeedForward;
-use wake_ldm::nn::norm::GroupNorm;
-use wake_ldm::nn::resample::{Downsample, Upsample};
-use wake_ldm::nn::resnet::{ResnetBlock, ResnetShape};
-use wake_ldm::nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
-use wake_ldm::nn::transformer::{Transformer2d, TransformerShape};
+use wake_nn::attention::CrossAttention;
+use wake_nn::feed_forward::FeedForward;
+use wake_nn::norm::GroupNorm;
+use wake_nn::resample::{Downsample, Upsample};
+use wake_nn::resnet::{ResnetBlock, ResnetShape};
+use wake_nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
+use wake_nn::transformer::{Transformer2d, TransformerShape};
 use wake_ldm::text::ClipText;
-use wake_ldm::weights::{self, Layout};
+use wake_nn::weights::{self, Layout};
 
 use crate::golden::{Golden, devices, expect, folder, json, largest, numbers};
 
@@ -173,7 +173,7 @@ impl Tap<'_> {
             burn::tensor::module::linear(x, weight, Some(bias))
         };
         let [q, k, v] = [0, 1, 2].map(|i| linear(tokens.clone(), i));
-        let out = linear(wake_ldm::nn::attention::attention(q, k, v, 1, false), 3);
+        let out = linear(wake_nn::attention::attention(q, k, v, 1, false), 3);
         numbers(&(out.swap_dims(1, 2).reshape(x.dims()) + x))
     }
 

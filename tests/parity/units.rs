@@ -3,10 +3,10 @@
 use burn::tensor::activation::{gelu, silu};
 use burn::tensor::{Device, Tensor};
 use wake_ldm::autoencoder::GaussianPosterior;
-use wake_ldm::nn::activation::quick_gelu;
-use wake_ldm::nn::norm::GroupNorm;
-use wake_ldm::nn::resample::nearest;
-use wake_ldm::nn::timestep::sinusoidal_embedding;
+use wake_nn::activation::quick_gelu;
+use wake_nn::norm::GroupNorm;
+use wake_nn::resample::nearest;
+use wake_nn::timestep::sinusoidal_embedding;
 
 use crate::golden::{Golden, devices, difference, folder, largest, numbers};
 

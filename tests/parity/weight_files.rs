@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use burn::tensor::Tensor;
 use serde_json::{Map, Value, json};
 use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
-use wake_ldm::weights::{self, Layout};
+use wake_nn::weights::{self, Layout};
 use wake_ldm::{Error, Mismatch};
 
 use crate::golden::{self, Golden, devices, folder, numbers};

@@ -1,13 +1,13 @@
-//! `detect`: searches images, draws them with their wakes, and tells them as JSON.
+//! `wake detect`: searches images, draws them with their wakes, and tells them as JSON.
 
-use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 use wake_detector::drawing::Drawing;
 use wake_detector::{Detection, Detector, Finder, GreyImage, image_files};
 
-use super::{exit, named, progress};
+use crate::exit::{self, Outcome};
+use crate::{named, progress};
 
 /// How wakes are looked for.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,8 +18,9 @@ enum Method {
     Radon,
 }
 
+/// Find ship wakes in radar images.
 #[derive(clap::Args, Debug, Clone)]
-pub(crate) struct Options {
+pub(crate) struct Arguments {
     /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them
     #[arg(required = true, value_name = "FILE|DIR")]
     images: Vec<PathBuf>,
@@ -42,18 +43,19 @@ pub(crate) struct Options {
     #[arg(long, default_value = "flex")]
     device: String,
     /// Folder of the pictures, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/detector")]
+    #[arg(long, value_name = "DIR", default_value = "out/detect")]
     out: PathBuf,
 }
 
-pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
-    let files = image_files(&options.images)?;
-    let finder = match options.method {
+/// Draws each image with its wakes into `--out`, and prints every wake by tip, axis, half-angle, visible length and score.
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
+    let files = image_files(&arguments.images)?;
+    let finder = match arguments.method {
         Method::Radon => Finder::Radon,
         Method::Network => {
-            let weights = options.weights.as_deref();
-            let detector = named::network(weights, &options.device, options.least_score)?;
-            Finder::from(match options.spacing {
+            let weights = arguments.weights.as_deref();
+            let detector = named::network(weights, &arguments.device, arguments.least_score)?;
+            Finder::from(match arguments.spacing {
                 Some(metres) => detector.with_spacing(metres)?,
                 None => detector,
             })
@@ -61,8 +63,7 @@ pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
     };
     // What cannot be read leaves no folder behind.
     let first = GreyImage::read(&files[0])?;
-    std::fs::create_dir_all(&options.out)
-        .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
+    whole_files::make_folder(&arguments.out)?;
     let bar = progress::bar(files.len() as u64, "images");
     let mut told = Map::new();
     let mut next = Some(first);
@@ -72,21 +73,21 @@ pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
             None => GreyImage::read(file)?,
         };
         let found = finder.find(&image);
-        draw(&image, &found, options, file)?;
+        draw(&image, &found, arguments, file)?;
         let name = file
             .file_name()
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        if !options.json {
-            bar.suspend(|| print(&name, &found));
+        if !arguments.json {
+            bar.suspend(|| exit::say(&summary(&name, &found)))?;
         }
         told.insert(name, found.iter().map(as_json).collect());
         bar.inc(1);
     }
     bar.finish_and_clear();
     let told = json!({ "images": told });
-    if options.json {
+    if arguments.json {
         exit::say(&format!("{told:#}"))?;
     }
     Ok(())
@@ -95,17 +96,17 @@ pub(crate) fn detect(options: &Options) -> Result<(), Box<dyn Error>> {
 fn draw(
     image: &GreyImage,
     found: &[Detection],
-    options: &Options,
+    arguments: &Arguments,
     file: &Path,
-) -> Result<(), Box<dyn Error>> {
+) -> Outcome<()> {
     let mut drawing = Drawing::new(image);
     // Radon's score has no upper end; all that it tells is above its threshold.
     let sure = |one: &&Detection| {
-        options.method == Method::Radon || one.score >= Detector::OPERATING_POINT
+        arguments.method == Method::Radon || one.score >= Detector::OPERATING_POINT
     };
     drawing.found(found.iter().filter(sure));
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let path = options.out.join(format!("{name}.wakes.png"));
+    let path = arguments.out.join(format!("{name}.wakes.png"));
     drawing
         .into_picture()
         .save(&path)
@@ -113,19 +114,19 @@ fn draw(
     Ok(())
 }
 
-fn print(name: &str, found: &[Detection]) {
-    let sure = || {
-        let sure = |one: &&Detection| one.score >= Detector::OPERATING_POINT;
-        found.iter().filter(sure)
-    };
-    println!("{name}: {} wakes", sure().count());
-    for one in sure() {
+/// What is said of one image.
+fn summary(name: &str, found: &[Detection]) -> String {
+    let sure = |one: &&Detection| one.score >= Detector::OPERATING_POINT;
+    let sure: Vec<&Detection> = found.iter().filter(sure).collect();
+    let mut lines = vec![format!("{name}: {} wakes", sure.len())];
+    lines.extend(sure.iter().map(|one| {
         let (wake, [column, row]) = (&one.wake, one.wake.tip);
-        println!(
+        format!(
             "  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
             one.score, wake.axis_deg, wake.length
-        );
-    }
+        )
+    }));
+    lines.join("\n")
 }
 
 /// A detection as the program prints it.

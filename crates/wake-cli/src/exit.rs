@@ -1,48 +1,83 @@
-//! How every example begins, speaks and ends.
+//! How the program begins, speaks and ends.
 
 use std::error::Error;
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
+
+/// What a subcommand returns.
+pub(crate) type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// More threads than any machine has cores.
 const MOST_THREADS: usize = 1024;
 /// No sentence on standard error is longer.
 const LONGEST: usize = 2000;
 
-/// Does the work of an example: exit code 0; or one sentence on standard error and exit code 2 for what was asked wrongly
-/// (arguments, files that they name, places that cannot be written to), 1 for what went wrong on the way (a full disk).
-pub(crate) fn code<E: Into<Box<dyn Error>>>(work: impl FnOnce() -> Result<(), E>) -> ExitCode {
-    let refused: Result<(), Box<dyn Error>> = match threads() {
-        Ok(()) => work().map_err(Into::into),
-        Err(error) => Err(error.into()),
-    };
-    match refused {
+/// Runs a subcommand: exit code 0; or one sentence on standard error and exit code 2 for bad input (arguments, files that
+/// they name, folders that cannot be written to), 1 for any other failure (a full disk).
+pub(crate) fn code(work: impl FnOnce() -> Outcome<()>) -> ExitCode {
+    match threads().map_err(Into::into).and_then(|()| work()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             note(&format!("error: {error}"));
-            ExitCode::from(if is_fault(error.as_ref()) { 1 } else { 2 })
+            ExitCode::from(if is_failure(error.as_ref()) { 1 } else { 2 })
         }
     }
 }
 
-/// Whether an error is none of the asker's.
-fn is_fault(error: &(dyn Error + 'static)) -> bool {
-    #[cfg(feature = "ldm")]
-    if let Some(error) = error.downcast_ref::<wake_ldm::Error>() {
-        use wake_ldm::Error as E;
+/// Whether an error has another cause than the input.
+fn is_failure(error: &(dyn Error + 'static)) -> bool {
+    #[cfg(feature = "train")]
+    if let Some(error) = error.downcast_ref::<wake_train::Error>() {
+        use wake_train::Error as E;
         return match error {
-            E::Scene(scene) => is_fault(scene),
-            E::Io { action, .. } => is_of_writing(action),
-            E::NotFinite { .. }
-            | E::Threads { .. }
-            | E::Diverged { .. }
-            | E::WrongNumbers { .. } => true,
+            E::Value(error) => is_failure(error),
+            E::Model(error) => is_failure(error),
+            E::Data(error) => is_failure(error),
+            E::Detector(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            E::Diverged { .. } => true,
             _ => false,
         };
     }
-    match error.downcast_ref::<wake_physics::Error>() {
-        Some(wake_physics::Error::File { action, .. }) => is_of_writing(action),
-        Some(_) => false,
+    #[cfg(feature = "dataset")]
+    if let Some(error) = error.downcast_ref::<wake_dataset::Error>() {
+        use wake_dataset::Error as E;
+        return match error {
+            E::Value(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            E::Source(error) => is_failure(error.as_ref()),
+            E::Threads { .. } => true,
+            _ => false,
+        };
+    }
+    #[cfg(feature = "generate")]
+    if let Some(error) = error.downcast_ref::<wake_ldm::Error>() {
+        use wake_ldm::Error as E;
+        return match error {
+            E::Model(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            _ => false,
+        };
+    }
+    #[cfg(feature = "detect")]
+    if let Some(wake_detector::Error::Model(error)) = error.downcast_ref() {
+        return is_failure(error);
+    }
+    #[cfg(any(feature = "dataset", feature = "generate", feature = "detect"))]
+    if let Some(error) = error.downcast_ref::<wake_nn::Error>() {
+        use wake_nn::Error as E;
+        return match error {
+            E::Io { action, .. } => is_of_writing(action),
+            E::NotFinite { .. } | E::WrongNumbers { .. } => true,
+            _ => false,
+        };
+    }
+    #[cfg(feature = "simulate")]
+    if let Some(wake_physics::Error::File { action, .. }) = error.downcast_ref() {
+        return is_of_writing(action);
+    }
+    match error.downcast_ref::<whole_files::Error>() {
+        Some(error) => is_of_writing(error.action),
         None => error.is::<io::Error>(),
     }
 }

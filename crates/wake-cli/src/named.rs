@@ -1,13 +1,17 @@
 //! Recipes, numbers and networks as the command line names them.
 
-use std::error::Error;
 use std::path::Path;
 
+#[cfg(feature = "train")]
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use wake_detector::Detector;
-use wake_detector::train::Recipe;
-use wake_ldm::device_named;
+use wake_nn::device_named;
+#[cfg(feature = "train")]
+use wake_train::detector::Recipe;
 
+use crate::exit::Outcome;
+
+#[cfg(feature = "train")]
 /// Reads the name of a recipe; `--help` tells what each shows.
 pub(crate) fn recipe() -> impl TypedValueParser<Value = Recipe> {
     let names = Recipe::ALL.map(|recipe| PossibleValue::new(recipe.name()).help(recipe.about()));
@@ -42,7 +46,7 @@ pub(crate) fn network(
     weights: Option<&Path>,
     device: &str,
     least_score: f32,
-) -> Result<Detector, Box<dyn Error>> {
+) -> Outcome<Detector> {
     let device = device_named(device)?;
     let detector = match weights {
         Some(file) => Detector::load(file, &device)?,

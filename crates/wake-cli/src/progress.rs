@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A progress bar of so many `things`.
-#[allow(dead_code, reason = "of the examples that count what they do")]
+#[cfg(any(feature = "dataset", feature = "generate", feature = "detect"))]
 pub(crate) fn bar(length: u64, things: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}, {per_sec}, {eta} left");
     ProgressBar::new(length)
@@ -12,7 +12,7 @@ pub(crate) fn bar(length: u64, things: &'static str) -> ProgressBar {
 }
 
 /// A sign of life with the time gone by, for work that cannot say how far it is.
-#[allow(dead_code, reason = "of the examples that have such work")]
+#[cfg(feature = "simulate")]
 pub(crate) fn clock(what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} gone by");
     let clock = ProgressBar::new_spinner()

@@ -1,28 +1,19 @@
-//! A scene as a prompt and its 77 CLIP tokens; a prompt as the values it states, and what of it stays unread.
-//!
-//! ```text
-//! cargo run --no-default-features --example prompt -- --set ship.speed=12
-//! cargo run --no-default-features --example prompt -- --text "A ship at 8 m/s in 5 m/s wind" --json
-//! ```
+//! `wake prompt`: a scene as a prompt and its 77 CLIP tokens; a prompt as the values it states, and what of it stays unread.
 
-#[path = "common/exit.rs"]
-mod exit;
-
-use clap::Parser;
+use clap::Args;
 use serde_json::{Value, json};
-use std::error::Error;
 use std::path::PathBuf;
-use std::process::ExitCode;
 use wake_physics::Scene;
 use wake_text::{Reading, TOKENS, Tokenizer, Tokens};
 
-/// Turns a scene into a prompt and its CLIP tokens, or reads a prompt back.
-#[derive(Parser)]
+use crate::exit::{self, Outcome};
+
+/// Turn a scene into a prompt and its CLIP tokens, or read a prompt back.
+#[derive(Args)]
 #[command(
-    version,
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
 )]
-struct Arguments {
+pub(crate) struct Arguments {
     /// Scene file (TOML); without it and without --text, the default scene.
     #[arg(long, value_name = "FILE", conflicts_with = "text")]
     scene: Option<PathBuf>,
@@ -38,16 +29,12 @@ struct Arguments {
     json: bool,
 }
 
-fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
-}
-
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let text = answer(arguments)?;
     Ok(exit::say(&text)?)
 }
 
-fn answer(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
+fn answer(arguments: &Arguments) -> Outcome<String> {
     let (prompt, base) = match &arguments.text {
         // A text has a ship only if it speaks of one.
         Some(text) => (
@@ -84,7 +71,7 @@ fn as_json(
     tokens: &Tokens,
     reading: &Reading,
     base: &Scene,
-) -> Result<Value, Box<dyn Error>> {
+) -> Outcome<Value> {
     let scene = (!reading.states_nothing()).then(|| reading.scene.onto(base));
     let scene = scene.transpose()?;
     Ok(json!({

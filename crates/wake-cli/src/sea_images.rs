@@ -1,13 +1,13 @@
 //! The images of a folder that a sea is learnt from, or judged by.
 
-use std::error::Error;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use wake_detector::GreyImage;
 use wake_ldm::sea_texture::SeaImage;
 use wake_physics::Field;
 
-use wake_detector::GreyImage;
+use crate::exit::Outcome;
 
 /// Endings of files that are read.
 const ENDINGS: [&str; 5] = ["png", "tif", "tiff", "jpg", "jpeg"];
@@ -38,7 +38,7 @@ pub(crate) struct SeaFile {
 }
 
 /// The images of a folder by name, without the masks.
-pub(crate) fn list(folder: &Path) -> Result<Vec<SeaFile>, Box<dyn Error>> {
+pub(crate) fn list(folder: &Path) -> Outcome<Vec<SeaFile>> {
     let place = folder.display();
     let unreadable = |error: std::io::Error| format!("cannot read {place}: {error}");
     let mut files = Vec::new();
@@ -68,7 +68,7 @@ pub(crate) fn list(folder: &Path) -> Result<Vec<SeaFile>, Box<dyn Error>> {
 
 impl SeaFile {
     /// Reads the image, or a half of it.
-    pub(crate) fn read(&self, half: Option<Half>) -> Result<SeaImage, Box<dyn Error>> {
+    pub(crate) fn read(&self, half: Option<Half>) -> Outcome<SeaImage> {
         let amplitude = field(&self.path, half)?;
         let mask = self.mask.as_ref().map(|mask| field(mask, half));
         let told = |error| format!("{}: {error}", self.path.display());
@@ -76,7 +76,7 @@ impl SeaFile {
     }
 }
 
-fn field(path: &Path, half: Option<Half>) -> Result<Field, Box<dyn Error>> {
+fn field(path: &Path, half: Option<Half>) -> Outcome<Field> {
     let grey = GreyImage::read(path)?;
     let columns = Half::columns(half, grey.columns());
     Ok(Field {

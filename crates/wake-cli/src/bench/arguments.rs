@@ -1,15 +1,14 @@
 //! The command line.
 
-use crate::stages::STAGES;
-use clap::{Parser, ValueEnum};
+use super::stages::STAGES;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 /// Measure every fast method of the simulator against its slow oracle.
-#[derive(Parser)]
-#[command(version)]
+#[derive(Args)]
 pub(crate) struct Arguments {
     /// Folder of the results, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/speed_vs_error")]
+    #[arg(long, value_name = "DIR", default_value = "out/bench")]
     pub(crate) out: PathBuf,
     /// Print {"rows": [...]} on standard output, and nothing else
     #[arg(long)]
@@ -20,7 +19,6 @@ pub(crate) struct Arguments {
     /// What to measure
     #[arg(long, value_enum, default_value = "all")]
     pub(crate) part: Part,
-    #[cfg(feature = "dataset")]
     /// Where the loader's model computes: flex, ndarray, wgpu or cuda, where compiled in
     #[arg(long, default_value = "flex")]
     pub(crate) device: String,
@@ -34,8 +32,8 @@ pub(crate) enum Part {
     All,
     /// The fast methods of the simulator
     Simulator,
-    /// The model, where it is built in
+    /// The model
     Model,
-    /// Images a second through the data set's loader, where it is built in
+    /// Images a second through the data set's loader
     Loader,
 }

@@ -1,11 +1,12 @@
 //! Images a second through the data set's loader, as a training loop gets them.
 
 use serde::Serialize;
-use std::error::Error;
 use std::sync::Arc;
 use std::time::Instant;
-use wake_ldm::dataset::{Loader, Recipe, Sampled, Simulated, Source};
+use wake_dataset::{Loader, Recipe, Sampled, Simulated, Source};
 use wake_ldm::{WakeSampler, device_named};
+
+use crate::exit::Outcome;
 
 /// Threads that make batches, as many as there are cores at most; on each the physics of one batch is computed while the device draws
 /// another.
@@ -42,7 +43,7 @@ fn threads() -> impl Iterator<Item = usize> {
 }
 
 /// All rows; `done` hears of each.
-pub(crate) fn measure(device: &str, done: impl Fn()) -> Result<Vec<LoaderRow>, Box<dyn Error>> {
+pub(crate) fn measure(device: &str, done: impl Fn()) -> Outcome<Vec<LoaderRow>> {
     let scenes = Simulated::new(Recipe::detector()?, SEED)?;
     let sampler = WakeSampler::pretrained(&device_named(device)?)?;
     let sampled = Sampled::new(sampler, scenes.clone())?;
@@ -72,7 +73,7 @@ fn images_per_second(
     source: Arc<dyn Source>,
     threads: usize,
     device: &str,
-) -> Result<f64, Box<dyn Error>> {
+) -> Outcome<f64> {
     let loader = Loader::new(source).batch(BATCH).threads(threads);
     let mut batches = loader.on(&device_named(device)?)?;
     for batch in batches.by_ref().take(threads) {

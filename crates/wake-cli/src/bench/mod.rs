@@ -1,56 +1,37 @@
-//! Every fast method against its oracle: seconds, error, and the frontier.
-//!
-//! ```text
-//! cargo run --release --example speed_vs_error
-//! cargo run --release --example speed_vs_error -- --part model
-//! cargo run --release --features wgpu --example speed_vs_error -- --part loader --device wgpu
-//! ```
-//!
-//! Writes `report.json`, `simulator.md`, `spacing.md`, `model.md`, `loader.md`, `frontier.svg` and `model.svg` (log-log).
+//! `wake bench`: every fast method against its oracle: seconds, error, and the frontier.
 //!
 //! The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the default scene, the paper's own method
 //! and scale; the oracle of both is the harmonic sum, the strong baseline the same sum as a matrix product. Where an
 //! oracle is too slow for all pixels it runs on random ones of the same size, as many as the table says, and its time is
 //! scaled up; that of the whole scene stage by stage. One image on finer and finer pixels shows what its spacing does. The
-//! second part is the model, where it is built in: steps, batch size and weights against many steps from the same noise. The
-//! third is the loader: images a second that a training loop gets of the simulator and of the model, by threads.
+//! second part is the model: steps, batch size and weights against many steps from the same noise. The third is the loader:
+//! images a second that a training loop gets of the simulator and of the model, by threads.
 
 mod arguments;
-#[path = "../common/exit.rs"]
-mod exit;
-#[cfg(feature = "dataset")]
 mod loader;
-#[cfg(feature = "ldm")]
 mod model;
-#[cfg(feature = "ldm")]
 mod model_row;
 mod plot;
-#[path = "../common/progress.rs"]
-mod progress;
-#[cfg(feature = "ldm")]
 mod reference;
-#[cfg(feature = "ldm")]
 mod rounding;
 mod row;
 mod spacing;
 mod stages;
 mod sweep;
 
-use arguments::{Arguments, Part};
-use clap::Parser;
+pub(crate) use arguments::Arguments;
+
+use arguments::Part;
 use serde::Serialize;
 use serde_json::{Value, json};
-use std::error::Error;
-use std::process::ExitCode;
-use wake_physics::output;
 
-fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
-}
+use crate::exit::{self, Outcome};
+use crate::progress;
 
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+/// Writes `report.json`, `simulator.md`, `spacing.md`, `model.md`, `loader.md`, `frontier.svg` and `model.svg` (log-log).
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let out = &arguments.out;
-    output::make_folder(out)?;
+    whole_files::make_folder(out)?;
     let (mut rows, mut parts) = (Vec::new(), Vec::new());
     let asked = |part| {
         let all = arguments.part == Part::All && arguments.stage.is_empty();
@@ -69,7 +50,6 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         parts.push(("spacing.md", spacing::table(&measured)));
         add(&mut rows, &measured)?;
     }
-    #[cfg(feature = "ldm")]
     if asked(Part::Model) {
         let bar = progress::bar(model::PARTS as u64, "rows of the model");
         let measured = model::measure(|| bar.inc(1))?;
@@ -79,7 +59,6 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         parts.push(("model.md", model_row::table(&measured)));
         add(&mut rows, &measured)?;
     }
-    #[cfg(feature = "dataset")]
     if asked(Part::Loader) {
         let bar = progress::bar(loader::parts(), "rows of the loader");
         let measured = loader::measure(&arguments.device, || bar.inc(1))?;
@@ -87,16 +66,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         parts.push(("loader.md", loader::table(&measured)));
         add(&mut rows, &measured)?;
     }
-    if rows.is_empty() {
-        return Err(
-            "--part model and loader need the feature flex, or another backend, and loader dataset"
-                .into(),
-        );
-    }
     let report = json!({ "rows": rows });
-    output::write_json(&out.join("report.json"), &report)?;
+    whole_files::write_json(&out.join("report.json"), &report)?;
     for (name, table) in &parts {
-        output::write_atomically(&out.join(name), table.as_bytes())?;
+        whole_files::write_atomically(&out.join(name), table.as_bytes())?;
     }
     if arguments.json {
         exit::say(&report.to_string())?;

@@ -1,13 +1,14 @@
 //! The model: steps, batch size and rounded weights against many steps from the same noise.
 
-use crate::model_row::ModelRow;
-use crate::reference::Reference;
-use crate::rounding::{Rounding, rounded};
-use crate::row::seconds;
-use burn::tensor::Device;
-use std::error::Error;
+use super::model_row::ModelRow;
+use super::reference::Reference;
+use super::rounding::{Rounding, rounded};
+use super::row::seconds;
+use wake_nn::burn::tensor::Device;
 use wake_ldm::WakeSampler;
 use wake_physics::{Field, Scene};
+
+use crate::exit::Outcome;
 
 /// Steps of the reference.
 pub(crate) const REFERENCE: usize = 100;
@@ -17,7 +18,7 @@ pub(crate) const STEPS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 const BATCHES: [usize; 2] = [4, 16];
 
 /// All rows; `done` hears of each.
-pub(crate) fn measure(done: impl Fn()) -> Result<Vec<ModelRow>, Box<dyn Error>> {
+pub(crate) fn measure(done: impl Fn()) -> Outcome<Vec<ModelRow>> {
     let sampler = WakeSampler::pretrained(&Device::default())?;
     let own = sampler.steps();
     let scenes = scenes(&sampler);
@@ -30,7 +31,7 @@ pub(crate) fn measure(done: impl Fn()) -> Result<Vec<ModelRow>, Box<dyn Error>> 
     };
     done();
     let mut rows = Vec::new();
-    let mut add = |sampler: &WakeSampler, precision, batch| -> Result<(), Box<dyn Error>> {
+    let mut add = |sampler: &WakeSampler, precision, batch| -> Outcome<()> {
         rows.push(reference.row(sampler, precision, batch)?);
         done();
         Ok(())

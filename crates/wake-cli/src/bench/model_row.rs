@@ -1,7 +1,7 @@
 //! What is told of the model: one row for each way to draw.
 
-use crate::model::{REFERENCE, STEPS};
-use crate::row::Row;
+use super::model::{REFERENCE, STEPS};
+use super::row::Row;
 use serde::Serialize;
 
 /// One way to draw images against the reference.

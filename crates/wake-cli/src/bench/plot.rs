@@ -1,9 +1,10 @@
 //! The log-log plot: seconds against error, each stage with its oracle.
 
-use crate::row::Row;
+use super::row::Row;
 use plotters::prelude::*;
-use std::error::Error;
 use std::path::Path;
+
+use crate::exit::Outcome;
 
 /// Pixels along a side of the simulator's frontier.
 pub(crate) const FRONTIER_SIZE: usize = 512;
@@ -39,7 +40,6 @@ pub(crate) const SIMULATOR: Chart = Chart {
 };
 
 /// Steps of the model.
-#[cfg(feature = "ldm")]
 pub(crate) const MODEL: Chart = Chart {
     caption: "Speed against error, 1 to 16 steps of the model, 256 x 256 pixels",
     size: 256,
@@ -49,7 +49,7 @@ pub(crate) const MODEL: Chart = Chart {
 };
 
 /// Draws rows: fast methods as joined dots, oracles as crosses of the same colour at their time.
-pub(crate) fn draw(path: &Path, plot: &Chart, rows: &[Row]) -> Result<(), Box<dyn Error>> {
+pub(crate) fn draw(path: &Path, plot: &Chart, rows: &[Row]) -> Outcome<()> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.size == plot.size).collect();
     let area = SVGBackend::new(path, (900, 620)).into_drawing_area();
     area.fill(&WHITE)?;

@@ -1,12 +1,13 @@
 //! Images that the model draws in many steps, and others of the same noise beside them.
 
-use crate::model::draw;
-use crate::model_row::ModelRow;
-use crate::row::{Errors, Row, median_seconds};
-use std::error::Error;
+use super::model::draw;
+use super::model_row::ModelRow;
+use super::row::{Errors, Row, median_seconds};
 use wake_ldm::WakeSampler;
 use wake_physics::measure::{Binning, radial_spectrum};
 use wake_physics::{Field, Scene};
+
+use crate::exit::Outcome;
 
 /// Runs of which the median counts.
 const RUNS: usize = 3;
@@ -28,7 +29,7 @@ impl Reference {
         sampler: &WakeSampler,
         precision: &'static str,
         batch: usize,
-    ) -> Result<ModelRow, Box<dyn Error>> {
+    ) -> Outcome<ModelRow> {
         let (seconds, images) = median_seconds(RUNS, || draw(sampler, &self.scenes, batch));
         let images = images?;
         let seconds = seconds / images.len() as f64;

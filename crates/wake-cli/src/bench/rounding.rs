@@ -1,11 +1,12 @@
 //! The model in the crate with its weights rounded further.
 
-use burn::tensor::{Device, bf16, f16};
+use wake_nn::burn::tensor::{Device, bf16, f16};
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
-use std::error::Error;
 use std::path::Path;
 use wake_ldm::WakeSampler;
+
+use crate::exit::Outcome;
 
 /// Coarser weights than the 16 bits (10 of them for the fraction) of the file.
 #[derive(Debug, Clone, Copy)]
@@ -50,8 +51,8 @@ fn to_8_bits(row: &mut [f32]) {
 }
 
 /// The model in the crate with rounded weights; it computes in f32 all the same.
-pub(crate) fn rounded(rounding: Rounding) -> Result<WakeSampler, Box<dyn Error>> {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/wake-ldm/assets");
+pub(crate) fn rounded(rounding: Rounding) -> Outcome<WakeSampler> {
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../wake-ldm/assets");
     let folder = tempfile::tempdir()?;
     for entry in std::fs::read_dir(assets)? {
         let from = entry?.path();
@@ -69,7 +70,7 @@ pub(crate) fn rounded(rounding: Rounding) -> Result<WakeSampler, Box<dyn Error>>
 }
 
 /// A weight file with its numbers rounded, as f32; what is no floating-point number stays.
-fn round_file(rounding: Rounding, bytes: &[u8]) -> Result<Vec<u8>, Box<dyn Error>> {
+fn round_file(rounding: Rounding, bytes: &[u8]) -> Outcome<Vec<u8>> {
     let file = SafeTensors::deserialize(bytes)?;
     let mut tensors = Vec::new();
     for (name, view) in file.iter() {

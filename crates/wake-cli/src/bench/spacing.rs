@@ -1,6 +1,6 @@
 //! The spacing computed on: error and seconds of one image on finer and finer pixels, and the order of convergence.
 
-use crate::row::median_seconds;
+use super::row::median_seconds;
 use serde::Serialize;
 use wake_physics::{Field, Result, Scene, Simulator};
 

@@ -1,8 +1,9 @@
 //! The simulator's stages over sizes and tolerances.
 
-use crate::row::{Row, instruction_set};
-use crate::stages::{self, Memo, STAGES, has_tolerance};
-use crate::{plot, progress};
+use super::row::{Row, instruction_set};
+use super::stages::{self, Memo, STAGES, has_tolerance};
+use super::plot;
+use crate::progress;
 use std::cmp::Ordering;
 
 /// Sizes of the sweep at the default tolerance.

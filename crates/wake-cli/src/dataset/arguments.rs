@@ -1,12 +1,11 @@
 //! What is asked for on the command line.
 
-use clap::Parser;
+use clap::Args;
 use std::path::PathBuf;
-use wake_ldm::dataset::Shard;
+use wake_dataset::Shard;
 
 /// Simulate a labelled data set of ship wakes.
-#[derive(Parser)]
-#[command(version)]
+#[derive(Args)]
 pub(crate) struct Arguments {
     /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), detector (what satellites
     /// deliver), or a TOML file
@@ -24,20 +23,21 @@ pub(crate) struct Arguments {
     /// Share of the images that are for validation, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     pub(crate) val_share: f64,
-    /// Draw the scenes on a sea learnt from real images: a file that `train -- sea` wrote
-    #[arg(long, value_name = "FILE")]
+    /// Draw the scenes on a sea learnt from real images: a file that `wake train sea` wrote
+    #[cfg(feature = "generate")]
+    #[arg(long, value_name = "FILE", conflicts_with = "merge")]
     pub(crate) sea: Option<PathBuf>,
     /// Make only share i of n, into the folder shard-i
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<Shard>,
     /// Join the shards made before
-    #[arg(long, conflicts_with_all = ["shard", "count", "set", "sea"])]
+    #[arg(long, conflicts_with_all = ["shard", "count", "set"])]
     pub(crate) merge: bool,
     /// Images made at the same time [default: one for each core]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) jobs: Option<u16>,
     /// Folder of the set, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/make_dataset")]
+    #[arg(long, value_name = "DIR", default_value = "out/dataset")]
     pub(crate) out: PathBuf,
     /// Print a report as JSON on standard output, and nothing else
     #[arg(long)]

@@ -1,45 +1,26 @@
-//! Simulated images with prompts and labels, as a folder that training scripts read.
-//!
-//! ```text
-//! cargo run --release --example make_dataset
-//! cargo run --release --example make_dataset -- --grid paper --out out/paper
-//! cargo run --release --example make_dataset -- --grid detector --count 100000 --shard 3/16
-//! cargo run --release --example make_dataset -- --sea out/sea/sea.safetensors
-//! cargo run --release --example make_dataset -- --merge
-//! ```
-//!
-//! Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (the same with oriented boxes), `labelTxt/*.txt` (DOTA),
-//! `metadata.jsonl`, `coco.json`, `data.yaml` with `trainset.txt` and `valset.txt`, and `dataset.json`; see docs/dataset.md. A run that was killed continues where it stopped.
+//! `wake dataset`: simulated images with prompts and labels, as a folder that training scripts read.
 
-#[path = "make_dataset/arguments.rs"]
 mod arguments;
-#[path = "common/exit.rs"]
-mod exit;
-#[path = "common/progress.rs"]
-mod progress;
 
-use arguments::Arguments;
-use clap::Parser;
+pub(crate) use arguments::Arguments;
+
 use serde_json::json;
-use std::error::Error;
 use std::path::Path;
-use std::process::ExitCode;
 use std::time::Instant;
-use wake_ldm::burn::tensor::Device;
-use wake_ldm::dataset::{
+use wake_dataset::{
     Manifest, PAPER_SCENES, Progress, Recipe, Simulated, merge, shard_folder, write,
 };
-use wake_ldm::fingerprint;
-use wake_ldm::sea_texture::SeaTexture;
 
-fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
-}
+use crate::exit::{self, Outcome};
+use crate::progress;
 
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+/// Writes `images/*.png`, `labels/*.txt` (YOLO), `labels-obb/*.txt` (the same with oriented boxes), `labelTxt/*.txt` (DOTA),
+/// `metadata.jsonl`, `coco.json`, `data.yaml` with `trainset.txt` and `valset.txt`, and `dataset.json`; see docs/dataset.md.
+/// A run that was killed continues where it stopped.
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let start = Instant::now();
     let (folder, manifest, made) = if arguments.merge {
-        (arguments.out.clone(), merge(&arguments.out)?, 0)
+        (arguments.out.clone(), joined(&arguments.out)?, 0)
     } else {
         let manifest = manifest(arguments)?;
         let folder = match manifest.shard {
@@ -71,7 +52,17 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
+/// Joins the shards of a folder.
+fn joined(folder: &Path) -> Outcome<Manifest> {
+    merge(folder).map_err(|error| match error {
+        wake_dataset::Error::Dataset { .. } => {
+            format!("{error}; `wake dataset --shard I/N` makes share I of N").into()
+        }
+        error => error.into(),
+    })
+}
+
+fn manifest(arguments: &Arguments) -> Outcome<Manifest> {
     let default_count = match arguments.grid.as_str() {
         "paper" => PAPER_SCENES,
         _ => 100,
@@ -80,27 +71,46 @@ fn manifest(arguments: &Arguments) -> Result<Manifest, Box<dyn Error>> {
     let recipe = Recipe::named_or_read(&arguments.grid);
     let recipe = recipe.map_err(|error| format!("--grid: {error}"))?;
     let recipe = recipe.with_assignments(&arguments.set)?;
+    #[cfg(feature = "generate")]
+    let sea = arguments
+        .sea
+        .as_deref()
+        .map(whole_files::fingerprint)
+        .transpose()?;
+    #[cfg(not(feature = "generate"))]
+    let sea = None;
     Ok(Manifest {
         shard: arguments.shard,
-        sea: arguments.sea.as_deref().map(fingerprint).transpose()?,
+        sea,
         ..Manifest::new(recipe, arguments.seed, count)?.with_val_share(arguments.val_share)?
     })
 }
 
 /// The pairs of a set, on the learnt sea that is asked for.
-fn source(manifest: &Manifest, arguments: &Arguments) -> wake_ldm::Result<Simulated> {
+#[cfg(feature = "generate")]
+fn source(manifest: &Manifest, arguments: &Arguments) -> Outcome<Simulated> {
     let source = manifest.source()?;
     match &arguments.sea {
-        Some(path) => source.with_sea(SeaTexture::load(path, &Device::default())?),
         None => Ok(source),
+        Some(path) => {
+            let device = wake_nn::burn::tensor::Device::default();
+            let sea = wake_ldm::sea_texture::SeaTexture::load(path, &device)?;
+            Ok(source.with_sea(sea)?)
+        }
     }
+}
+
+/// The pairs of a set.
+#[cfg(not(feature = "generate"))]
+fn source(manifest: &Manifest, _: &Arguments) -> Outcome<Simulated> {
+    Ok(manifest.source()?)
 }
 
 /// Seconds of a core above which what a set costs is said first.
 const LONG: f64 = 600.0;
 
 /// Says what a large set costs, by the plans of its first scenes.
-fn tell_cost(manifest: &Manifest) -> wake_ldm::Result<()> {
+fn tell_cost(manifest: &Manifest) -> wake_dataset::Result<()> {
     let (each, indices) = (manifest.core_seconds()?, manifest.indices());
     let total = each * (indices.end - indices.start) as f64;
     if total > LONG {
@@ -118,7 +128,7 @@ fn make(
     manifest: &Manifest,
     source: &Simulated,
     arguments: &Arguments,
-) -> wake_ldm::Result<u64> {
+) -> wake_dataset::Result<u64> {
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = arguments.jobs.map_or_else(cores, usize::from);
     let bar = progress::bar(0, "images");

@@ -3,23 +3,26 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use wake_ldm::dataset::{Recipe, Simulated};
-use wake_ldm::device_named;
-use wake_ldm::evaluation::{Baseline, ImageSource, Views, other_sea};
-use wake_physics::{Scene, output};
+use wake_dataset::{Recipe, Simulated};
+use wake_nn::device_named;
+use wake_train::evaluation::{Baseline, ImageSource, Views, other_sea};
+use wake_physics::Scene;
 
-use crate::domain_report::{Report, markdown, sheet};
-use crate::{Result, exit, model, progress};
+use super::domain_report::{Report, markdown, sheet};
+use super::model;
+use crate::exit::{self, Outcome};
+use crate::progress;
 
 /// Seed of the scenes: no training set has it.
 const SEED: u64 = 1 << 40;
 
+/// Compare the model with the simulator over all scenes of a recipe.
 #[derive(Args)]
 pub(crate) struct Options {
     /// paper, ranges, detector or model, or a recipe file: the scenes
     #[arg(long, default_value = "detector")]
     recipe: String,
-    /// Folder of a small model that `train` wrote; without it, the model in the crate
+    /// Folder of a small model that `wake train` wrote; without it, the model in the crate
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
     /// Steps from noise to image; without it, the sampler's own number
@@ -39,7 +42,7 @@ pub(crate) struct Options {
     json: bool,
 }
 
-pub(crate) fn run(options: &Options) -> Result<()> {
+pub(crate) fn run(options: &Options) -> Outcome<()> {
     let device = device_named(&options.device)?;
     let sampler = model::load(options.weights.as_deref(), options.steps, &device)?;
     let recipe = Recipe::named_or_read(&options.recipe)?;
@@ -49,7 +52,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     scenes
         .iter()
         .try_for_each(|scene| sampler.check_scene(scene))?;
-    output::make_folder(&options.out)?;
+    whole_files::make_folder(&options.out)?;
     let baseline = |of: &'static Baseline| (of.name(), of as &dyn ImageSource);
     let kinds: [(&'static str, &dyn ImageSource); 4] = [
         baseline(&Baseline::Expected),
@@ -76,8 +79,8 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         rows,
     };
     let text = markdown(&report);
-    output::write_json(&options.out.join("domain.json"), &report)?;
-    output::write_atomically(&options.out.join("domain.md"), text.as_bytes())?;
+    whole_files::write_json(&options.out.join("domain.json"), &report)?;
+    whole_files::write_atomically(&options.out.join("domain.md"), text.as_bytes())?;
     if let Some(pictures) = pictures {
         pictures.write(&options.out.join("domain.png"))?;
     }

@@ -1,8 +1,8 @@
 //! The report over a recipe: text, and a sheet of images.
 
 use serde::Serialize;
-use wake_ldm::evaluation::{DomainRow, Views};
-use wake_ldm::train::TwoSample;
+use wake_train::evaluation::{DomainRow, Views};
+use wake_train::TwoSample;
 use wake_physics::picture::Picture;
 
 /// Scenes that are shown, each simulated and drawn by the model.

@@ -1,17 +1,17 @@
 //! The order of the figures: what is drawn, and what is counted on it.
 
-use crate::Result;
-use crate::report::{ConditionRow, PAPER, Report, Speckle};
-use crate::rungs::kinds;
-use crate::scenes::held_out;
-use crate::timing::timings;
-use burn::tensor::Device;
+use crate::exit::Outcome;
+use super::report::{ConditionRow, PAPER, Report, Speckle};
+use super::rungs::kinds;
+use super::scenes::held_out;
+use super::timing::timings;
+use wake_nn::burn::tensor::Device;
 use indicatif::ProgressBar;
-use wake_ldm::evaluation::{
+use wake_train::evaluation::{
     BATCH, Comparison, ImageSource, MeasurementRow, Quantity, Reading, SwapRow, Told, rungs, swaps,
     wake_correlation,
 };
-use wake_ldm::metrics::Lpips;
+use wake_train::metrics::Lpips;
 use wake_physics::Scene;
 
 /// First index of the scenes whose values are changed: apart from those of the other figures.
@@ -63,7 +63,7 @@ pub(crate) fn judge(
     lpips: Option<&Lpips>,
     device: &Device,
     bar: &ProgressBar,
-) -> Result<Report> {
+) -> Outcome<Report> {
     let scenes: Vec<Scene> = (0..plan.scenes as u64).map(held_out).collect();
     bar.set_message("pixels and values");
     let mut compared = Comparison::default();
@@ -113,7 +113,7 @@ fn conditions(
     judged: &Judged<'_>,
     compared: &Comparison,
     bar: &ProgressBar,
-) -> Result<Vec<ConditionRow>> {
+) -> Outcome<Vec<ConditionRow>> {
     let simulated = &compared.simulated[..scenes.len()];
     let row = |told: Told, generated: &[Reading]| ConditionRow {
         told: told.name(),
@@ -128,7 +128,7 @@ fn conditions(
 }
 
 /// Pairs of scenes of which one value is changed.
-fn swapped(pairs: usize, judged: &Judged<'_>, bar: &ProgressBar) -> Result<Vec<SwapRow>> {
+fn swapped(pairs: usize, judged: &Judged<'_>, bar: &ProgressBar) -> Outcome<Vec<SwapRow>> {
     let told = [&[Told::Both][..], &judged.conditions].concat();
     let mut rows = Vec::new();
     for quantity in Quantity::ALL {

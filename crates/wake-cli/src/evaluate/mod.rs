@@ -1,64 +1,46 @@
-//! How good are generated images? Every figure beside the simulator's own, on scenes that no training set holds.
-//!
-//! ```text
-//! cargo run --release --example evaluate
-//! cargo run --release --example evaluate -- --simulator-only
-//! cargo run --release --example evaluate -- domain --recipe detector
-//! cargo run --release --example evaluate -- sea --real chips --weights out/sea/sea.safetensors
-//! ```
-//!
-//! Writes `report.json`, `report.md`, `spectrum.svg` and `wake_correlation.svg`. `docs/evaluation.md` says what each
-//! figure means. `domain` judges the model over a recipe and writes `domain.json`, `domain.md` and `domain.png`. `sea` sets a
-//! learnt sea beside real images instead, and writes `report.json`, `report.md` and `learned_sea.png`.
+//! `wake evaluate`: every figure beside the simulator's own, on scenes that no training set holds.
 
-#[path = "../common/exit.rs"]
-mod exit;
+mod detector;
 mod domain;
 mod domain_report;
 mod judge;
 mod model;
 mod options;
 mod plot;
-#[path = "../common/progress.rs"]
-mod progress;
 mod report;
 mod rungs;
 mod scenes;
 mod sea;
-#[path = "../common/sea_images.rs"]
-mod sea_images;
 mod sea_report;
 mod text_to_image;
 mod timing;
 
-use clap::Parser;
+pub(crate) use options::Arguments;
+
 use indicatif::{ProgressBar, ProgressStyle};
 use judge::{Judged, Plan, judge};
-use options::{Arguments, Task};
-use std::process::ExitCode;
+use options::Task;
 use text_to_image::TextToImage;
-use wake_ldm::device_named;
-use wake_ldm::evaluation::{Baseline, ImageSource, Told};
-use wake_physics::output;
+use wake_nn::device_named;
+use wake_train::evaluation::{Baseline, ImageSource, Told};
 
-/// Result of what may fail in this example.
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+use crate::exit::{self, Outcome};
 
 /// The held-out scene that is shown on every rung.
 const PICTURED: u64 = 2;
 
-fn main() -> ExitCode {
-    exit::code(|| {
-        let arguments = Arguments::parse();
-        match &arguments.task {
-            Some(Task::Domain(options)) => domain::run(options),
-            Some(Task::Sea(options)) => sea::run(options),
-            None => run(&arguments),
-        }
-    })
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
+    match &arguments.task {
+        None => models(arguments),
+        Some(Task::Domain(options)) => domain::run(options),
+        Some(Task::Sea(options)) => sea::run(options),
+        Some(Task::Detector(options)) => detector::run(options),
+    }
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
+/// Writes `report.json`, `report.md`, `rungs.png`, `spectrum.svg` and `wake_correlation.svg`; `docs/evaluation.md` says what
+/// each figure means.
+fn models(arguments: &Arguments) -> Outcome<()> {
     let device = device_named(&arguments.device)?;
     let lpips = arguments.lpips(&device)?;
     let model = match arguments.simulator_only {
@@ -73,7 +55,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let text_to_image = text_to_image.transpose()?;
     let beside = text_to_image.as_ref().map(|s| s as &dyn ImageSource);
     // What cannot be read leaves no folder behind.
-    output::make_folder(&arguments.out)?;
+    whole_files::make_folder(&arguments.out)?;
     let judged = match &model {
         Some(model) => Judged {
             source: model,
@@ -98,8 +80,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     let report = judge(&plan, &judged, lpips.as_ref(), &device, &bar)?;
     bar.finish_and_clear();
     let text = report::markdown(&report);
-    output::write_json(&arguments.out.join("report.json"), &report)?;
-    output::write_atomically(&arguments.out.join("report.md"), text.as_bytes())?;
+    whole_files::write_json(&arguments.out.join("report.json"), &report)?;
+    whole_files::write_atomically(&arguments.out.join("report.md"), text.as_bytes())?;
     rungs::picture(&scenes::held_out(PICTURED), &judged)?
         .write(&arguments.out.join("rungs.png"))?;
     plot::spectrum(&arguments.out.join("spectrum.svg"), &report)?;

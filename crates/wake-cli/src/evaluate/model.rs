@@ -1,7 +1,7 @@
 //! The wake model that is judged.
 
-use crate::Result;
-use burn::tensor::Device;
+use crate::exit::Outcome;
+use wake_nn::burn::tensor::Device;
 use std::path::Path;
 use wake_ldm::WakeSampler;
 
@@ -10,7 +10,7 @@ pub(crate) fn load(
     folder: Option<&Path>,
     steps: Option<usize>,
     device: &Device,
-) -> Result<WakeSampler> {
+) -> Outcome<WakeSampler> {
     let sampler = match folder {
         Some(folder) => WakeSampler::from_folder(folder, device)?,
         None => WakeSampler::pretrained(device)?,

@@ -1,27 +1,28 @@
 //! The command line, and what it names.
 
-use crate::{Result, domain, sea};
-use burn::tensor::Device;
-use clap::{Parser, Subcommand};
+use super::{detector, domain, sea};
+use crate::exit::Outcome;
+use wake_nn::burn::tensor::Device;
+use clap::{Args, Subcommand};
 use std::path::PathBuf;
-use wake_ldm::metrics::{Lpips, LpipsNetwork};
+use wake_train::metrics::{Lpips, LpipsNetwork};
 
-/// Judge generated images against the simulator.
-#[derive(Parser)]
-#[command(version, args_conflicts_with_subcommands = true)]
+/// Evaluate the models against the simulator.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) task: Option<Task>,
     /// Judge the simulator itself, with another random sea, in the place of a model: what a perfect model would get
     #[arg(long)]
     pub(crate) simulator_only: bool,
-    /// Folder of a small model that `train` wrote; without it, the model in the crate
+    /// Folder of a small model that `wake train` wrote; without it, the model in the crate
     #[arg(long, value_name = "DIR", conflicts_with = "simulator_only")]
     pub(crate) weights: Option<PathBuf>,
     /// Steps from noise to image; without it, the sampler's own number
     #[arg(long, conflicts_with = "simulator_only")]
     pub(crate) steps: Option<usize>,
-    /// Folder of a model that `train -- text-to-image` wrote, to stand beside the model
+    /// Folder of a model that `wake train text-to-image` wrote, to stand beside the model
     #[arg(long, value_name = "DIR")]
     pub(crate) text_to_image: Option<PathBuf>,
     /// Held-out scenes
@@ -46,15 +47,14 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 pub(crate) enum Task {
-    /// Judge the model over all scenes of a recipe
     Domain(domain::Options),
-    /// Judge a sea that was learnt from real images against their other halves
     Sea(sea::Options),
+    Detector(detector::Options),
 }
 
 impl Arguments {
     /// The networks of LPIPS, where they are named.
-    pub(crate) fn lpips(&self, device: &Device) -> Result<Option<Lpips>> {
+    pub(crate) fn lpips(&self, device: &Device) -> Outcome<Option<Lpips>> {
         let (Some(backbone), Some(linear)) = (&self.lpips_backbone, &self.lpips_linear) else {
             return Ok(None);
         };

@@ -1,7 +1,7 @@
 //! The plots: radial spectra against the simulator's, and wake correlation scene by scene.
 
-use crate::Result;
-use crate::report::Report;
+use crate::exit::Outcome;
+use super::report::Report;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -12,7 +12,7 @@ const COLOURS: [RGBColor; 3] = [
 ];
 
 /// Power of each ring less that of the reference [dB].
-pub(crate) fn spectrum(path: &Path, report: &Report) -> Result<()> {
+pub(crate) fn spectrum(path: &Path, report: &Report) -> Outcome<()> {
     let area = SVGBackend::new(path, (900, 560)).into_drawing_area();
     area.fill(&WHITE)?;
     let rings = report.pixels[0].spectrum_curve_db.len();
@@ -43,7 +43,7 @@ pub(crate) fn spectrum(path: &Path, report: &Report) -> Result<()> {
 }
 
 /// Wake correlation of model and simulator, a dot a scene.
-pub(crate) fn wake(path: &Path, report: &Report) -> Result<()> {
+pub(crate) fn wake(path: &Path, report: &Report) -> Outcome<()> {
     let area = SVGBackend::new(path, (620, 600)).into_drawing_area();
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&area)
@@ -80,7 +80,7 @@ type Chart<'a> = ChartContext<
     Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
 >;
 
-fn legend(chart: &mut Chart<'_>) -> Result<()> {
+fn legend(chart: &mut Chart<'_>) -> Outcome<()> {
     chart
         .configure_series_labels()
         .background_style(WHITE.mix(0.8))

@@ -1,8 +1,8 @@
 //! The rungs, from the dumbest image to the simulator's, and a picture of one scene on all of them.
 
-use crate::Result;
-use crate::judge::Judged;
-use wake_ldm::evaluation::{Baseline, ImageSource, Told, grey};
+use crate::exit::Outcome;
+use super::judge::Judged;
+use wake_train::evaluation::{Baseline, ImageSource, Told, grey};
 use wake_physics::picture::Picture;
 use wake_physics::{Field, Scene};
 
@@ -28,8 +28,8 @@ pub(crate) fn kinds<'a>(judged: &Judged<'a>) -> Vec<(&'static str, &'a dyn Image
 }
 
 /// One scene on every rung, in one stretch of grey: three standard deviations of the simulator's image to each side of its mean.
-pub(crate) fn picture(scene: &Scene, judged: &Judged<'_>) -> Result<Picture> {
-    let draw = |source: &dyn ImageSource| -> Result<Field> {
+pub(crate) fn picture(scene: &Scene, judged: &Judged<'_>) -> Outcome<Picture> {
+    let draw = |source: &dyn ImageSource| -> Outcome<Field> {
         let images = source.draw(std::slice::from_ref(scene), Told::Both)?;
         Ok(grey(&images[0]))
     };

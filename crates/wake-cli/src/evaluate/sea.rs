@@ -4,27 +4,30 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
-use wake_ldm::device_named;
-use wake_ldm::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
+use wake_nn::device_named;
+use wake_train::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
 use wake_ldm::sea_texture::{PATCH, SeaTexture};
-use wake_ldm::train::{TwoSampleOptions, two_sample};
+use wake_train::{TwoSampleOptions, two_sample};
 use wake_physics::picture::Picture;
-use wake_physics::{Field, output};
+use wake_physics::Field;
 
+use super::sea_report;
+use crate::exit::{self, Outcome};
+use crate::progress;
 use crate::sea_images::{Half, list};
-use crate::{Result, exit, progress, sea_report};
 
 /// First seed of what is drawn: no training has it.
 const SEED: u64 = 1 << 40;
 /// Styles that are shown.
 const SHOWN: usize = 4;
 
+/// Compare a sea learnt from real images with their other halves.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of real images, and `NAME_mask.png` of what does not count
     #[arg(long, value_name = "DIR")]
     real: PathBuf,
-    /// A sea that `train -- sea --half left` learnt from the left halves of these images
+    /// A sea that `wake train sea --half left` learnt from the left halves of these images
     #[arg(long, value_name = "FILE")]
     weights: PathBuf,
     /// Windows of open sea of each half of an image, at most
@@ -51,7 +54,7 @@ pub(crate) struct SeaReport {
     pub(crate) rows: Vec<SeaRow>,
 }
 
-pub(crate) fn run(options: &Options) -> Result<()> {
+pub(crate) fn run(options: &Options) -> Outcome<()> {
     let device = device_named(&options.device)?;
     let learnt = SeaTexture::load(&options.weights, &device)?;
     let files = list(&options.real)?;
@@ -73,7 +76,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         .into());
     }
     // What cannot be read leaves no folder behind.
-    output::make_folder(&options.out)?;
+    whole_files::make_folder(&options.out)?;
     let kinds = kinds(&pairs, &learnt, SEED)?;
     let bar = progress::bar(kinds.len() as u64, "kinds of sea");
     let right: Vec<Field> = pairs.iter().map(|pair| pair.right.clone()).collect();
@@ -91,8 +94,8 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         rows,
     };
     let text = sea_report::markdown(&report);
-    output::write_json(&options.out.join("report.json"), &report)?;
-    output::write_atomically(&options.out.join("report.md"), text.as_bytes())?;
+    whole_files::write_json(&options.out.join("report.json"), &report)?;
+    whole_files::write_atomically(&options.out.join("report.md"), text.as_bytes())?;
     picture(&learnt, &options.out.join("learned_sea.png"))?;
     match options.json {
         true => exit::say(&serde_json::to_string_pretty(&report)?)?,
@@ -102,7 +105,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
 }
 
 /// Seas of the first styles: Gaussian noise above, below it what the flow makes of the same noise.
-fn picture(learnt: &SeaTexture, path: &Path) -> Result<()> {
+fn picture(learnt: &SeaTexture, path: &Path) -> Outcome<()> {
     let step = learnt.styles().len() / SHOWN;
     let show = |field: &Field, caption: &str| {
         let level = |&a: &f32| (90.0 * a).round().clamp(0.0, 255.0) as u8;

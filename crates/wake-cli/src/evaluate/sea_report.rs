@@ -1,16 +1,16 @@
 //! The report of seas as text.
 
-use crate::sea::SeaReport;
-use wake_ldm::evaluation::sea::SeaRow;
-use wake_ldm::train::TwoSample;
+use super::sea::SeaReport;
+use wake_train::evaluation::sea::SeaRow;
+use wake_train::TwoSample;
 
 /// The report in Markdown.
 pub(crate) fn markdown(report: &SeaReport) -> String {
     let mut text = format!(
-        "<!-- Written by: cargo run --release --example evaluate -- sea --real DIR --weights FILE -->\n\n\
+        "<!-- Written by: wake evaluate sea --real DIR --weights FILE -->\n\n\
          # A sea learnt from real images\n\n{}\n\n\
          {} windows of 128 x 128 pixels of open sea of the right halves of {} real images stand against as many of each kind. \
-         Learnt was from the left halves alone (`train -- sea --half left`), without labels. All kinds are levels of 8 bits; \
+         Learnt was from the left halves alone (`wake train sea --half left`), without labels. All kinds are levels of 8 bits; \
          what is drawn like a left window has its median.\n\n\
          ![Gaussian noise of four styles, and below it what the flow makes of the same noise](learned_sea.png)\n\n\
          Four styles: above, Gaussian noise with their correlations; below, what the flow makes of the same noise.\n\n\
@@ -36,7 +36,7 @@ pub(crate) fn markdown(report: &SeaReport) -> String {
         and correlations of one left window each, 32 pixels far; the learnt sea told the same windows starts from that very noise. \
         With its own styles the learnt sea shows those of patches that chance takes from its file, so images and sensors come in \
         other shares than among the windows, which is seen too. Intervals are those of the windows: how the judge's own training \
-        turns out is not in them. Windows of both halves leave out what `train -- sea` leaves out; wakes that nobody masked are in \
+        turns out is not in them. Windows of both halves leave out what `wake train sea` leaves out; wakes that nobody masked are in \
         both.\n"
 }
 

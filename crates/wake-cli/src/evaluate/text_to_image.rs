@@ -1,10 +1,10 @@
 //! A model of images and prompts alone as a source of images: the paper's own way.
 
-use crate::Result;
-use crate::scenes::SIZE;
-use burn::tensor::Device;
+use crate::exit::Outcome;
+use super::scenes::SIZE;
+use wake_nn::burn::tensor::Device;
 use std::path::Path;
-use wake_ldm::evaluation::{ImageSource, Told};
+use wake_train::evaluation::{ImageSource, Told};
 use wake_ldm::pipeline::{Pipeline, Request};
 use wake_physics::grey::GreyScale;
 use wake_physics::{Field, Scene};
@@ -19,7 +19,7 @@ pub(crate) struct TextToImage(Pipeline);
 
 impl TextToImage {
     /// The model of a folder.
-    pub(crate) fn load(folder: &Path, device: &Device) -> Result<Self> {
+    pub(crate) fn load(folder: &Path, device: &Device) -> Outcome<Self> {
         let pipeline = Pipeline::load(folder, device)?;
         let [rows, columns] = pipeline.image_size();
         if [rows, columns] != [SIZE, SIZE] {

@@ -1,12 +1,12 @@
 //! Seconds per image: the model, the simulator's fast methods, and its harmonic sum.
 
-use crate::Result;
-use crate::scenes::{SIZE, held_out, ship};
+use crate::exit::Outcome;
+use super::scenes::{SIZE, held_out, ship};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 use std::time::Instant;
-use wake_ldm::evaluation::{ImageSource, Told};
+use wake_train::evaluation::{ImageSource, Told};
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::KelvinWake;
 use wake_physics::scene::{SpectrumModel, SpreadingModel};
@@ -52,7 +52,7 @@ pub(crate) struct TimingRow {
 pub(crate) fn timings(
     model: &dyn ImageSource,
     text_to_image: Option<&dyn ImageSource>,
-) -> Result<Vec<TimingRow>> {
+) -> Outcome<Vec<TimingRow>> {
     SIZES
         .into_iter()
         .map(|size| {
@@ -83,7 +83,7 @@ pub(crate) fn timings(
 }
 
 /// Median seconds of some runs after one that does not count.
-fn median(mut run: impl FnMut() -> Result<()>) -> Result<f64> {
+fn median(mut run: impl FnMut() -> Outcome<()>) -> Outcome<f64> {
     run()?;
     let mut seconds = Vec::new();
     for _ in 0..RUNS {

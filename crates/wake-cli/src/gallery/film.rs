@@ -1,8 +1,8 @@
 //! Twenty seconds of a wake: the water beside its radar image.
 
-use crate::stages::signed;
+use super::stages::signed;
+use crate::exit::Outcome;
 use gif::{Encoder, EncodingError, Frame, Repeat};
-use std::error::Error;
 use wake_physics::picture::Picture;
 use wake_physics::{Field, Result, Scene, Simulator};
 
@@ -16,7 +16,7 @@ const SIDE: usize = 176;
 const LEVELS: u8 = 8;
 
 /// The film as a GIF.
-pub(crate) fn film() -> std::result::Result<Vec<u8>, Box<dyn Error>> {
+pub(crate) fn film() -> Outcome<Vec<u8>> {
     let mut simulator = Simulator::default();
     let frames: Result<Vec<Picture>> = (0..FRAMES)
         .map(|n| frame(&mut simulator, f64::from(n) * STEP))

@@ -1,33 +1,24 @@
-//! The pictures of the documentation: the gallery, the stages from hull to image, and twenty seconds of a wake.
-//!
-//! ```text
-//! cargo run --release --example gallery
-//! ```
-//!
-//! Writes `gallery.png`, `stages.png` and `wake.gif`.
+//! `wake gallery`: the pictures of the documentation: the gallery, the stages from hull to image, and twenty seconds of a wake.
 
-#[path = "../common/exit.rs"]
-mod exit;
 mod film;
-#[path = "../common/progress.rs"]
-mod progress;
 mod stages;
 
-use clap::Parser;
-use std::error::Error;
+use clap::Args;
 use std::path::PathBuf;
-use std::process::ExitCode;
 use wake_detector::drawing::Drawing;
 use wake_detector::{Detector, GreyImage};
-use wake_ldm::{WakeSampler, device_named};
+use wake_ldm::WakeSampler;
+use wake_nn::device_named;
 use wake_physics::grey::GreyScale;
 use wake_physics::picture::Picture;
-use wake_physics::{Field, Scene, Simulation, output, simulate};
+use wake_physics::{Field, Scene, Simulation, simulate};
+
+use crate::exit::{self, Outcome};
+use crate::progress;
 
 /// Draw the pictures of the documentation.
-#[derive(Parser)]
-#[command(version)]
-struct Arguments {
+#[derive(Args)]
+pub(crate) struct Arguments {
     /// Folder of the pictures, made if absent
     #[arg(long, value_name = "DIR", default_value = "docs/images")]
     out: PathBuf,
@@ -67,19 +58,16 @@ const SCENES: [(&str, &[&str], &str); 4] = [
     ),
 ];
 
-fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
-}
-
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    output::make_folder(&arguments.out)?;
+/// Writes `gallery.png`, `stages.png` and `wake.gif`.
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
+    whole_files::make_folder(&arguments.out)?;
     let bar = progress::bar(3, "pictures");
     let out = |name: &str| arguments.out.join(name);
     gallery()?.write(&out("gallery.png"))?;
     bar.inc(1);
     stages::sheet()?.write(&out("stages.png"))?;
     bar.inc(1);
-    output::write_atomically(&out("wake.gif"), &film::film()?)?;
+    whole_files::write_atomically(&out("wake.gif"), &film::film()?)?;
     bar.finish_and_clear();
     Ok(exit::say(&format!(
         "written to {}",
@@ -87,7 +75,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     ))?)
 }
 
-fn gallery() -> Result<Picture, Box<dyn Error>> {
+fn gallery() -> Outcome<Picture> {
     let size = [format!("grid.rows={SIDE}"), format!("grid.columns={SIDE}")];
     let mut pictures = Vec::new();
     for (file, changes, caption) in SCENES {
@@ -123,7 +111,7 @@ fn filling(field: &Field) -> Vec<u8> {
 }
 
 /// What the detector finds in a simulated image.
-fn found() -> Result<Picture, Box<dyn Error>> {
+fn found() -> Outcome<Picture> {
     let scene = Scene::default().with_assignments(&[
         "grid.rows=256",
         "grid.columns=256",

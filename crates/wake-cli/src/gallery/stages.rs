@@ -1,6 +1,6 @@
 //! The stages from hull to image, a panel each.
 
-use crate::filling;
+use super::filling;
 use wake_physics::picture::Picture;
 use wake_physics::{Field, Result, Scene, simulate};
 

@@ -1,26 +1,27 @@
 //! A model in the layout of diffusers, such as Stable Diffusion v1.4.
 
-use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use burn::tensor::Tensor;
+use wake_nn::burn::tensor::Tensor;
 use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
 use serde_json::{Value, json};
-use wake_ldm::device_named;
 use wake_ldm::pipeline::{Pipeline, Request, to_bytes};
 use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
-use wake_physics::{Scene, output};
+use wake_nn::device_named;
+use wake_physics::Scene;
 
-use super::{Arguments, finish, numbered, progress, prompt, scene};
+use super::{Arguments, finish, numbered, prompt, scene};
+use crate::exit::Outcome;
+use crate::progress;
 
 /// Steps, unless others are asked for.
 const STEPS: usize = 50;
 /// Guidance, unless another is asked for.
 const GUIDANCE: f64 = 7.5;
 
-pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Result<(), Box<dyn Error>> {
+pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Outcome<()> {
     let scene = scene(arguments, Scene::default)?;
     let prompt = prompt(arguments, scene.as_ref())?;
     let device = device_named(&arguments.device)?;
@@ -85,7 +86,7 @@ fn generate(
     request: &Request,
     arguments: &Arguments,
     prompt: &str,
-) -> Result<(Tensor<4>, Value), Box<dyn Error>> {
+) -> Outcome<(Tensor<4>, Value)> {
     let begin = Instant::now();
     // Embeddings are remembered, so the run finds them ready.
     pipeline.embed(&[prompt, negative(arguments)]);
@@ -94,7 +95,7 @@ fn generate(
     let begin = Instant::now();
     let mut sampling = pipeline.sample(request)?;
     // A request that is refused leaves no folder behind.
-    output::make_folder(&arguments.out)?;
+    whole_files::make_folder(&arguments.out)?;
     let bar = progress::bar(sampling.len() as u64, "steps");
     for progress in sampling.by_ref() {
         bar.set_position(progress.done as u64);
@@ -116,7 +117,7 @@ fn generate(
 }
 
 /// Writes one PNG per image and returns their names.
-fn write_images(images: Tensor<4>, out: &Path) -> Result<Vec<String>, Box<dyn Error>> {
+fn write_images(images: Tensor<4>, out: &Path) -> Outcome<Vec<String>> {
     let [count, channels, rows, columns] = images.dims();
     let color = match channels {
         1 => image::ExtendedColorType::L8,
@@ -126,7 +127,7 @@ fn write_images(images: Tensor<4>, out: &Path) -> Result<Vec<String>, Box<dyn Er
     for (k, bytes) in to_bytes(images).into_iter().enumerate() {
         let (name, mut png) = (numbered("image", k, count, "png"), Vec::new());
         PngEncoder::new(&mut png).write_image(&bytes, columns as u32, rows as u32, color)?;
-        output::write_atomically(&out.join(&name), &png)?;
+        whole_files::write_atomically(&out.join(&name), &png)?;
         names.push(name);
     }
     Ok(names)

@@ -1,39 +1,22 @@
-//! A sentence (or a scene) becomes a radar image with the diffusion model.
-//!
-//! ```text
-//! cargo run --release --example generate
-//! cargo run --release --example generate -- --prompt "a ship at 8 m/s toward 135 degrees, wind 5 m/s" --count 8
-//! cargo run --release --example generate -- --sea out/sea/sea.safetensors
-//! cargo run --release --example generate -- --weights stable-diffusion-v1-4 --steps 20
-//! ```
-//!
-//! Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and
-//! `report.json`; the model that lies in `wake-ldm` also writes the labels of each image (`labels.json`, `labels-0.json`, …),
-//! and says which scene it drew (what the prompt states, and the default values of what it leaves open) and which parts of
-//! the prompt it did not read. A prompt that states nothing of a scene is an error.
+//! `wake generate`: a sentence (or a scene) becomes a radar image with the diffusion model.
 
 mod diffusers;
-#[path = "../common/exit.rs"]
-mod exit;
-#[path = "../common/progress.rs"]
-mod progress;
 mod wake_model;
 
-use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
-use clap::Parser;
+use clap::Args;
 use serde_json::Value;
-use wake_physics::{Scene, output};
+use wake_physics::Scene;
+
+use crate::exit::{self, Outcome};
 
 /// Generate an image from a prompt with a latent diffusion model.
-#[derive(Parser)]
+#[derive(Args)]
 #[command(
-    version,
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
 )]
-struct Arguments {
+pub(crate) struct Arguments {
     /// What the image shows; without it and without --scene, the default scene in words.
     #[arg(long, value_name = "TEXT", conflicts_with = "scene")]
     prompt: Option<String>,
@@ -43,10 +26,10 @@ struct Arguments {
     /// Change one value of the scene, such as ship.speed=8; may be repeated; without --scene, of the model's own scene
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "prompt")]
     set: Vec<String>,
-    /// Folder of a model: one that `train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
+    /// Folder of a model: one that `wake train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Draw on a sea learnt from real images: a file that `train -- sea` wrote; not in diffusers layout
+    /// Draw on a sea learnt from real images: a file that `wake train sea` wrote; not in diffusers layout
     #[arg(long, value_name = "FILE", conflicts_with = "steps")]
     sea: Option<PathBuf>,
     /// Steps from noise to image [default: 4, or 50 in diffusers layout]
@@ -82,11 +65,11 @@ struct Arguments {
     json: bool,
 }
 
-fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
-}
-
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+/// Writes `image.png` (`image-0.png`, `image-1.png`, … and all of them as `sheet.png` with `--count`) and `report.json`; the
+/// wake model also writes the labels of each image (`labels.json`, `labels-0.json`, …), and says which scene it drew (what
+/// the prompt states, and the default values of what it leaves open) and which parts of the prompt it did not read. A prompt
+/// that states nothing of a scene is an error.
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     match arguments.weights.as_deref() {
         None => wake_model::run(arguments),
         Some(folder) if folder.join("unet").is_dir() => match &arguments.sea {
@@ -95,7 +78,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         },
         Some(folder) if folder.join("config.json").is_file() => wake_model::run(arguments),
         Some(folder) => Err(format!(
-            "--weights {}: no model there; a folder that `train` wrote holds config.json, one in diffusers layout unet/",
+            "--weights {}: no model there; a folder that `wake train` wrote holds config.json, one in diffusers layout unet/",
             folder.display()
         )
         .into()),
@@ -132,9 +115,9 @@ fn numbered(stem: &str, k: usize, count: usize, ending: &str) -> String {
 }
 
 /// Writes the report and says what was made.
-fn finish(arguments: &Arguments, report: &Value) -> Result<(), Box<dyn Error>> {
+fn finish(arguments: &Arguments, report: &Value) -> Outcome<()> {
     let out: &Path = &arguments.out;
-    output::write_json(&out.join("report.json"), report)?;
+    whole_files::write_json(&out.join("report.json"), report)?;
     if arguments.json {
         return Ok(exit::say(&format!("{report:#}"))?);
     }

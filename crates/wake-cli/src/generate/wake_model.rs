@@ -1,23 +1,24 @@
 //! The small model of `wake-ldm`, or one that `train` wrote.
 
-use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
 use serde_json::json;
 use wake_ldm::sampler::WakeImage;
 use wake_ldm::sea_texture::SeaTexture;
-use wake_ldm::{WakeSampler, device_named};
+use wake_ldm::WakeSampler;
+use wake_nn::device_named;
 use wake_physics::picture::Picture;
 use wake_physics::{Scene, output};
 use wake_text::Reading;
 
-use super::{Arguments, exit, finish, numbered, prompt, scene};
+use super::{Arguments, finish, numbered, prompt, scene};
+use crate::exit::{self, Outcome};
 
 /// Images in a row of the contact sheet.
 const ACROSS: usize = 4;
 
-pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     refuse_options(arguments)?;
     let device = device_named(&arguments.device)?;
     let begin = Instant::now();
@@ -42,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         None => sampler.sample_many(&vec![prompt.as_str(); count], seed)?,
     };
     let total = begin.elapsed().as_secs_f64();
-    output::make_folder(&arguments.out)?;
+    whole_files::make_folder(&arguments.out)?;
     let files = write_images(&images, arguments)?;
     let seconds = images[0].seconds;
     let report = json!({
@@ -101,7 +102,7 @@ fn write_images(images: &[WakeImage], arguments: &Arguments) -> wake_physics::Re
         let levels = image.levels();
         let name = numbered("image", k, count, "png");
         output::write_png(&out.join(&name), &levels, image.grey.rows, columns)?;
-        output::write_json(
+        whole_files::write_json(
             &out.join(numbered("labels", k, count, "json")),
             &image.labels,
         )?;

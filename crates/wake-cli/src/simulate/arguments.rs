@@ -1,12 +1,11 @@
 //! What is asked for on the command line.
 
-use clap::{Parser, ValueEnum};
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
 /// Simulate the SAR image of a ship wake from the numbers of a scene.
-#[derive(Parser)]
+#[derive(Args)]
 #[command(
-    version,
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
                   grid.spacing is that of the image; the plan says which spacing is computed on (computed_spacing): docs/scene.md"
 )]

@@ -2,7 +2,7 @@
 
 use wake_physics::measure::{ImageFigures, StatedSpeckle, Texture};
 
-use crate::across;
+use super::across;
 
 /// Both tables as a page of Markdown.
 pub(crate) fn page(simulated: &[ImageFigures], real: &[ImageFigures]) -> String {

@@ -1,49 +1,30 @@
-//! From a scene to a SAR image: every field, the labels and a report.
-//!
-//! ```text
-//! cargo run --release --example simulate
-//! cargo run --release --example simulate -- --set sea.wind_speed=3 --set ship.heading=90 --out out/light_wind
-//! cargo run --release --example simulate -- --scene assets/scenes/satellite/*.toml --compare REAL_IMAGES
-//! ```
-//!
-//! Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`, of several scenes into a folder each; with
-//! `--overlay` the picture with its labels drawn, `overlay.png`; with `--export` every field as a NumPy array or a TIFF with
-//! the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
-//! `comparison.json`, and quick-looks of what was simulated, `sheet.png`.
+//! `wake simulate`: from a scene to a SAR image, with every field, the labels and a report.
 
-#[path = "simulate/across.rs"]
 mod across;
-#[path = "simulate/arguments.rs"]
 mod arguments;
-#[path = "simulate/compare.rs"]
 mod compare;
-#[path = "common/exit.rs"]
-mod exit;
-#[path = "common/progress.rs"]
-mod progress;
-#[path = "simulate/real.rs"]
 mod real;
-#[path = "simulate/results.rs"]
 mod results;
 
-use arguments::{Arguments, MethodName};
-use clap::Parser;
+pub(crate) use arguments::Arguments;
+
+use arguments::MethodName;
 use serde_json::Value;
-use std::error::Error;
-use std::process::ExitCode;
+use crate::exit::{self, Outcome};
+use crate::progress;
 use wake_physics::measure::ImageFigures;
 use wake_physics::picture::Picture;
-use wake_physics::{Method, Plan, Scene, Simulation, output, simulate_with};
+use wake_physics::{Method, Plan, Scene, Simulation, simulate_with};
 
 /// Pixels of a quick-look along its longer side, and quick-looks in a row of the sheet.
 const SIDE: usize = 334;
 const ACROSS: usize = 3;
 
-fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
-}
-
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
+/// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`, of several scenes into a folder each; with
+/// `--overlay` the picture with its labels drawn, `overlay.png`; with `--export` every field as a NumPy array or a TIFF with
+/// the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
+/// `comparison.json`, and quick-looks of what was simulated, `sheet.png`.
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let scenes = scenes(arguments)?;
     // A scene that cannot be simulated leaves no folder behind.
     let plans = scenes.iter().map(|(_, scene)| Plan::new(scene));
@@ -55,7 +36,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     let real = arguments.compare.as_deref().map(real::figures);
     let real = real.transpose()?;
-    output::make_folder(&arguments.out)?;
+    whole_files::make_folder(&arguments.out)?;
     let (mut reports, mut rows, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     for (name, scene) in &scenes {
         let out = match scenes.len() {
@@ -77,9 +58,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if let Some(real) = real {
         let page = compare::page(&rows, &real);
         let out = |name: &str| arguments.out.join(name);
-        output::write_atomically(&out("comparison.md"), page.as_bytes())?;
+        whole_files::write_atomically(&out("comparison.md"), page.as_bytes())?;
         rows.extend(real);
-        output::write_json(&out("comparison.json"), &rows)?;
+        whole_files::write_json(&out("comparison.json"), &rows)?;
         Picture::sheet(&pictures, ACROSS).write(&out("sheet.png"))?;
         if !arguments.json {
             exit::say(&page)?;
@@ -94,7 +75,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 }
 
 /// The scenes by the names of their files.
-fn scenes(arguments: &Arguments) -> Result<Vec<(String, Scene)>, Box<dyn Error>> {
+fn scenes(arguments: &Arguments) -> Outcome<Vec<(String, Scene)>> {
     let changed = |scene: Scene| scene.with_assignments(&arguments.set);
     if arguments.scene.is_empty() {
         return Ok(vec![("default".to_owned(), changed(Scene::default())?)]);

@@ -6,7 +6,7 @@ use wake_physics::grey::GreyScale;
 use wake_physics::picture::Picture;
 use wake_physics::{Simulation, export};
 
-use crate::arguments::{Arguments, Export, GreyName};
+use super::arguments::{Arguments, Export, GreyName};
 
 /// Writes everything but what several scenes share, and gives the report.
 pub(crate) fn write(

@@ -1,13 +1,14 @@
-//! `train`: the network learns from images made on the fly, and can be stopped and continued.
+//! `wake train detector`: the network learns from images made on the fly, and can be stopped and continued.
 
-use std::error::Error;
 use std::path::PathBuf;
 
-use wake_detector::train::{Recipe, Training, train};
-use wake_ldm::device_named;
+use wake_nn::device_named;
+use wake_train::detector::{Recipe, Training, train};
 
-use super::{named, progress};
+use crate::exit::{self, Outcome};
+use crate::{named, progress};
 
+/// Train the detector on images made on the fly; a run that was killed goes on when it is started again.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
     /// Images to learn from
@@ -40,7 +41,7 @@ pub(crate) struct Options {
 }
 
 /// Trains, and writes `detector.safetensors` (averaged weights), `train.jsonl` and `checkpoints/` into the folder.
-pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+pub(crate) fn run(options: &Options) -> Outcome<()> {
     let training = Training {
         images: options.images as usize,
         distinct: options.distinct.map(|count| count as usize),
@@ -57,6 +58,9 @@ pub(crate) fn run(options: &Options) -> Result<(), Box<dyn Error>> {
         bar.set_position(step as u64);
     })?;
     bar.finish_and_clear();
-    println!("{steps} steps, weights in {}", options.out.display());
+    exit::say(&format!(
+        "{steps} steps, weights in {}",
+        options.out.display()
+    ))?;
     Ok(())
 }

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use wake_ldm::dataset::Folder;
-use wake_ldm::train::{FineTuning, StageOptions};
+use wake_dataset::Folder;
+use wake_train::{FineTuning, StageOptions};
 
-use super::Outcome;
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
+use crate::exit::Outcome;
 
 /// Defaults of the options that all runs have; batch and rate are the paper's.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[
@@ -19,13 +19,13 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/fine_tune"),
 ];
 
-/// The whole U-Net learns and nothing else, unless changes are asked for.
+/// Fit a model in diffusers layout to simulated pairs: its U-Net, or low-rank changes of it.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of the model in diffusers layout
     #[arg(long, value_name = "DIR")]
     weights: PathBuf,
-    /// Folder that `make_dataset` wrote
+    /// Folder that `wake dataset` wrote
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Learn changes of this rank of the attentions, and leave all else [default: the whole U-Net learns]

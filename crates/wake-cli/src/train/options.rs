@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use burn::tensor::Device;
+use wake_nn::burn::tensor::Device;
 use clap::{Arg, Args};
-use wake_ldm::device_named;
-use wake_ldm::train::StageOptions;
+use wake_nn::device_named;
+use wake_train::{Result, StageOptions};
 
 /// Where a run begins and ends, and what it computes on.
 #[derive(Args, Clone)]
@@ -67,12 +67,13 @@ pub(crate) fn defaults(
 
 impl Place {
     /// The devices, outside autodiff.
-    pub(crate) fn devices(&self) -> wake_ldm::Result<Vec<Device>> {
-        self.device.split(',').map(device_named).collect()
+    pub(crate) fn devices(&self) -> Result<Vec<Device>> {
+        let devices = self.device.split(',').map(device_named);
+        Ok(devices.collect::<wake_nn::Result<_>>()?)
     }
 
     /// How a stage runs that takes what is usual for it.
-    pub(crate) fn stage(&self) -> wake_ldm::Result<StageOptions> {
+    pub(crate) fn stage(&self) -> Result<StageOptions> {
         Ok(StageOptions {
             every: self.every as usize,
             seed: self.seed,
@@ -83,7 +84,7 @@ impl Place {
     }
 
     /// How a stage runs at a pace.
-    pub(crate) fn paced(&self, pace: &Pace) -> wake_ldm::Result<StageOptions> {
+    pub(crate) fn paced(&self, pace: &Pace) -> Result<StageOptions> {
         Ok(StageOptions {
             steps: Some(pace.steps as usize),
             batch: Some(usize::from(pace.batch)),

@@ -5,9 +5,10 @@ use std::path::{Display, Path};
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
-use wake_ldm::train::Progress;
+use wake_train::Progress;
 
-use super::{Outcome, exit, progress};
+use crate::exit::{self, Outcome};
+use crate::progress;
 
 /// Shows the progress of a training.
 pub(crate) struct Screen<'a> {

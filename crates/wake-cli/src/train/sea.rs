@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::{Map, Value, json};
-use wake_ldm::fingerprint;
 use wake_ldm::sea_texture::SeaTexture;
-use wake_ldm::train::{SeaPatches, SeaTraining};
 use wake_physics::picture::Picture;
+use wake_train::{SeaPatches, SeaTraining};
+use whole_files::fingerprint;
 
 use super::options::{Pace, Place};
 use super::screen::Screen;
-use super::sea_images::{Half, SeaFile, list};
-use super::{Outcome, exit, progress};
+use crate::exit::{self, Outcome};
+use crate::progress;
+use crate::sea_images::{Half, SeaFile, list};
 
 /// Patches in all that are held in memory, unless there are more images.
 const PATCHES: usize = 2048;
@@ -30,6 +31,9 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/sea"),
 ];
 
+/// Train the sea of real radar images that nobody labelled.
+///
+/// Writes `sea.safetensors`, which `wake generate --sea` and `wake dataset --sea` draw scenes on.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of radar images of 8 or 16 bits, grey by amplitude; what `NAME_mask.png` marks is left out
@@ -59,7 +63,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     };
     let screen = Screen::new(&options.place.out);
     training.train(&options.place.out, &screen.watch(), |sea, path| {
-        Ok::<_, wake_ldm::Error>(sheet(sea)?.write(path)?)
+        Ok::<_, wake_train::Error>(sheet(sea)?.write(path)?)
     })?;
     screen.end()
 }

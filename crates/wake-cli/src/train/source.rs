@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use wake_ldm::dataset::{Folder, Recipe};
+use wake_dataset::{Folder, Recipe};
 use wake_ldm::network::WakeModelConfig;
-use wake_ldm::train::TrainingPairs;
 use wake_physics::available_memory;
+use wake_train::TrainingPairs;
 
-use super::Outcome;
-use super::stages::Options;
+use super::wake_model::Options;
+use crate::exit::Outcome;
 
 /// The pairs of --data, or those of --recipe.
 pub(crate) fn pairs(options: &Options) -> Outcome<TrainingPairs> {

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use wake_ldm::dataset::Recipe;
-use wake_ldm::train::{PipelineTraining, TrainingPairs};
+use wake_dataset::Recipe;
+use wake_train::{PipelineTraining, TrainingPairs};
 
-use super::Outcome;
 use super::options::{Pace, Place};
 use super::screen::Screen;
 use super::source::{check_memory, folder};
+use crate::exit::Outcome;
 
 /// What is simulated without --data: the recipe `ranges` with the ship in the middle, of whose place prompts say nothing.
 const RECIPE: &str = r#"
@@ -36,9 +36,13 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/text_to_image"),
 ];
 
+/// Train a small model of Stable Diffusion's layout from nothing, on images and prompts alone.
+///
+/// The autoencoder first, then text encoder and U-Net together; `wake generate --weights`, `wake evaluate --text-to-image` and
+/// `wake train fine-tune --weights` read the model.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Folder that `make_dataset` wrote; without it, pairs are simulated first
+    /// Folder that `wake dataset` wrote; without it, pairs are simulated first
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Pairs to simulate where there is no --data

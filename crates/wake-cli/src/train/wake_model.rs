@@ -1,23 +1,44 @@
-//! The stages of the wake model: patches, words, mean, diffusion.
+//! `wake train wake-model`: the stages of the wake model.
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use wake_ldm::network::WakeModelConfig;
-use wake_ldm::train::{LatentSet, StageOptions, WakeStage, WakeTraining};
+use wake_train::{LatentSet, StageOptions, WakeStage, WakeTraining};
 
-use super::Outcome;
-use super::exit;
 use super::options::{Place, Thrift};
 use super::screen::Screen;
 use super::source::{check_memory, fitting, pairs};
+use crate::exit::{self, Outcome};
 
 /// Defaults of the options that all runs have.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[("every", "500"), ("out", "out/train")];
 
+/// A stage of the wake model.
+#[derive(Clone, Copy, ValueEnum)]
+enum Stage {
+    /// Fit the patch transform, in closed form
+    Autoencoder,
+    /// Train the reader of prompts
+    Words,
+    /// Train mean and spread of the latents
+    Mean,
+    /// Train the flow that draws the sea
+    Diffusion,
+}
+
+/// Train the wake model, stage by stage.
+///
+/// A stage runs the earlier ones first, or to their end, where their weights are not in --out yet; so `diffusion`, the last,
+/// trains the whole model. Writes `config.json`, `patches.safetensors`, `reader.safetensors`, `prior.safetensors`,
+/// `flow.safetensors` (averaged weights, 16 bits), `shares.json`, a log `STAGE.jsonl` of each stage, `sheet.png`, `run.json`,
+/// and `checkpoints/`.
 #[derive(Args, Clone)]
 pub(crate) struct Options {
-    /// Folder that `make_dataset` wrote; without it, pairs are simulated first
+    /// The stage to reach
+    #[arg(value_enum, default_value_t = Stage::Diffusion)]
+    stage: Stage,
+    /// Folder that `wake dataset` wrote; without it, pairs are simulated first
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
     /// paper, ranges, detector or model, or a recipe file: the pairs to simulate where there is no --data
@@ -48,7 +69,13 @@ pub(crate) struct Options {
 }
 
 /// Runs a stage, after those that it needs.
-pub(crate) fn run(stage: WakeStage, options: &Options) -> Outcome<()> {
+pub(crate) fn run(options: &Options) -> Outcome<()> {
+    let stage = match options.stage {
+        Stage::Autoencoder => WakeStage::Autoencoder,
+        Stage::Words => WakeStage::Words,
+        Stage::Mean => WakeStage::Mean,
+        Stage::Diffusion => WakeStage::Diffusion,
+    };
     let constants = StageOptions {
         steps: options.steps.map(|steps| steps as usize),
         batch: options.batch.map(usize::from),

@@ -4,7 +4,7 @@ use super::RUNS;
 use super::memo::Memo;
 use super::oracle::{QUADRATURES, row, sample};
 use super::surface::{INCIDENCE, fields, wake};
-use crate::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use wake_physics::scattering::{
     Backscatter, BackscatterTable, FacetFields, SlopeCovariance, Specular, TwoScale,
 };

@@ -3,7 +3,7 @@
 use super::RUNS;
 use super::oracle::{pixels, row};
 use super::surface::{INCIDENCE, fields};
-use crate::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use rayon::prelude::*;
 use wake_physics::Raster;
 use wake_physics::sar::direct::DirectImage;

@@ -2,7 +2,7 @@
 
 use super::RUNS;
 use super::oracle::{QUADRATURES, row, sample};
-use crate::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use rayon::prelude::*;
 use wake_physics::scattering::breaking;
 use wake_physics::turbulent::current::{EdgeResponse, WakeCurrent, WakeEdge, edge_factor};

@@ -10,7 +10,7 @@ mod scene;
 mod surface;
 mod waves;
 
-use crate::row::Row;
+use crate::bench::row::Row;
 pub(crate) use memo::Memo;
 use wake_physics::Raster;
 

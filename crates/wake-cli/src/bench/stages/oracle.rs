@@ -1,6 +1,6 @@
 //! Where the oracles run, and the row that comes of it.
 
-use crate::row::{Errors, Row};
+use crate::bench::row::{Errors, Row};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use wake_physics::Raster;

@@ -3,7 +3,7 @@
 use super::RUNS;
 use super::oracle::{QUADRATURES, row, sample};
 use super::surface::fields;
-use crate::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use rayon::prelude::*;
 use wake_physics::sar::ImpulseResponse;
 use wake_physics::sar::impulse::{Axis, PointTarget, Reflectivity};

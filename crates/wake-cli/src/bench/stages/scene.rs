@@ -3,7 +3,7 @@
 use super::RUNS;
 use super::memo::Memo;
 use super::oracle::{row, sample};
-use crate::row::{Errors, Row, median_seconds};
+use crate::bench::row::{Errors, Row, median_seconds};
 use wake_physics::{Scene, direct_intensity, simulate};
 
 /// Tolerance of the direct simulation: its nodes of the wake stand for all others, and it leaves out no term.

@@ -3,7 +3,7 @@
 use super::RUNS;
 use super::oracle::{WHOLE, pixels, row};
 use super::surface::{TRANSFER, spectrum, wake};
-use crate::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use wake_physics::surface::Surface;
 use wake_physics::swell::Swell;
 use wake_physics::waves::{PlaneWaves, Quantity, harmonic_sum, matrix_product};

@@ -1,18 +1,24 @@
-//! `evaluate`: how well wakes are found in simulated images that were held out, and in real tiles.
+//! `wake evaluate detector`: how well wakes are found in simulated images that were held out, and in real tiles.
 
-use std::error::Error;
+mod real;
+mod real_sea;
+mod recall;
+mod report;
+
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
 use wake_detector::Finder;
 use wake_detector::drawing::sheet;
-use wake_detector::judging::{Searched, compared};
-use wake_detector::train::Recipe;
+use wake_train::detector::judging::{Searched, compared};
+use wake_train::detector::Recipe;
 
-use super::recall::{by_scene, by_visibility};
-use super::report::Report;
-use super::{exit, named, progress, real, real_sea};
+use crate::exit::{self, Outcome};
+use crate::{named, progress};
+use recall::{by_scene, by_visibility};
+use report::Report;
 
+/// Measure how well wakes are found, in simulated images that were held out and in real tiles.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
     /// Simulated images of each recipe
@@ -31,7 +37,7 @@ pub(crate) struct Options {
     #[arg(long, default_value = "flex")]
     device: String,
     /// Folder of the results, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/detector")]
+    #[arg(long, value_name = "DIR", default_value = "out/evaluate_detector")]
     out: PathBuf,
 }
 
@@ -57,8 +63,8 @@ const CLEAR: f64 = 1.0;
 const PICTURES: usize = 24;
 
 /// Searches, and writes `report.md`, `report.json` and pictures into the folder.
-pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
-    let network = |weights: Option<&Path>| -> Result<Finder, Box<dyn Error>> {
+pub(crate) fn run(options: &Options) -> Outcome<()> {
+    let network = |weights: Option<&Path>| -> Outcome<Finder> {
         let detector = named::network(weights, &options.device, LEAST_SCORE)?;
         Ok(Finder::from(detector))
     };
@@ -77,8 +83,7 @@ pub(crate) fn evaluate(options: &Options) -> Result<(), Box<dyn Error>> {
             (tiles, sea)
         }
     };
-    std::fs::create_dir_all(&options.out)
-        .map_err(|error| format!("cannot make {}: {error}", options.out.display()))?;
+    whole_files::make_folder(&options.out)?;
     let mut report = Report {
         rungs: options.rung.iter().map(|(name, _)| name.clone()).collect(),
         ..Report::default()
@@ -103,7 +108,7 @@ fn simulated(
     recipe: Recipe,
     options: &Options,
     report: &mut Report,
-) -> Result<(), Box<dyn Error>> {
+) -> Outcome<()> {
     let source = recipe.source(HELD_OUT, SIZE)?;
     let count = u64::from(options.images);
     let bar = progress::bar(count, recipe.name());
@@ -130,11 +135,11 @@ fn simulated(
         report.scenes = by_scene(recipe, &names, &searched);
     }
     let megapixels = (SIZE * SIZE) as f64 * 1e-6;
-    println!(
+    exit::say(&format!(
         "{}: {:.2} megapixels a second",
         recipe.name(),
         megapixels / searched.seconds
-    );
+    ))?;
     let path = options.out.join(format!("{}.png", recipe.name()));
     Ok(sheet(&pictures, 4).save(path)?)
 }

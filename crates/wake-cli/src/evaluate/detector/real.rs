@@ -1,16 +1,16 @@
 //! Real tiles with labels, searched.
 
-use std::error::Error;
 use std::path::Path;
 
 use rayon::prelude::*;
-use wake_detector::judging::{Tile, compared};
+use wake_train::detector::judging::{Tile, compared};
 use wake_detector::{Detection, Finder};
 
 use super::report::Report;
+use crate::exit::Outcome;
 
 /// The tiles of a folder with their labels.
-pub(crate) fn tiles(folder: &Path) -> Result<Vec<Tile>, Box<dyn Error>> {
+pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
     Tile::read_all(folder).map_err(|error| match error {
         wake_detector::Error::Io { .. } => {
             format!("{error}; --real names the folder of tiles and labels.json").into()
@@ -26,7 +26,7 @@ pub(crate) fn judge(
     tiles: &[Tile],
     out: &Path,
     report: &mut Report,
-) -> Result<(), Box<dyn Error>> {
+) -> Outcome<()> {
     let found: Vec<Vec<Detection>> = tiles.par_iter().map(|t| finder.find(&t.image)).collect();
     let searched = || tiles.iter().zip(&found);
     let clear: Vec<_> = searched()

@@ -1,20 +1,20 @@
 //! Whether a small network tells the open sea of real tiles from a simulated one.
 
-use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
 use wake_detector::GreyImage;
-use wake_detector::judging::{Tile, paired_windows};
-use wake_detector::train::Recipe;
-use wake_ldm::dataset::Source;
-use wake_ldm::device_named;
-use wake_ldm::train::{TwoSampleOptions, two_sample};
+use wake_train::detector::judging::{Tile, paired_windows};
+use wake_train::detector::Recipe;
+use wake_dataset::Source;
+use wake_nn::device_named;
+use wake_train::{TwoSampleOptions, two_sample};
 use wake_physics::Field;
 
-use super::evaluate::HELD_OUT;
+use super::HELD_OUT;
+use crate::exit::Outcome;
 
 /// Rows and columns of a window of open sea.
 const WINDOW: usize = 128;
@@ -22,7 +22,7 @@ const WINDOW: usize = 128;
 const OF_A_HALF: usize = 4;
 
 /// Windows of open sea of the tiles of a folder, without what `NAME_mask.png` marks.
-pub(crate) fn windows(folder: &Path, tiles: &[Tile]) -> Result<Vec<Field>, Box<dyn Error>> {
+pub(crate) fn windows(folder: &Path, tiles: &[Tile]) -> Outcome<Vec<Field>> {
     let mut windows = Vec::new();
     for tile in tiles {
         let mask = folder.join(tile.name.replace(".png", "_mask.png"));
@@ -42,9 +42,9 @@ fn field(values: Vec<f32>) -> Field {
 }
 
 /// As many windows of a source.
-fn simulated(source: &Arc<dyn Source>, count: usize) -> Result<Vec<Field>, Box<dyn Error>> {
+fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
     let pairs = source.items(0..count as u64)?;
-    let levels = |pair: wake_ldm::dataset::Pair| {
+    let levels = |pair: wake_dataset::Pair| {
         let levels = pair.image.levels();
         field(levels.into_iter().map(f32::from).collect())
     };
@@ -52,9 +52,9 @@ fn simulated(source: &Arc<dyn Source>, count: usize) -> Result<Vec<Field>, Box<d
 }
 
 /// How often real windows are told from those of each recipe, and the recipe detector from itself: the floor.
-pub(crate) fn told_apart(real: &[Field]) -> Result<Vec<Value>, Box<dyn Error>> {
+pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
     let device = device_named("flex")?;
-    let sea = |plain: bool, seed: u64| -> Result<Vec<Field>, Box<dyn Error>> {
+    let sea = |plain: bool, seed: u64| -> Outcome<Vec<Field>> {
         simulated(&Recipe::open_sea(plain, seed, WINDOW)?, real.len())
     };
     let detector = sea(false, HELD_OUT)?;

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 use wake_detector::Wake;
-use wake_detector::judging::Searched;
+use wake_train::detector::judging::Searched;
 use wake_detector::score::{Rule, found_by};
-use wake_detector::train::Recipe;
+use wake_train::detector::Recipe;
 use wake_physics::Scene;
 use wake_physics::scene::Sensor;
 

@@ -59,7 +59,7 @@ impl Report {
             false => " --rung NAME=FILE …",
         };
         let mut text = format!(
-            "<!-- Written by: cargo run --release --example detector -- evaluate --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n\
+            "<!-- Written by: wake evaluate detector --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n\
              AP: average precision by the ray rule (axis within 10°; tip within 60 pixels, or axis line within 25 pixels of tip \
              and middle). AP boxes: oriented boxes from the tip to the end of what is visible, IoU 0.5. Recall: with at most half \
              a false alarm an image.\n\n\

@@ -3,9 +3,9 @@
 mod images;
 mod values;
 
-use crate::timing::TimingRow;
+use super::super::timing::TimingRow;
 use serde::Serialize;
-use wake_ldm::evaluation::{MeasurementRow, PixelRow, RungRow, SwapRow, WakeCorrelation};
+use wake_train::evaluation::{MeasurementRow, PixelRow, RungRow, SwapRow, WakeCorrelation};
 
 /// Everything that `report.json` holds.
 #[derive(Debug, Serialize)]

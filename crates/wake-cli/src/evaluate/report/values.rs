@@ -1,7 +1,7 @@
 //! Figures of values that are read from the images.
 
 use super::{Report, number};
-use wake_ldm::evaluation::{AbsoluteErrors, MeasurementRow};
+use wake_train::evaluation::{AbsoluteErrors, MeasurementRow};
 
 fn errors(errors: &AbsoluteErrors) -> String {
     format!(
