@@ -17,6 +17,7 @@ use std::time::Duration;
 
 use arbtest::arbtest;
 use burn::tensor::Device;
+use serde_json::json;
 use wake_dataset::{Folder, Recipe};
 use wake_ldm::network::{PatchTransform, WakeModelConfig};
 use wake_ldm::pipeline::Pipeline;
@@ -25,6 +26,7 @@ use wake_train::{Checkpoint, Metrics};
 use wake_ldm::unet::UNetConfig;
 use wake_nn::weights::{Layout, load};
 use wake_physics::Scene;
+use whole_files::{checksum, sealed};
 use wake_text::{PartialScene, TOKENS, Tokenizer};
 
 /// No sentence about an input is longer [characters].
@@ -200,14 +202,19 @@ fn lines_of_data_sets() {
     let folder = tempfile::tempdir().expect("a folder");
     let recipe = Recipe::default();
     let manifest = wake_dataset::Manifest::new(recipe, 7, 1).expect("a manifest");
-    let text = serde_json::to_string(&manifest).expect("JSON");
-    std::fs::write(folder.path().join("dataset.json"), text).expect("a file");
+    let manifest = serde_json::to_string(&manifest).expect("JSON");
+    let manifest = sealed(&manifest) + "\n";
+    std::fs::write(folder.path().join("dataset.json"), manifest).expect("a file");
     attack("metadata", |input| {
-        with_file(folder.path(), "metadata.jsonl", input, |_| {
-            if let Some(set) = said(Folder::open(folder.path())) {
-                said(set.pair(0));
-            }
-        });
+        // What was written like that is looked at in full; else the checksum is wrong.
+        let line = sealed(&text(input)) + "\n";
+        for input in [input, line.as_bytes()] {
+            with_file(folder.path(), "metadata.jsonl", input, |_| {
+                if let Some(set) = said(Folder::open(folder.path())) {
+                    said(set.pair(0));
+                }
+            });
+        }
     });
 }
 
@@ -217,15 +224,16 @@ fn states_of_runs() {
     let step = folder.path().join("step-00000001");
     std::fs::create_dir(&step).expect("a folder");
     attack("checkpoint", |input| {
-        with_file(&step, "state.json", input, |_| {
-            said(Checkpoint::newest(folder.path()))
-        });
-        with_file(
-            &step,
-            "state.json",
-            b"{\"step\": 1, \"applied\": 1, \"state\": {}}",
-            |_| (),
-        );
+        let state = sealed(&text(input)) + "\n";
+        for input in [input, state.as_bytes()] {
+            with_file(&step, "state.json", input, |_| {
+                said(Checkpoint::newest(folder.path()))
+            });
+        }
+        let files = json!({"tensors-000.safetensors": checksum(input)});
+        let state = json!({"step": 1, "applied": 1, "state": {}, "files": files});
+        let state = sealed(&state.to_string()) + "\n";
+        with_file(&step, "state.json", state.as_bytes(), |_| ());
         with_file(&step, "tensors-000.safetensors", input, |path| {
             said(Checkpoint::newest(folder.path()));
             std::fs::remove_file(path).expect("a file that was written");

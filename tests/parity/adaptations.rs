@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
-use wake_ldm::Error;
+use wake_nn::Error;
 use wake_ldm::lora::merge_lora;
 use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetConfig, UNetInput};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Tensor;
 use serde_json::Value;
-use wake_ldm::Error;
+use wake_nn::Error;
 use wake_ldm::pipeline::{Pipeline, Request, StartImage, to_bytes};
 use wake_ldm::scheduler::SchedulerConfig;
 use wake_text::Tokenizer;

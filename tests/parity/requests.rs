@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use burn::tensor::Tensor;
-use wake_ldm::Error;
+use wake_nn::Error;
 use wake_ldm::pipeline::{Pipeline, Prompts, Request, StartImage};
 use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
 

@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor};
 use serde_json::Value;
-use wake_ldm::Error;
+use wake_nn::Error;
 use wake_ldm::scheduler::{
     NoiseLevel, NoiseSchedule, Scheduler, SchedulerConfig, StepInput, TerminalSnr,
 };

@@ -6,7 +6,7 @@ use burn::tensor::Tensor;
 use serde_json::{Map, Value, json};
 use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
 use wake_nn::weights::{self, Layout};
-use wake_ldm::{Error, Mismatch};
+use wake_nn::{Error, Mismatch};
 
 use crate::golden::{self, Golden, devices, folder, numbers};
 

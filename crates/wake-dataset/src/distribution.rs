@@ -46,7 +46,15 @@ impl Distribution {
             toml::Value::Boolean(flag) => Ok(Self::Fixed(Value::Flag(*flag))),
             toml::Value::String(word) => Ok(Self::Fixed(Value::Word(word.clone()))),
             toml::Value::Integer(number) => Ok(Self::Fixed(Value::Number(*number as f64))),
-            toml::Value::Float(number) => Ok(Self::Fixed(Value::Number(*number))),
+            toml::Value::Float(number) if number.is_finite() => {
+                Ok(Self::Fixed(Value::Number(*number)))
+            }
+            // A manifest has no form for it.
+            toml::Value::Float(_) => Err(refused(
+                name,
+                value,
+                "a finite number, or \"infinite\" for sea.depth",
+            )),
             toml::Value::Array(_) => range(name, value).map(Self::Even),
             toml::Value::Table(table) if table.len() == 1 && table.contains_key("log") => {
                 let log = range(name, &table["log"])?;
@@ -230,6 +238,9 @@ mod tests {
             "[1]",
             "[1, 2, 3]",
             "[4, 2]",
+            "inf",
+            "nan",
+            "{ one_of = [1, -inf] }",
             "[1, nan]",
             "[1, inf]",
             "[\"a\", \"b\"]",

@@ -5,6 +5,7 @@ use super::metadata::{Rows, parse};
 use super::pair::{Grey, Pair};
 use super::shuffle::shuffled;
 use crate::error::Result;
+use image::ImageFormat;
 use std::path::{Path, PathBuf};
 use wake_physics::{Scene, labels_of};
 
@@ -19,11 +20,9 @@ pub struct Folder {
 impl Folder {
     /// Opens a folder; images are read when they are asked for.
     ///
-    /// Captions may have been edited.
-    ///
     /// # Errors
     ///
-    /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first broken line.
+    /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first line that is broken or was changed.
     pub fn open(path: &Path) -> Result<Self> {
         let Some(manifest) = Manifest::read(path)? else {
             let message = "no data set; make one with the example make_dataset";
@@ -71,7 +70,7 @@ impl Folder {
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`](crate::Error::Dataset) if there is no such pair, or its image is not of the set's size.
+    /// [`Error::Dataset`](crate::Error::Dataset) if there is no such pair, or its image is another one than was written.
     pub fn pair(&self, position: u64) -> Result<Pair> {
         let Some((index, row)) = self.rows.get(position as usize) else {
             let message = format!("no pair {position}, there are {}", self.len());
@@ -79,9 +78,10 @@ impl Folder {
         };
         let grid = &self.manifest.recipe.scene.grid;
         let path = self.path.join(&row.file_name);
+        let bytes = row.image_bytes(&path, position as usize + 1)?;
         Ok(Pair {
             index: *index,
-            image: read_image(&path, [grid.rows, grid.columns])?,
+            image: decoded(&path, &bytes, [grid.rows, grid.columns])?,
             prompt: row.text.clone(),
             labels: labels_of(&row.scene),
             scene: row.scene.clone(),
@@ -90,9 +90,12 @@ impl Folder {
     }
 }
 
-fn read_image(path: &Path, [rows, columns]: [usize; 2]) -> Result<Grey> {
-    let image = image::open(path).map_err(|e| broken(path, 0, e.to_string()))?;
-    let image = image.into_luma8();
+/// The image of a file's content.
+fn decoded(path: &Path, bytes: &[u8], [rows, columns]: [usize; 2]) -> Result<Grey> {
+    let image = image::load_from_memory_with_format(bytes, ImageFormat::Png);
+    let image = image
+        .map_err(|e| broken(path, 0, e.to_string()))?
+        .into_luma8();
     let size = [image.height() as usize, image.width() as usize];
     if size != [rows, columns] {
         let message = format!(

@@ -12,10 +12,11 @@ use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wake_physics::Plan;
+use whole_files::{sealed, unsealed};
 use wake_physics::grey::GreyScale;
 
 /// Version of the layout; a reader refuses others.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 /// Share of the images that are for validation, unless another is asked for.
 const VAL_SHARE: f64 = 0.1;
 /// Scenes that are planned to tell what a set costs.
@@ -147,44 +148,70 @@ impl Manifest {
     pub(super) fn text(&self) -> Result<String> {
         let text = serde_json::to_string_pretty(self);
         let text = text.map_err(|e| cannot("encode", Path::new("dataset.json"), e.into()))?;
-        Ok(text + "\n")
+        Ok(sealed(&text) + "\n")
     }
 
     /// Reads the manifest of a folder; `None` if it has none.
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`] if it is not the manifest of this layout.
+    /// [`Error::Dataset`] if it is not the manifest of this layout, or was changed after it was written.
     pub(super) fn read(folder: &Path) -> Result<Option<Self>> {
         let path = Layout(folder).manifest();
-        let Some(mut manifest) = read_json::<Self>(&path)? else {
+        let Some(text) = text_if_there(&path)? else {
             return Ok(None);
         };
+        let Some(object) = text.strip_suffix('\n').and_then(unsealed) else {
+            return Err(unreadable_manifest(&path, &text));
+        };
+        let mut manifest: Self = parse_json(&path, &object)?;
         if manifest.format != FORMAT {
-            let message = format!(
-                "format {} is not {FORMAT}; make the set again with this version",
-                manifest.format
-            );
-            return Err(broken(&path, 1, message));
+            return Err(other_format(&path, manifest.format.into()));
         }
         if manifest.grey != manifest.recipe.grey {
             let message = "grey and recipe.grey differ; a set has one mapping".to_owned();
             return Err(broken(&path, 1, message));
         }
-        manifest.shard = read_json(&Layout(folder).shard_note())?;
+        let note = Layout(folder).shard_note();
+        let shard = text_if_there(&note)?.map(|text| parse_json(&note, &text));
+        manifest.shard = shard.transpose()?;
         Ok(Some(manifest))
     }
 }
 
-/// Reads a JSON file; `None` if there is none.
-fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+/// Why a text without a valid checksum is no manifest: no JSON, of another version, of something else, or changed.
+fn unreadable_manifest(path: &Path, text: &str) -> Error {
+    let value: serde_json::Value = match parse_json(path, text) {
+        Ok(value) => value,
+        Err(error) => return error,
+    };
+    let changed = || {
+        let message = "changed: its checksum crc32 does not fit; restore the file, or make the set again in another folder";
+        broken(path, 1, message)
+    };
+    match value["format"].as_u64() {
+        Some(format) if format != u64::from(FORMAT) => other_format(path, format),
+        _ if value.get("crc32").is_some() => changed(),
+        _ => parse_json::<Manifest>(path, text).map_or_else(|error| error, |_| changed()),
+    }
+}
+
+fn other_format(path: &Path, format: u64) -> Error {
+    let message = format!("format {format} is not {FORMAT}; make the set again with this version");
+    broken(path, 1, message)
+}
+
+/// Reads a text file; `None` if there is none.
+fn text_if_there(path: &Path) -> Result<Option<String>> {
     match read_text(path) {
-        Ok(text) => serde_json::from_str(&text)
-            .map(Some)
-            .map_err(|e| broken(path, e.line(), e.to_string())),
+        Ok(text) => Ok(Some(text)),
         Err(e) if e.source.kind() == ErrorKind::NotFound => Ok(None),
         Err(e) => Err(e.into()),
     }
+}
+
+fn parse_json<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T> {
+    serde_json::from_str(text).map_err(|e| broken(path, e.line(), e.to_string()))
 }
 
 /// Paths of a data set in a folder.

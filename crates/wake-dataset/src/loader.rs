@@ -1,4 +1,17 @@
 //! Pairs as tensors, batch by batch.
+//!
+//! ```
+//! use burn::tensor::Device;
+//! use wake_dataset::{Loader, Recipe, Simulated};
+//!
+//! let recipe = Recipe::default().with_assignments(&["scene.grid.rows = 32", "scene.grid.columns = 32"])?;
+//! let source = Simulated::new(recipe, 7)?;
+//! let mut batches = Loader::new(source).batch(2).threads(2).on(&Device::default())?;
+//! let batch = batches.next().expect("there is always a next one")?;
+//! assert_eq!(batch.images.dims(), [2, 1, 32, 32]);
+//! println!("{:?}, {:?}", batch.scenes[0].ships, batch.objects[0]);
+//! # Ok::<(), wake_dataset::Error>(())
+//! ```
 
 use super::ordered::Ordered;
 use super::pair::Pair;

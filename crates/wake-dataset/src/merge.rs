@@ -17,8 +17,8 @@ pub fn shard_folder(folder: &Path, shard: Shard) -> PathBuf {
 ///
 /// # Errors
 ///
-/// [`Error::Dataset`](crate::Error::Dataset) if a shard is missing, unfinished or of another set; nothing is changed
-/// then.
+/// [`Error::Dataset`](crate::Error::Dataset) if a shard is missing, unfinished, damaged or of another set; nothing is
+/// changed then.
 pub fn merge(folder: &Path) -> Result<Manifest> {
     if let Some(whole) = merged_before(folder)? {
         remove_shards(folder)?;
@@ -95,7 +95,7 @@ fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
     }
 }
 
-/// The lines of a shard and their rows, all of them, with every file here or already moved.
+/// The lines of a shard and their rows, all of them, with every file here or already moved, and as it was written.
 fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec<u8>, Rows)> {
     let metadata = Layout(path).metadata();
     let text = std::fs::read(&metadata).map_err(|e| cannot("read", &metadata, e))?;
@@ -108,14 +108,18 @@ fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec
     if rows.len() as u64 != count {
         return Err(unfinished(format!("{} of {count} pairs", rows.len())));
     }
-    for (index, _) in &rows {
-        let here = Layout(path).files_of(*index);
-        let moved = Layout(folder).files_of(*index);
-        for (here, moved) in here.iter().zip(&moved) {
-            if !here.is_file() && !moved.is_file() {
-                return Err(unfinished(format!("{} is missing", here.display())));
+    let grid = &manifest.recipe.scene.grid;
+    for (at, (index, row)) in rows.iter().enumerate() {
+        let mut files = Layout(path).files_of(*index);
+        for (file, moved) in files.iter_mut().zip(Layout(folder).files_of(*index)) {
+            if !file.is_file() && !moved.is_file() {
+                return Err(unfinished(format!("{} is missing", file.display())));
+            }
+            if !file.is_file() {
+                *file = moved;
             }
         }
+        row.check_files(&files, at + 1, [grid.rows, grid.columns])?;
     }
     Ok((text, rows))
 }

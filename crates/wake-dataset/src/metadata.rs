@@ -1,6 +1,6 @@
 //! `metadata.jsonl`: one line a pair, in order; it grows as pairs are made.
 
-use super::annotations::Objects;
+use super::annotations::{Objects, dota, yolo, yolo_oriented};
 use super::layout::{Layout, Manifest, broken, cannot, image_name};
 use super::pair::Pair;
 use crate::error::Result;
@@ -9,6 +9,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use wake_physics::Scene;
+use whole_files::{checksum, sealed, unsealed};
 use wake_physics::scene::Ship;
 
 /// One pair as a line of `metadata.jsonl`.
@@ -16,6 +17,8 @@ use wake_physics::scene::Ship;
 pub(super) struct Row {
     /// Path of the image, below the folder.
     pub(super) file_name: String,
+    /// [Checksum](checksum) of the image's file.
+    image_crc32: String,
     /// The prompt.
     pub(super) text: String,
     #[serde(flatten)]
@@ -33,15 +36,75 @@ pub(super) struct Row {
 
 impl Row {
     /// The line of a pair.
-    pub(super) fn of(pair: &Pair) -> Self {
+    ///
+    /// - `image_crc32`: [checksum] of its image's file
+    pub(super) fn of(pair: &Pair, image_crc32: String) -> Self {
         Self {
             file_name: image_name(pair.index),
+            image_crc32,
             text: pair.prompt.clone(),
             columns: Columns::of(&pair.scene),
             scene: pair.scene.clone(),
             objects: Objects::of(&pair.labels),
             amplitudes: pair.amplitudes,
         }
+    }
+
+    /// The content of the image's file.
+    ///
+    /// - `line`: number of this row in `metadata.jsonl`, from 1
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dataset`](crate::Error::Dataset) if the file is not the one that was written with this row.
+    pub(super) fn image_bytes(&self, path: &Path, line: usize) -> Result<Vec<u8>> {
+        let bytes = std::fs::read(path).map_err(|e| cannot("read", path, e))?;
+        let found = checksum(&bytes);
+        if found == self.image_crc32 {
+            return Ok(bytes);
+        }
+        let message = format!(
+            "damaged or another image: its CRC-32 is {found}, line {line} of metadata.jsonl has {}; remove the file and \
+             run make_dataset again to make it anew",
+            self.image_crc32
+        );
+        Err(broken(path, 0, message))
+    }
+
+    /// The contents of the label files of an image of `[rows, columns]` pixels, in the order of [`Layout::files_of`].
+    pub(super) fn labels(&self, size: [usize; 2]) -> [String; 3] {
+        let objects = &self.objects;
+        [
+            yolo(objects, size),
+            yolo_oriented(objects, size),
+            dota(objects),
+        ]
+    }
+
+    /// Checks that image and labels are those that were written with this row.
+    ///
+    /// - `files`: as [`Layout::files_of`] names them; all of them are there
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dataset`](crate::Error::Dataset) with the first file that is not.
+    pub(super) fn check_files(
+        &self,
+        [image, labels @ ..]: &[PathBuf; 4],
+        line: usize,
+        size: [usize; 2],
+    ) -> Result<()> {
+        self.image_bytes(image, line)?;
+        for (path, text) in labels.iter().zip(self.labels(size)) {
+            if std::fs::read(path).map_err(|e| cannot("read", path, e))? != text.as_bytes() {
+                let message = format!(
+                    "changed: not the labels of line {line} of metadata.jsonl; remove the file and run make_dataset again \
+                     to make it anew"
+                );
+                return Err(broken(path, 0, message));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -157,29 +220,43 @@ impl Log {
 }
 
 /// A row as its line.
-fn line(row: &Row) -> Result<String> {
+pub(super) fn line(row: &Row) -> Result<String> {
     let text = serde_json::to_string(row);
     let text = text.map_err(|e| cannot("encode", Path::new(&row.file_name), e.into()))?;
-    Ok(text + "\n")
+    Ok(sealed(&text) + "\n")
 }
 
-/// The rows of whole lines.
+/// The rows of whole lines, each with its checksum and of its own pair.
 pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Rows> {
     let lines = text.split_inclusive(|&b| b == b'\n').enumerate();
     let mut indices = manifest.indices();
     let parse = |(at, line): (usize, &[u8])| -> Result<(u64, Row)> {
-        let row = serde_json::from_slice(line)
-            .map_err(|e| broken(path, at + 1, format!("not a line of a data set: {e}")))?;
+        let fail = |message: String| broken(path, at + 1, message);
+        let row: Row = serde_json::from_slice(line)
+            .map_err(|e| fail(format!("not a line of a data set: {e}")))?;
+        let text = std::str::from_utf8(line).ok();
+        let text = text.and_then(|line| line.strip_suffix('\n'));
+        if text.and_then(unsealed).is_none() {
+            let message = "changed: its checksum crc32 does not fit; restore the line, or remove it and all below it and \
+                           run make_dataset again";
+            return Err(fail(message.to_owned()));
+        }
         let index = indices
             .next()
-            .ok_or_else(|| broken(path, at + 1, "more lines than pairs"))?;
+            .ok_or_else(|| fail("more lines than pairs".to_owned()))?;
+        if row.file_name != image_name(index) {
+            let found = &row.file_name;
+            return Err(fail(format!(
+                "of {found}, where that of pair {index} belongs; restore the lines in their order"
+            )));
+        }
         Ok((index, row))
     };
     lines.map(parse).collect()
 }
 
-/// Checks that the lines are those that this set makes, byte for byte but for the amplitudes of quick-looks, which only their
-/// images tell.
+/// Checks that the lines are those that this set makes, byte for byte but for what only the images tell: their checksums, and
+/// the amplitudes of quick-looks.
 fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<()> {
     let source = manifest.source()?;
     let lines = text.split_inclusive(|&b| b == b'\n');
@@ -188,7 +265,10 @@ fn check(path: &Path, text: &[u8], rows: &Rows, manifest: &Manifest) -> Result<(
             amplitudes: kept
                 .amplitudes
                 .filter(|_| source.quick_look(*index).is_some()),
-            ..Row::of(&source.pair_without_image(*index)?)
+            ..Row::of(
+                &source.pair_without_image(*index)?,
+                kept.image_crc32.clone(),
+            )
         };
         if found != line(&row)?.as_bytes() {
             let message = format!("not the line of pair {index} of this recipe and seed");

@@ -1,12 +1,16 @@
 //! Makes a data set in a folder, or what is missing of it.
 
-use super::annotations::{Coco, data_yaml, dota, yolo, yolo_oriented};
+use super::annotations::{Coco, data_yaml};
 use super::layout::{Layout, Manifest, Shard, broken, cannot};
 use super::metadata::{Log, Row, Rows};
 use super::ordered::Ordered;
 use super::scenes::Simulated;
 use crate::error::{Error, Result};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::Path;
+use whole_files::checksum;
+use wake_physics::output;
 use whole_files::FolderLock;
 
 /// How far a data set is.
@@ -23,13 +27,14 @@ pub struct Progress {
 /// Makes the data set of a manifest in a folder on `jobs` threads, continuing what an earlier run began.
 ///
 /// The folder's content is a function of the manifest alone, byte for byte. A run that is killed leaves no
-/// half-written file; the next one continues. `watch` hears of every pair.
+/// half-written file; the next one continues, after it has read what is there and compared it with its checksums. `watch`
+/// hears of every pair.
 ///
 /// - `source`: the manifest's own, on its learnt sea where it names one
 ///
 /// # Errors
 ///
-/// [`Error::Dataset`] if the folder holds something else, [`wake_nn::Error::Io`] if it cannot be written,
+/// [`Error::Dataset`] if the folder holds something else or a damaged file, [`wake_nn::Error::Io`] if it cannot be written,
 /// [`wake_nn::Error::InvalidOption`] for a source of another recipe or seed, or with a sea that the manifest does not name.
 pub fn write(
     folder: &Path,
@@ -41,10 +46,10 @@ pub fn write(
     check_source(manifest, source)?;
     let _lock = claim(folder, &manifest.text()?, manifest.shard)?;
     let mut log = Log::open(folder, manifest)?;
-    let missing = missing(folder, manifest, log.rows.len());
+    let missing = missing(folder, manifest, &log.rows)?;
     let total = manifest.indices().end - manifest.indices().start;
     let mut progress = Progress {
-        done: total - missing.len() as u64,
+        done: total - missing.indices.len() as u64,
         total,
         made: 0,
     };
@@ -137,18 +142,44 @@ fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
     }))
 }
 
-/// Indices without a line, or without their files.
-fn missing(folder: &Path, manifest: &Manifest, lines: usize) -> Vec<u64> {
-    let start = manifest.indices().start;
-    let is_there = |index: u64| {
-        let [image, labels @ ..] = Layout(folder).files_of(index);
-        std::fs::metadata(image).is_ok_and(|file| file.len() > 0)
-            && labels.iter().all(|labels| labels.exists())
+/// Pairs to be made.
+struct Missing {
+    indices: Vec<u64>,
+    /// Of those that lost only files: the number of their line, and its row.
+    lines: BTreeMap<u64, (usize, Row)>,
+}
+
+/// Pairs without a line, or without their files.
+///
+/// # Errors
+///
+/// [`Error::Dataset`] with the first file that is not as it was written.
+fn missing(folder: &Path, manifest: &Manifest, rows: &Rows) -> Result<Missing> {
+    let grid = &manifest.recipe.scene.grid;
+    let size = [grid.rows, grid.columns];
+    let is_there = |(at, (index, row)): (usize, &(u64, Row))| -> Result<bool> {
+        let files = Layout(folder).files_of(*index);
+        let [image, labels @ ..] = &files;
+        let is_there = std::fs::metadata(image).is_ok_and(|file| file.len() > 0)
+            && labels.iter().all(|labels| labels.exists());
+        if is_there {
+            row.check_files(&files, at + 1, size)?;
+        }
+        Ok(is_there)
     };
-    manifest
-        .indices()
-        .filter(|&index| index - start >= lines as u64 || !is_there(index))
-        .collect()
+    let are_there: Vec<Result<bool>> = rows.par_iter().enumerate().map(is_there).collect();
+    let mut lines = BTreeMap::new();
+    for (at, (is_there, (index, row))) in are_there.into_iter().zip(rows).enumerate() {
+        if !is_there? {
+            lines.insert(*index, (at + 1, row.clone()));
+        }
+    }
+    let indices = manifest.indices();
+    let new = indices.start + rows.len() as u64..indices.end;
+    Ok(Missing {
+        indices: lines.keys().copied().chain(new).collect(),
+        lines,
+    })
 }
 
 /// Makes pairs and writes their files on `jobs` threads; their rows come in order.
@@ -156,22 +187,25 @@ fn make(
     folder: &Path,
     source: &Simulated,
     jobs: usize,
-    indices: Vec<u64>,
+    missing: Missing,
 ) -> Result<Ordered<(u64, Row)>> {
     let (source, folder) = (source.clone(), folder.to_owned());
+    let Missing { indices, lines } = missing;
     Ordered::new(indices.into_iter(), jobs, move |index| {
         let pair = source.pair(index)?;
-        let row = Row::of(&pair);
         let [image, labels @ ..] = Layout(&folder).files_of(index);
         let size = [pair.image.rows, pair.image.columns];
-        wake_physics::output::write_png(&image, &pair.image.levels(), size[0], size[1])?;
-        let objects = &row.objects;
-        let texts = [
-            yolo(objects, size),
-            yolo_oriented(objects, size),
-            dota(objects),
-        ];
-        for (path, text) in labels.iter().zip(texts) {
+        let png = output::encode_png(&image, &pair.image.levels(), size[0], size[1])?;
+        let row = Row::of(&pair, checksum(&png));
+        if let Some((line, _)) = lines.get(&index).filter(|(_, kept)| *kept != row) {
+            let message = format!(
+                "pair {index} comes out otherwise than this line says, as on another processor or version; go on with \
+                 those that made the set, or make it again in another folder"
+            );
+            return Err(broken(&Layout(&folder).metadata(), *line, message));
+        }
+        whole_files::write_atomically(&image, &png)?;
+        for (path, text) in labels.iter().zip(row.labels(size)) {
             whole_files::write_atomically(path, text.as_bytes())?;
         }
         Ok((index, row))

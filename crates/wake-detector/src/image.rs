@@ -155,7 +155,6 @@ impl GreyImage {
     /// # Panics
     ///
     /// When there are not `rows · columns` of them.
-    #[cfg(any(test, feature = "train"))]
     pub fn from_levels(rows: usize, columns: usize, levels: &[f32]) -> Self {
         assert_eq!(levels.len(), rows * columns, "pixels of an image");
         let levels = levels.iter().map(|x| x.round().clamp(0.0, 255.0) as u8);
@@ -167,7 +166,6 @@ impl GreyImage {
     }
 
     /// The image rotated by a quarter clockwise.
-    #[cfg(test)]
     pub fn turned(&self) -> Self {
         let turn = |value: &dyn Fn(usize, usize) -> f32| -> Vec<f32> {
             let places = (0..self.columns).flat_map(|r| (0..self.rows).map(move |c| (r, c)));

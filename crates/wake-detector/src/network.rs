@@ -16,18 +16,20 @@ pub const INPUTS: usize = 2;
 /// Maps that come out, see [`Map`].
 pub const OUTPUTS: usize = 8;
 
-/// Channels of what comes out.
+/// Output channels of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Map {
     /// Logit: a wake begins here.
     Tip = 0,
     /// Logit: the line of a wake passes here.
     Line = 1,
-    /// Direction of that line from the tip along the wake, its part to the right and its part downward.
+    /// Direction of that line from the tip along the wake: part to the right.
     LineRight = 2,
+    /// Direction of that line from the tip along the wake: part downward.
     LineDown = 3,
-    /// The same for the wake whose tip is here.
+    /// Direction of the wake whose tip is here: part to the right.
     TipRight = 4,
+    /// Direction of the wake whose tip is here: part downward.
     TipDown = 5,
     /// Logarithm of the visible length over [`LENGTH_UNIT`].
     Length = 6,

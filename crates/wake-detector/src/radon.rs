@@ -310,10 +310,10 @@ fn log_tail(t: f64) -> f64 {
     ln / std::f64::consts::LN_10
 }
 
-#[cfg(all(test, feature = "train"))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::draw::Draw;
+    use wake_nn::noise::NoiseSource;
 
     /// Values of the two-sided normal tail: 0.3173105, 0.0455003, 5.7330e-7, 1.9732e-9 at 1, 2, 5, 6.
     #[test]
@@ -337,10 +337,8 @@ mod tests {
     fn a_dark_line_beside_a_target_is_found() {
         let (size, mut alarms) = (400, 0);
         for seed in 0..3 {
-            let mut draw = Draw::new(seed, 9);
-            let mut levels: Vec<f32> = (0..size * size)
-                .map(|_| 100.0 + 12.0 * draw.normal())
-                .collect();
+            let noise = NoiseSource::new(seed).normal(0, size * size);
+            let mut levels: Vec<f32> = noise.iter().map(|n| 100.0 + 12.0 * n).collect();
             let dark = |levels: &mut [f32]| {
                 for k in 0..180 {
                     for c in -3i32..=3 {

@@ -47,7 +47,7 @@ pub enum Error {
     },
     /// The fields would not fit in memory.
     #[error(
-        "a grid of {rows} x {columns} pixels with a margin of {} x {} for displaced echoes needs about {needed_gib:.1} GiB, but {available_gib:.1} GiB are free; lower grid.rows, grid.columns or radar.range_to_velocity, or raise grid.spacing", margin[0], margin[1]
+        "a grid of {rows} x {columns} pixels with a margin of {} x {} for displaced echoes needs about {needed_gib:.1} GiB, but {available_gib:.1} GiB are free; {advice}", margin[0], margin[1]
     )]
     TooLarge {
         rows: usize,
@@ -55,6 +55,8 @@ pub enum Error {
         margin: [usize; 2],
         needed_gib: f64,
         available_gib: f64,
+        /// What to change, beginning with a verb.
+        advice: &'static str,
     },
 }
 

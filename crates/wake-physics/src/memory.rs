@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Checks that `needed` bytes for a grid are free.
+/// Checks that `needed` bytes for a grid are free; `advice` says what would need less.
 ///
 /// What is free is what the machine has left or, where less, what the limits of the control groups of this process
 /// leave (containers). A few megabytes are never asked for. Where the system does not tell (only Linux is asked) nothing is refused.
@@ -11,7 +11,11 @@ use std::path::{Path, PathBuf};
 /// # Errors
 ///
 /// [`Error::TooLarge`] with what is needed and what is free.
-pub(crate) fn check([rows, columns]: [usize; 2], margin: [usize; 2], needed: u64) -> Result<()> {
+pub(crate) fn check(
+    [rows, columns]: [usize; 2],
+    margin: [usize; 2],
+    (needed, advice): (u64, &'static str),
+) -> Result<()> {
     if needed <= NEVER_ASKED {
         return Ok(());
     }
@@ -22,6 +26,7 @@ pub(crate) fn check([rows, columns]: [usize; 2], margin: [usize; 2], needed: u64
             margin,
             needed_gib: needed as f64 / GIB,
             available_gib: free as f64 / GIB,
+            advice,
         }),
         _ => Ok(()),
     }
@@ -141,9 +146,11 @@ mod tests {
 
     #[test]
     fn what_never_fits_is_refused_where_the_system_tells() {
-        assert!(check([1, 1], [0, 0], 0).is_ok());
+        assert!(check([1, 1], [0, 0], (0, "")).is_ok());
         if available().is_some() {
-            let message = check([9, 9], [0, 0], u64::MAX).unwrap_err().to_string();
+            let message = check([9, 9], [0, 0], (u64::MAX, "lower grid.rows"))
+                .unwrap_err()
+                .to_string();
             assert!(message.contains("grid.rows"), "{message}");
         }
     }

@@ -37,11 +37,26 @@ fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) 
 ///
 /// If there are not rows × columns pixels.
 pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
+    Ok(write_atomically(path, &encode_png(path, pixels, rows, columns)?)?)
+}
+
+/// The bytes of an 8-bit grey PNG, as [`write_png`] writes them.
+///
+/// - `path`: named in the error
+///
+/// # Errors
+///
+/// [`Error::File`].
+///
+/// # Panics
+///
+/// If there are not rows × columns pixels.
+pub fn encode_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
         .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::L8)
         .map_err(|e| file_error("encode", path, &e))?;
-    Ok(write_atomically(path, &bytes)?)
+    Ok(bytes)
 }
 
 /// Writes a PNG of red, green and blue, 8 bits each: `[rows, columns, 3]`; one without colours as a grey one, which is smaller

@@ -175,6 +175,23 @@ impl Track {
         }
     }
 
+    /// The distances astern of midship \[m\] at which the perpendicular of the track may cross a raster, in order: on a turn
+    /// those of the half circle and of the straight line before it, else those of the straight track and none.
+    pub(crate) fn astern(&self, raster: &Raster) -> [[f64; 2]; 2] {
+        let of = |straight: Self| {
+            let corners = straight.corners(raster).map(|corner| -corner[0]);
+            let near = corners.iter().copied().fold(f64::INFINITY, f64::min);
+            let far = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            [near.max(0.0), far]
+        };
+        let Some((radius, _)) = self.turn() else {
+            return [of(*self), [0.0, -1.0]];
+        };
+        let half_circle = PI * radius;
+        let before = of(self.at(-half_circle).straight());
+        [[0.0, half_circle], before.map(|d| half_circle + d)]
+    }
+
     /// The columns of a row of a raster that may lie no farther than `reach` \[m\] off the track.
     pub(crate) fn columns_within(&self, raster: &Raster, row: usize, reach: f64) -> Range<usize> {
         if self.turn().is_some() {

@@ -13,6 +13,9 @@ use std::f64::consts::TAU;
 /// Block coefficient of the full hull where the scene names none: a laden tanker.
 const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
 
+/// Farthest coordinate of a ship \[m\]: squares and areas of what lies farther overflow. No image is anywhere near.
+const FARTHEST: f64 = 1e100;
+
 /// What one ship leaves on the water.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wake {
@@ -58,7 +61,7 @@ fn kelvin(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
         },
         speed: ship.speed,
         track: Track::turning(
-            ship.position,
+            ship.position.map(|at| at.clamp(-FARTHEST, FARTHEST)),
             ship.heading,
             ship.speed * time,
             ship.curvature(),

@@ -133,9 +133,12 @@ fn amount(sentence: &[Piece<'_>], at: usize) -> Option<Amount> {
     let unit = unit(sentence, at + 1);
     let (dimension, factor, words) =
         unit.map_or((None, 1.0, 0), |u| (Some(u.dimension), u.factor, u.words));
+    let value = number * factor + 0.0; // +0.0: never −0
+    // "45 100 degrees" and "5,270 degrees" are lists whose marks look like those of thousands.
+    let is_list = dimension == Some(Dimension::Angle) && (1000.0..f64::INFINITY).contains(&value);
     Some(Amount {
         dimension,
-        value: number * factor + 0.0, // +0.0: never −0
+        value: if is_list { f64::NAN } else { value },
         pieces: at..at + 1 + words,
     })
 }

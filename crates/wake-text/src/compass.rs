@@ -94,6 +94,11 @@ fn read(word: &str) -> Option<(f64, Form)> {
     Some((POINT * rank as f64, form))
 }
 
+/// Whether a word or its letters may be a compass word.
+pub(crate) fn may_be_compass(word: &str) -> bool {
+    read(word).is_some()
+}
+
 /// Whether a word is a compass word by itself; single letters are not.
 pub(crate) fn is_compass(word: &str) -> bool {
     word.len() > 2 && read(word).is_some()

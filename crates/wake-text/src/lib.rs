@@ -8,17 +8,27 @@ mod error;
 // Scene → prompt → what it states.
 mod cleaning;
 #[cfg(feature = "scene")]
+mod numbers;
+#[cfg(feature = "scene")]
 mod pieces;
 #[cfg(feature = "scene")]
 mod amounts;
 #[cfg(feature = "scene")]
 mod compass;
 #[cfg(feature = "scene")]
+mod filler;
+#[cfg(feature = "scene")]
 mod subjects;
+#[cfg(feature = "scene")]
+mod denials;
+#[cfg(feature = "scene")]
+mod modifiers;
 #[cfg(feature = "scene")]
 mod statement;
 #[cfg(feature = "scene")]
 mod wording;
+#[cfg(feature = "scene")]
+mod leftovers;
 #[cfg(feature = "scene")]
 mod sentence;
 #[cfg(feature = "scene")]

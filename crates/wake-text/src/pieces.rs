@@ -1,6 +1,7 @@
 //! A prompt as numbers, words and punctuation.
 
 use crate::cleaning::{Cleaned, clean};
+use crate::numbers::{continues, digits, spelt, unsigned};
 use std::ops::Range;
 
 /// A prompt in lower case and usual forms, as CLIP's cleaning leaves it, with the places its bytes came from.
@@ -31,6 +32,8 @@ impl<'p> Text<'p> {
         while let Some(c) = text[at..].chars().next() {
             let (kind, length) = if let Some(read) = number(text, at) {
                 (Some(read.0), read.1)
+            } else if let Some(length) = lettered(&text[at..]) {
+                (Some(Kind::Figure), length)
             } else if let Some((word, length)) = word(&text[at..]) {
                 (Some(Kind::Word(word)), length)
             } else {
@@ -50,10 +53,8 @@ impl<'p> Text<'p> {
     fn mark(&self, at: usize, c: char, last: Option<&Piece<'_>>) -> (Option<Kind<'static>>, usize) {
         let rest = &self.cleaned.text[at..];
         let dots = rest.len() - rest.trim_start_matches('.').len();
-        let marks = ["+/-", "+-"]
-            .into_iter()
-            .filter(|mark| rest.starts_with(mark));
-        let length = marks.map(str::len).next().unwrap_or(dots.max(c.len_utf8()));
+        let mark = LONG_MARKS.into_iter().find(|mark| rest.starts_with(mark));
+        let length = mark.map_or(dots.max(c.len_utf8()), str::len);
         let before_number = || {
             let next = rest[length..].trim_start().chars().next();
             next.is_some_and(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | '\u{2212}'))
@@ -62,8 +63,9 @@ impl<'p> Text<'p> {
         let kind = match c {
             '.' if dots > 1 && before_number() => Some(Kind::Dash),
             '.' if self.is_abbreviation(at, last) => None,
+            '<' | '>' | '=' | '!' if mark.is_some_and(|mark| mark != "==") => Some(Kind::Bound),
             '.' | '!' | '?' => Some(Kind::Stop),
-            ',' | ';' | '(' | ')' | '[' | ']' => Some(Kind::Comma),
+            ',' | ';' | '(' | ')' | '[' | ']' | '{' | '}' | '|' => Some(Kind::Comma),
             ':' | '=' => Some(Kind::Colon),
             '-' | '\u{2010}'..='\u{2015}' | '\u{2212}' | '\u{2026}' => {
                 before_number().then_some(Kind::Dash)
@@ -71,9 +73,11 @@ impl<'p> Text<'p> {
             '~' if after_number() => before_number().then_some(Kind::Dash),
             '\u{B1}' => Some(Kind::PlusMinus),
             '+' if length > 1 => Some(Kind::PlusMinus),
-            '<' | '>' | '\u{2264}' | '\u{2265}' => Some(Kind::Bound),
+            '<' | '>' | '\u{2260}' | '\u{2264}' | '\u{2265}' => Some(Kind::Bound),
             '/' | '\u{D7}' | '*' => Some(Kind::Cross),
-            _ => None,
+            '@' => Some(Kind::Word("at")),
+            _ if is_silent(c) => None,
+            _ => Some(Kind::Symbol),
         };
         (kind, length)
     }
@@ -101,6 +105,26 @@ impl<'p> Text<'p> {
     }
 }
 
+/// Marks of several characters.
+const LONG_MARKS: [&str; 11] = [
+    "+/-", "+-", "<=", ">=", "=<", "=>", "<>", "!=", "==", "<<", ">>",
+];
+
+/// Whether a character that is no letter and no digit says nothing: space, quotes, signs of "about", bullets.
+fn is_silent(c: char) -> bool {
+    c.is_whitespace()
+        || c.is_control()
+        || matches!(
+            c,
+            '"' | '\'' | '`' | '&' | '_' | '~' | '-' | '\u{AD}' | '\u{B4}' | '\u{AB}' | '\u{BB}'
+        )
+        || matches!(
+            c,
+            '\u{2248}' | '\u{2245}' | '\u{223C}' | '\u{2022}' | '\u{B7}' | '\u{FE0F}'
+        )
+        || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2010}'..='\u{201F}' | '\u{2026}' | '\u{2060}'..='\u{2064}')
+}
+
 /// Words that a full stop may follow within a sentence.
 const ABBREVIATIONS: [&str; 32] = [
     "deg", "degs", "kt", "kts", "kn", "m", "km", "nm", "nmi", "mi", "ft", "m/s", "km/h", "kmh",
@@ -125,7 +149,7 @@ pub(crate) struct Piece<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Kind<'a> {
     Number(f64),
-    /// Digits that are not one number, such as `1.2.3`.
+    /// Digits that are not one number, such as `1.2.3` and `l0`.
     Figure,
     /// Letters, with slashes and apostrophes between them; or `°`.
     Word(&'a str),
@@ -138,11 +162,16 @@ pub(crate) enum Kind<'a> {
     /// A dash or dots before a number.
     Dash,
     PlusMinus,
-    /// `<`, `>`, `≤` or `≥`.
+    /// `<`, `>=`, `≤`, `≠` and their like.
     Bound,
     /// `×`, `*`, or a slash that joins no words.
     Cross,
+    /// Any other sign, such as `%` and `→`.
+    Symbol,
 }
+
+/// Marks after which `.5` is a number.
+const OPENING: &str = "([{,;:=<>\u{2264}\u{2265}\u{B1}~+-\u{2212}\u{2013}/@|";
 
 /// The number at a place of a text, and its length. A sign counts where no letter or digit stands before it.
 fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
@@ -155,6 +184,11 @@ fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
         .into_iter()
         .find(|&sign| !after_word && rest.starts_with(sign));
     let sign_length = sign.map_or(0, char::len_utf8);
+    // A point right after a word, a unit or a bracket ends it, and opens no number.
+    let opens = |c: char| c.is_whitespace() || OPENING.contains(c);
+    if rest.starts_with('.') && !text[..at].chars().next_back().is_none_or(opens) {
+        return None;
+    }
     let (value, length) = unsigned(&rest[sign_length..])?;
     let value = if sign.is_some_and(|sign| sign != '+') {
         -value
@@ -167,190 +201,6 @@ fn number(text: &str, at: usize) -> Option<(Kind<'static>, usize)> {
         Kind::Number(value)
     };
     Some((kind, sign_length + length))
-}
-
-/// Value and length of `12`, `1,200`, `12 000`, `1.5`, `1,5`, `.5`, `1.5e3`, `1/2`, `8 1/2` or `8½`; not a
-/// number for digits that are joined in another way.
-fn unsigned(text: &str) -> Option<(f64, usize)> {
-    let (whole, mut length) = match decimal(text) {
-        Some(read) => read,
-        None => vulgar(text).or_else(|| other_digits(text))?,
-    };
-    let (mut value, rest) = (whole, &text[length..]);
-    let is_whole = text[..length].bytes().all(|byte| byte.is_ascii_digit());
-    if is_whole && let Some((fraction, more)) = slashed(text) {
-        (value, length) = (fraction, more);
-    } else if is_whole && let Some((fraction, more)) = fraction_after(rest) {
-        (value, length) = (whole + fraction, length + more);
-    }
-    let rest = &text[length..];
-    let raised = |c: char| c.is_numeric() && !c.is_ascii_digit();
-    let tail = match rest.strip_prefix('^') {
-        Some(power) => 1 + digits(power.as_bytes()),
-        None => rest.find(|c| !raised(c)).unwrap_or(rest.len()),
-    };
-    Some(if tail > 0 {
-        (f64::NAN, length + tail)
-    } else {
-        (value, length)
-    })
-}
-
-/// Digits with points, commas and spaces between them, and an exponent.
-fn decimal(text: &str) -> Option<(f64, usize)> {
-    let bytes = text.as_bytes();
-    let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
-    let mut length = 0;
-    while digit(length) || (matches!(bytes.get(length), Some(b'.' | b',')) && digit(length + 1)) {
-        length += 1;
-    }
-    if length == 0 {
-        return None;
-    }
-    let mut number = text[..length].to_owned();
-    if length <= 3 && number.bytes().all(|byte| byte.is_ascii_digit()) {
-        while let Some(group) = spaced_group(&text[length..]) {
-            length += group;
-            number.push_str(&text[length - 3..length]);
-        }
-    }
-    let exponent = exponent_length(&bytes[length..]);
-    let value = plain_number(&number).map(|number| number + &text[length..length + exponent]);
-    let value = value.and_then(|number| number.parse().ok());
-    Some((value.unwrap_or(f64::NAN), length + exponent))
-}
-
-/// Length of a space and three digits that continue a number such as `10 000`.
-fn spaced_group(text: &str) -> Option<usize> {
-    let space = text
-        .chars()
-        .next()
-        .filter(|c| matches!(c, ' ' | '\u{A0}' | '\u{2009}' | '\u{202F}'))?;
-    let group = &text.as_bytes()[space.len_utf8()..];
-    let is_group = digits(group) == 3 && !matches!(group.get(3), Some(b'.' | b',' | b'/'));
-    is_group.then(|| space.len_utf8() + 3)
-}
-
-/// Digits as Rust writes them: commas between groups of three go, a single other comma is a decimal point.
-fn plain_number(number: &str) -> Option<String> {
-    let (whole, decimals) = number.split_once('.').unwrap_or((number, ""));
-    let groups: Vec<&str> = whole.split(',').collect();
-    let grouped = groups[0].len() <= 3
-        && groups[0] != "0"
-        && groups[1..].iter().all(|group| group.len() == 3);
-    if decimals.contains(['.', ',']) {
-        None
-    } else if groups.len() == 1 || grouped {
-        Some(number.replace(',', ""))
-    } else {
-        (groups.len() == 2 && !number.contains('.')).then(|| number.replace(',', "."))
-    }
-}
-
-fn exponent_length(text: &[u8]) -> usize {
-    let (sign, power) = match text {
-        [b'e', b'-' | b'+', power @ ..] => (1, power),
-        [b'e', power @ ..] => (0, power),
-        _ => return 0,
-    };
-    match digits(power) {
-        0 => 0,
-        count => 1 + sign + count,
-    }
-}
-
-fn digits(text: &[u8]) -> usize {
-    text.iter().take_while(|byte| byte.is_ascii_digit()).count()
-}
-
-/// `1/2` and other halves, quarters and eighths; other digits with slashes, such as dates, are no number.
-fn slashed(text: &str) -> Option<(f64, usize)> {
-    let length = text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '/' | '\u{2044}')));
-    let all = &text[..length.unwrap_or(text.len())];
-    let all = all.trim_end_matches(['/', '\u{2044}']);
-    let (above, below) = all.split_once(['/', '\u{2044}'])?;
-    let (above, below): (f64, f64) = match (above.parse(), below) {
-        (Ok(above), "2" | "3" | "4" | "8") => (above, below.parse().ok()?),
-        _ => (1.0, 0.0),
-    };
-    let value = if above < below {
-        above / below
-    } else {
-        f64::NAN
-    };
-    Some((value, all.len()))
-}
-
-/// A fraction below one right after a whole number, or after one space.
-fn fraction_after(text: &str) -> Option<(f64, usize)> {
-    let space = usize::from(text.starts_with([' ', '-']));
-    let (value, length) =
-        vulgar(&text[space..]).or_else(|| slashed(&text[space..]).filter(|_| space > 0))?;
-    (value < 1.0).then_some((value, space + length))
-}
-
-/// `½` and its like.
-fn vulgar(text: &str) -> Option<(f64, usize)> {
-    let c = text.chars().next()?;
-    let eighths = [
-        ('¼', 2.0),
-        ('½', 4.0),
-        ('¾', 6.0),
-        ('⅛', 1.0),
-        ('⅜', 3.0),
-        ('⅝', 5.0),
-        ('⅞', 7.0),
-    ];
-    let (_, count) = eighths.into_iter().find(|&(sign, _)| sign == c)?;
-    Some((count / 8.0, c.len_utf8()))
-}
-
-/// Numbers in words.
-const SPELT: [&str; 28] = [
-    "zero",
-    "one",
-    "two",
-    "three",
-    "four",
-    "five",
-    "six",
-    "seven",
-    "eight",
-    "nine",
-    "ten",
-    "eleven",
-    "twelve",
-    "thirteen",
-    "fourteen",
-    "fifteen",
-    "sixteen",
-    "seventeen",
-    "eighteen",
-    "nineteen",
-    "twenty",
-    "thirty",
-    "forty",
-    "fifty",
-    "sixty",
-    "seventy",
-    "eighty",
-    "ninety",
-];
-
-/// The number a word spells; `one` is an article.
-fn spelt(word: &str) -> Option<f64> {
-    let rank = SPELT.iter().position(|&spelt| spelt == word)?;
-    Some(if rank < 20 {
-        rank as f64
-    } else {
-        10.0 * (rank - 18) as f64
-    })
-}
-
-/// Whether "five" goes on from "twenty", "thirty" from "two hundred".
-fn continues(value: f64, more: f64) -> bool {
-    let step = if more < 10.0 { 10.0 } else { 100.0 };
-    more > 0.0 && value >= step + 10.0 && value % step == 0.0
 }
 
 /// Takes a word that spells a number, or continues one ("twenty-five", "ten thousand"), as that number.
@@ -383,11 +233,11 @@ fn join_spelt<'a>(found: &mut Vec<Piece<'a>>, piece: &Piece<'a>) -> bool {
     true
 }
 
-/// Digits of other scripts, and raised ones: no number that is read.
-fn other_digits(text: &str) -> Option<(f64, usize)> {
-    let length = text.find(|c: char| !c.is_numeric() || c.is_ascii_digit());
-    let length = length.unwrap_or(text.len());
-    (length > 0).then_some((f64::NAN, length))
+/// Length of a letter and the digits right after it, such as `l0` and `u10`.
+fn lettered(text: &str) -> Option<usize> {
+    let letter = text.chars().next().filter(|c| c.is_alphabetic())?;
+    let digits = digits(&text.as_bytes()[letter.len_utf8()..]);
+    (digits > 0).then_some(letter.len_utf8() + digits)
 }
 
 /// The word a text starts with, and its length: without the dots of `m.p.h.` and the `'s` of `ship's`, with the
@@ -396,7 +246,7 @@ fn word(text: &str) -> Option<(&str, usize)> {
     if let Some(sign) = text.chars().next().filter(|c| matches!(c, '°' | 'º' | '˚')) {
         return Some(("°", sign.len_utf8()));
     }
-    if let Some(found) = dotted(text) {
+    if let Some(found) = dotted(text).or_else(|| shortened(text)) {
         return Some(found);
     }
     let end = text.find(|c: char| !(c.is_alphabetic() || matches!(c, '/' | '\'')));
@@ -414,6 +264,16 @@ fn word(text: &str) -> Option<(&str, usize)> {
         Some((per, whole.len() + power.len()))
     });
     Some(power.unwrap_or((whole.strip_suffix("'s").unwrap_or(whole), whole.len())))
+}
+
+/// `w/` and `w/o`, and their length.
+fn shortened(text: &str) -> Option<(&'static str, usize)> {
+    let ends = |length: usize| !text[length..].starts_with(|c: char| c.is_alphabetic() || c == '/');
+    match text.strip_prefix("w/")? {
+        rest if rest.starts_with('o') && ends(3) => Some(("without", 3)),
+        rest if rest.starts_with("out") && ends(5) => Some(("without", 5)),
+        _ => ends(2).then_some(("with", 2)),
+    }
 }
 
 /// An abbreviation such as `m.p.h.` or `n.e.`, and its length.

@@ -14,8 +14,9 @@ use std::ops::Range;
 
 /// What was understood of a prompt, and what was not.
 ///
-/// Every number and every word of the field in a prompt (ships, wakes, wind, waves, fetch, incidence, directions,
-/// units and their like) is either a part of `scene` or named in `unread`.
+/// Every number and every word of a prompt is a part of `scene`, filler that changes no value ("a", "of", "image",
+/// "sea"), or named in `unread`; so is every sign that is neither punctuation nor a part of a number. A text without a
+/// number and without a word of the field [states nothing](Self::states_nothing) as a whole, and names no words.
 ///
 /// | in a prompt | read as |
 /// | --- | --- |
@@ -28,7 +29,11 @@ use std::ops::Range;
 /// | "stationary ship", "anchored", "at rest" | a ship of 0 m/s |
 /// | "wake" | a ship, unless the prompt says that there is none |
 /// | "5 ± 1 m/s" | 5 m/s; the margin stays unread |
-/// | "5 to 7 m/s", "at least 5 m/s", numbers without a unit, what is denied ("not at 10 m/s") | unread |
+/// | "5 to 7 m/s", numbers without a unit, what is denied ("not at 10 m/s"), lists of thousands of degrees | unread |
+/// | "at least 5 m/s", ">= 5 m/s", "twice 5 m/s", "half of 10 m/s", "opposite to north", "45 degrees to port" and other words that change a value | word and value unread |
+/// | an unknown word right before a number, or bound to it by "of", "to" or a colon | word and value unread |
+/// | "unless …", "if …", "except …", "instead …", up to the next comma | unread |
+/// | "light wind", "a fast ferry" without a number | ship or wind; the strength unread |
 ///
 /// A compass word and a number may state the same direction up to half a point (11.25 degrees); the number counts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -46,6 +51,16 @@ pub struct Unread {
     pub place: Range<usize>,
     /// Its text.
     pub text: String,
+    #[serde(skip)]
+    of_the_field: bool,
+}
+
+impl Unread {
+    /// Whether a number or a word of the field (ships, wind, directions, units and their like) is among its words, so
+    /// that it may state a value; other unread words only describe.
+    pub fn is_of_the_field(&self) -> bool {
+        self.of_the_field
+    }
 }
 
 impl Reading {
@@ -86,15 +101,20 @@ impl Reading {
         let unread = sentences
             .iter()
             .flat_map(|sentence| sentence.unread(&scene));
-        let unread = unread.map(|place| {
-            let place = text.span(place);
-            let text = prompt[place.clone()].to_owned();
-            Unread { place, text }
+        let unread = unread.map(|left| {
+            let place = text.span(left.place);
+            Unread {
+                text: prompt[place.clone()].to_owned(),
+                place,
+                of_the_field: left.of_the_field,
+            }
         });
-        Ok(Self {
-            scene,
-            unread: unread.collect(),
-        })
+        let mut unread: Vec<Unread> = unread.collect();
+        // A text about something else states nothing as a whole.
+        if scene.is_empty() && !unread.iter().any(Unread::is_of_the_field) {
+            unread.clear();
+        }
+        Ok(Self { scene, unread })
     }
 
     /// Whether the prompt states nothing of a scene.

@@ -2,27 +2,20 @@
 
 use crate::amounts::{Amount, Dimension, Group, group, is_unit};
 use crate::compass::{Compass, Form, POINT, compass, is_compass};
+use crate::denials::{Denied, denials};
 use crate::error::Result;
+use crate::leftovers::{Left, Mark, Marked};
+use crate::modifiers::{modifier_after, modifier_before};
 use crate::pieces::{Kind, Piece, word_at};
 use crate::statement::{PartialScene, Statement, Value};
 use crate::subjects::{
-    Denied, Named, Subject, denials, is_at_rest, is_attribute, is_filler, is_link, is_motion,
-    is_unstated, leads, noun, subjects, word_before,
+    Named, Subject, is_approximate, is_at_rest, is_attribute, is_filler, is_link, is_motion,
+    is_strength, leads, noun, subjects, word_before,
 };
 use std::ops::Range;
 
 /// Subjects on each side among which the owner of a number is sought.
 const NEAR: usize = 64;
-
-/// Whether a piece has been taken in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Mark {
-    Open,
-    Used,
-    Unread,
-    /// Says that there is no wake: used where there is no ship.
-    NoWake,
-}
 
 /// Where a direction points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +52,11 @@ impl<'t, 'a> Sentence<'t, 'a> {
             if self.marks[at] != Mark::Open {
                 at += 1;
             } else if let Some(group) = group(self.pieces, at) {
+                if let Some(changed) = self.changed(at, &group) {
+                    at = changed.end;
+                    self.mark(changed, Mark::Unread);
+                    continue;
+                }
                 at = match group {
                     Group::One(amount, end) => {
                         self.mark(amount.pieces.end..end, Mark::Unread);
@@ -66,7 +64,8 @@ impl<'t, 'a> Sentence<'t, 'a> {
                         end
                     }
                     Group::NoValue(end) => {
-                        self.mark(at..end, Mark::Unread);
+                        let start = self.bounds(at).unwrap_or(at);
+                        self.mark(start..end, Mark::Unread);
                         end
                     }
                 };
@@ -86,6 +85,25 @@ impl<'t, 'a> Sentence<'t, 'a> {
 
     fn mark(&mut self, pieces: Range<usize>, mark: Mark) {
         self.marks[pieces].fill(mark);
+    }
+
+    /// The pieces of a group of numbers with the words that change it, if some do.
+    fn changed(&self, at: usize, group: &Group) -> Option<Range<usize>> {
+        let (turns, end) = match group {
+            Group::One(amount, end) => (amount.dimension == Some(Dimension::Angle), *end),
+            Group::NoValue(end) => (true, *end),
+        };
+        let before = modifier_before(self.pieces, at, true);
+        let after = modifier_after(self.pieces, end, turns);
+        before.or(after)?;
+        Some(before.unwrap_or(at)..after.unwrap_or(end))
+    }
+
+    /// The word that bounds a quantity which its subject does not follow: "wind under 5 m/s", but "under 5 m/s wind".
+    fn bounds(&self, start: usize) -> Option<usize> {
+        let before = self.before(start)?;
+        let word = word_at(self.pieces, before)?;
+        matches!(word, "under" | "over" | "past" | "near").then_some(before)
     }
 
     /// Takes in what is denied; its subjects own nothing.
@@ -133,12 +151,25 @@ impl<'t, 'a> Sentence<'t, 'a> {
             self.mark(pieces, Mark::Unread);
             return Ok(());
         };
+        if let Some(bound) = self.bounds(pieces.start).filter(|_| !right_after) {
+            self.mark(bound..pieces.end, Mark::Unread);
+            return Ok(());
+        }
         let end = if right_after {
             owner.at + 1
         } else {
             pieces.end
         };
-        let (way, start) = self.way(pieces.start);
+        let minus = word_before(self.pieces, pieces.start) == Some("minus");
+        let sign = pieces.start - usize::from(minus);
+        let (way, start) = self.way(sign);
+        if let Some(from) = self
+            .lost_from(sign)
+            .filter(|_| value.is_direction() && way.is_none())
+        {
+            self.mark(from..pieces.end, Mark::Unread);
+            return Ok(());
+        }
         let turned = value.is_direction() && way == Some(Way::From);
         let number = if turned {
             amount.value + 180.0
@@ -147,11 +178,7 @@ impl<'t, 'a> Sentence<'t, 'a> {
         };
         statement.set(value, number, 0.0, self.place(pieces.start..end))?;
         self.mark(
-            if value.is_direction() {
-                start
-            } else {
-                pieces.start
-            }..pieces.end,
+            if value.is_direction() { start } else { sign }..pieces.end,
             Mark::Used,
         );
         self.mark(owner.at..owner.at + 1, Mark::Used);
@@ -162,6 +189,16 @@ impl<'t, 'a> Sentence<'t, 'a> {
     fn point(&mut self, compass: &Compass, statement: &mut Statement<'_>) -> Result<usize> {
         let Range { start, end } = compass.pieces;
         let (way, from) = self.way(start);
+        // An adjective before "north wind" describes the wind.
+        let describes = way.is_none() && self.described(end).is_some();
+        if let Some(changed) = modifier_before(self.pieces, start, !describes && way.is_some()) {
+            self.mark(changed..end, Mark::Unread);
+            return Ok(end);
+        }
+        if let Some(quadrant) = self.quadrant(end) {
+            self.mark(start..quadrant, Mark::Unread);
+            return Ok(quadrant);
+        }
         let found = self.direction(compass, way);
         // "se" may be a word of another language; after "wind" or "5 m/s" it is a direction.
         let letters =
@@ -186,6 +223,14 @@ impl<'t, 'a> Sentence<'t, 'a> {
             }
         }
         Ok(end)
+    }
+
+    /// The end of a bearing in a quadrant, "north 45 degrees west", whose compass word ends at a piece.
+    fn quadrant(&self, end: usize) -> Option<usize> {
+        let number = self.pieces.get(end)?;
+        matches!(number.kind, Kind::Number(_)).then_some(())?;
+        let unit = usize::from(word_at(self.pieces, end + 1).is_some_and(is_unit));
+        Some(compass(self.pieces, end + 1 + unit)?.pieces.end)
     }
 
     /// Which direction a compass word states.
@@ -248,14 +293,11 @@ impl<'t, 'a> Sentence<'t, 'a> {
 
     /// The subject that the words from a piece on describe, across its strength and a number.
     fn described(&self, from: usize) -> Option<Subject> {
-        let strengths = [
-            "light", "gentle", "moderate", "fresh", "strong", "stiff", "weak", "steady",
-        ];
         let mut at = from;
         while let Some(Group::One(_, end)) = group(self.pieces, at) {
             at = end;
         }
-        while word_at(self.pieces, at).is_some_and(|word| strengths.contains(&word)) {
+        while word_at(self.pieces, at).is_some_and(|word| is_strength(word) || word == "steady") {
             at += 1;
         }
         let word = word_at(self.pieces, at)?;
@@ -296,6 +338,21 @@ impl<'t, 'a> Sentence<'t, 'a> {
             Some("to" | "toward" | "towards") => (Some(Way::Toward), before),
             _ => (None, at),
         }
+    }
+
+    /// A "from" before a direction that describing words keep from it: "from a stormy 30 degrees".
+    fn lost_from(&self, start: usize) -> Option<usize> {
+        let describes = |at: &usize| {
+            word_at(self.pieces, *at).is_some_and(|word| {
+                is_filler(word)
+                    || !(is_link(word) || is_unit(word) || is_attribute(word))
+                        && noun(word).is_none()
+            })
+        };
+        let from = (start.saturating_sub(NEAR)..start)
+            .rev()
+            .find(|at| !describes(at))?;
+        (word_at(self.pieces, from) == Some("from")).then_some(from)
     }
 
     /// The subject that a quantity belongs to, and whether it stands right after it.
@@ -345,53 +402,24 @@ impl<'t, 'a> Sentence<'t, 'a> {
             .any(|named| named.subject == Subject::Ship);
         if has_ship && (two || is_at_rest(word)) {
             let pieces = at..at + 1 + usize::from(two);
+            if word_before(self.pieces, at).is_some_and(is_approximate) {
+                self.mark(at - 1..pieces.end, Mark::Unread);
+                return Ok(());
+            }
             statement.set(Value::ShipSpeed, 0.0, 0.0, self.place(pieces.clone()))?;
             self.mark(pieces, Mark::Used);
         }
         Ok(())
     }
 
-    /// The places of what was not taken in; neighbours are one.
-    pub(crate) fn unread(&self, scene: &PartialScene) -> Vec<Range<usize>> {
-        let unread = |at: &usize| self.is_unread(*at, scene);
-        let mut places: Vec<Range<usize>> = Vec::new();
-        let mut last = usize::MAX;
-        for at in (0..self.pieces.len()).filter(unread) {
-            let place = self.pieces[at].place.clone();
-            match places.last_mut() {
-                Some(before) if last + 1 == at => before.end = place.end,
-                _ => places.push(place),
-            }
-            last = at;
-        }
-        places
-    }
-
-    fn is_unread(&self, at: usize, scene: &PartialScene) -> bool {
-        let word = match (self.marks[at], self.pieces[at].kind) {
-            (Mark::Used, _) => return false,
-            (Mark::NoWake, _) => return scene.ship != Some(false),
-            (Mark::Unread, _) | (_, Kind::Number(_) | Kind::Figure | Kind::PlusMinus) => {
-                return true;
-            }
-            (Mark::Open, Kind::Word(word)) => word,
-            _ => return false,
+    /// What was not taken in; neighbours are one.
+    pub(crate) fn unread(&self, scene: &PartialScene) -> Vec<Left> {
+        let sentence = Marked {
+            pieces: self.pieces,
+            marks: &self.marks,
+            subjects: &self.subjects,
         };
-        let near = |way: usize| {
-            let near = at.saturating_sub(way)..self.pieces.len().min(at + way + 1);
-            self.marks[near].contains(&Mark::Used)
-        };
-        match noun(word) {
-            Some(Subject::Ship | Subject::Wake | Subject::Bystander) => false,
-            Some(Subject::Wind) => scene.wind_speed.or(scene.wind_toward).is_none(),
-            Some(Subject::Wave) => scene.wind_speed.is_none(),
-            Some(Subject::Fetch) => scene.fetch.is_none(),
-            Some(Subject::Incidence) => scene.incidence.is_none(),
-            Some(Subject::Heading | Subject::Angle) => !near(4),
-            Some(_) => true,
-            None if is_attribute(word) => !near(4),
-            None => is_unit(word) || is_compass(word) || is_at_rest(word) || is_unstated(word),
-        }
+        sentence.left(scene)
     }
 }
 

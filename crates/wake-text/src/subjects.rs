@@ -1,9 +1,8 @@
 //! What a sentence speaks of, and what it denies.
 
 use crate::amounts::Dimension;
-use crate::compass::is_compass;
-use crate::pieces::{Kind, Piece, word_at};
-use std::ops::Range;
+use crate::filler::is_listed;
+use crate::pieces::{Piece, word_at};
 
 /// What a number can belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,14 +45,6 @@ pub(crate) struct Named {
     pub(crate) subject: Subject,
     /// Index of its word in the sentence.
     pub(crate) at: usize,
-}
-
-/// Something denied in a sentence.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Denied {
-    /// `None`: not understood.
-    pub(crate) subject: Option<Subject>,
-    pub(crate) pieces: Range<usize>,
 }
 
 /// The subjects a sentence names, in their order.
@@ -126,186 +117,12 @@ pub(crate) fn noun(word: &str) -> Option<Subject> {
     })
 }
 
-/// What a sentence denies, in its order.
-pub(crate) fn denials(sentence: &[Piece<'_>]) -> Vec<Denied> {
-    let mut found: Vec<Denied> = Vec::new();
-    let mut at = 0;
-    while at < sentence.len() {
-        match denial(sentence, at) {
-            Some(denied) => {
-                at = denied.pieces.end.max(at + 1);
-                found.push(denied);
-                while let Some(denied) = further(sentence, at) {
-                    at = denied.pieces.end;
-                    found.push(denied);
-                }
-            }
-            None => at += 1,
-        }
-    }
-    found
-}
-
-/// Pieces that a denial reaches at most.
-const REACH: usize = 8;
-
-/// What is denied from a piece on.
-fn denial(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
-    let word = word_at(sentence, at);
-    let named = word.and_then(noun);
-    if let Some(subject) = named.filter(|subject| matches!(subject, Subject::Ship | Subject::Wind))
-    {
-        let length = denied_after(sentence, at)?;
-        let (subject, pieces) = (Some(subject), at..at + length);
-        return Some(Denied { subject, pieces });
-    }
-    let none =
-        sentence[at].kind == Kind::Number(0.0) && noun_after(sentence, at) == Some(Subject::Ship);
-    let start = at + opening(sentence, at).or(none.then_some(1))?;
-    let is_not = word.is_some_and(|word| word == "not" || word.ends_with("n't"));
-    if is_not && word_at(sentence, start) == Some("only") {
-        return None;
-    }
-    let (mut plain, mut understood) = (0, true);
-    for end in start..sentence.len().min(start + REACH) {
-        let Some(word) = word_at(sentence, end) else {
-            let ends = matches!(sentence[end].kind, Kind::Comma | Kind::Stop | Kind::Colon);
-            if ends {
-                return denied_nothing(sentence, at..end);
-            }
-            understood = false;
-            continue;
-        };
-        match noun(word) {
-            Some(subject) if subject != Subject::Heading && subject != Subject::Bystander => {
-                let compound = noun_after(sentence, end)
-                    .filter(|s| matches!(s, Subject::Wake | Subject::Wave));
-                let subject = compound
-                    .filter(|&head| head == Subject::Wave)
-                    .unwrap_or(subject);
-                let known = matches!(
-                    subject,
-                    Subject::Ship | Subject::Wind | Subject::Wake | Subject::Wave
-                );
-                let end = end + 1 + usize::from(compound.is_some());
-                let others = (start..end).any(|at| word_at(sentence, at).is_some_and(is_further));
-                let subject = if others { Subject::Bystander } else { subject };
-                let subject = (understood && known).then_some(subject);
-                return Some(Denied {
-                    subject,
-                    pieces: at..end,
-                });
-            }
-            _ if matches!(word, "but" | "while" | "with" | "because") => {
-                return denied_nothing(sentence, at..end);
-            }
-            _ if is_article(word) => understood &= plain == 0,
-            _ if matches!(
-                word,
-                "of" | "sign" | "signs" | "trace" | "traces" | "kind" | "evidence"
-            ) =>
-            {
-                plain = 0;
-            }
-            _ if is_link(word) || is_at_rest(word) || is_compass(word) => understood = false,
-            _ => plain += 1,
-        }
-    }
-    denied_nothing(sentence, at..sentence.len().min(start + REACH))
-}
-
-/// A denial of no subject, which matters where it denies numbers or directions.
-fn denied_nothing(sentence: &[Piece<'_>], pieces: Range<usize>) -> Option<Denied> {
-    let says = |at: usize| match sentence[at].kind {
-        Kind::Number(_) | Kind::Figure => true,
-        Kind::Word(word) => is_compass(word) || noun(word).is_some() || is_at_rest(word),
-        _ => false,
-    };
-    pieces.clone().any(says).then_some(Denied {
-        subject: None,
-        pieces,
-    })
-}
-
-/// Number of pieces of the denial that starts at a piece: "no", "free of".
-fn opening(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
-    let word = word_at(sentence, at)?;
-    let of = word_at(sentence, at + 1) == Some("of");
-    match word {
-        "no" | "not" | "without" | "neither" | "nor" | "never" | "cannot" | "lacking" | "sans"
-        | "non" => Some(1),
-        "free" | "devoid" | "absence" | "lack" | "empty" | "clear" if of => Some(2),
-        _ => word.ends_with("n't").then_some(1),
-    }
-}
-
-/// Number of pieces of a noun and what denies it: "shipless", "ship-free", "ships: none", "ship is not visible".
-fn denied_after(sentence: &[Piece<'_>], at: usize) -> Option<usize> {
-    if word_at(sentence, at)?.ends_with("less") {
-        return Some(1);
-    }
-    let mut end = at + 1;
-    let links = |piece: &Piece<'_>| {
-        piece.kind == Kind::Colon || matches!(piece.kind, Kind::Word("is" | "are" | "was" | "were"))
-    };
-    while sentence.get(end).is_some_and(links) {
-        end += 1;
-    }
-    let last = match word_at(sentence, end)? {
-        "free" if word_at(sentence, end + 1) != Some("of") => end,
-        "none" | "absent" | "false" | "missing" => end,
-        "no" if word_at(sentence, end + 1).is_none() && end > at + 1 => end,
-        word if word == "not" || word.ends_with("n't") => {
-            let seen = [
-                "visible", "present", "seen", "there", "detected", "included", "shown",
-            ];
-            word_at(sentence, end + 1).filter(|word| seen.contains(word))?;
-            end + 1
-        }
-        _ => return None,
-    };
-    Some(last + 1 - at)
-}
-
-/// What "or" adds to a denial: "no wind or ship".
-fn further(sentence: &[Piece<'_>], at: usize) -> Option<Denied> {
-    matches!(word_at(sentence, at)?, "or" | "nor").then_some(())?;
-    let article = usize::from(word_at(sentence, at + 1).is_some_and(is_article));
-    let noun_at = (at + 1 + article..at + 3 + article)
-        .find(|&at| word_at(sentence, at).and_then(noun).is_some())?;
-    let subject = word_at(sentence, noun_at).and_then(noun);
-    let pieces = at..noun_at + 1;
-    let subject = subject.filter(|s| {
-        matches!(
-            s,
-            Subject::Ship | Subject::Wind | Subject::Wake | Subject::Wave
-        )
-    });
-    Some(Denied { subject, pieces })
-}
-
-/// Whether "no" before this word denies only more of the same.
-fn is_further(word: &str) -> bool {
-    matches!(
-        word,
-        "other" | "others" | "further" | "second" | "more" | "additional"
-    )
-}
-
-fn is_article(word: &str) -> bool {
-    matches!(word, "a" | "an" | "any" | "the" | "its" | "single" | "one")
-}
-
 /// Whether a word says that a ship makes no way.
 pub(crate) fn is_at_rest(word: &str) -> bool {
     matches!(
         word,
         "stationary" | "anchored" | "moored" | "motionless" | "stopped" | "halted" | "unmoving"
     )
-}
-
-fn noun_after(sentence: &[Piece<'_>], at: usize) -> Option<Subject> {
-    word_at(sentence, at + 1).and_then(noun)
 }
 
 pub(crate) fn word_before<'a>(sentence: &[Piece<'a>], at: usize) -> Option<&'a str> {
@@ -352,6 +169,39 @@ pub(crate) fn is_motion(word: &str) -> bool {
         "heads",
         "head",
         "headed",
+    ]
+    .contains(&word)
+}
+
+/// Whether a word changes no value of a scene.
+pub(crate) fn says_nothing(word: &str) -> bool {
+    is_listed(word) || is_filler(word) || is_motion(word)
+}
+
+/// Whether a word makes what follows nearly so.
+pub(crate) fn is_approximate(word: &str) -> bool {
+    matches!(
+        word,
+        "about"
+            | "approximately"
+            | "approx"
+            | "around"
+            | "roughly"
+            | "nearly"
+            | "almost"
+            | "ca"
+            | "circa"
+            | "mainly"
+            | "generally"
+    )
+}
+
+/// Whether a word tells how much without a number: "light wind", "a fast ferry".
+pub(crate) fn is_strength(word: &str) -> bool {
+    [
+        "light", "gentle", "moderate", "fresh", "strong", "stiff", "weak", "high", "low", "heavy",
+        "faint", "slight", "brisk", "fast", "slow", "quick", "swift", "rapid", "slowly", "quickly",
+        "swiftly", "rapidly", "gently", "strongly",
     ]
     .contains(&word)
 }

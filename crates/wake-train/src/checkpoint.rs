@@ -4,13 +4,18 @@
 //! FOLDER/step-00001200/state.json
 //! FOLDER/step-00001200/tensors-000.safetensors, tensors-001.safetensors, …
 //! ```
+//!
+//! `state.json` has a checksum of each file of tensors, and of itself.
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
-use serde_json::Value;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+use whole_files::{checksum, sealed, unsealed};
 
 use crate::error::{Error, Result};
 
@@ -79,19 +84,21 @@ impl Checkpoint {
 
     fn write_files(&self, folder: &Path) -> std::io::Result<()> {
         fs::create_dir_all(folder)?;
-        let (mut part, mut bytes, mut number) = (Vec::new(), 0, 0);
+        let (mut part, mut bytes, mut files) = (Vec::new(), 0, Map::new());
         for (name, (shape, numbers)) in &self.tensors {
             if bytes > 0 && bytes + 4 * numbers.len() > LARGEST_FILE {
-                write_part(folder, number, &part)?;
-                (part, bytes, number) = (Vec::new(), 0, number + 1);
+                write_part(folder, &mut files, &part)?;
+                (part, bytes) = (Vec::new(), 0);
             }
             bytes += 4 * numbers.len();
             part.push((name, shape, numbers));
         }
-        write_part(folder, number, &part)?;
-        let state =
-            serde_json::json!({"step": self.step, "applied": self.applied, "state": self.state});
-        fs::write(folder.join("state.json"), format!("{state:#}\n"))?;
+        write_part(folder, &mut files, &part)?;
+        let state = json!({
+            "step": self.step, "applied": self.applied, "state": self.state, "files": files,
+        });
+        let state = sealed(&format!("{state:#}")) + "\n";
+        fs::write(folder.join("state.json"), state)?;
         for entry in fs::read_dir(folder)? {
             fs::File::open(entry?.path())?.sync_all()?;
         }
@@ -102,7 +109,8 @@ impl Checkpoint {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`], [`wake_nn::Error::Json`] or [`wake_nn::Error::InvalidSafetensors`] for a checkpoint that cannot be read.
+    /// [`Error::Dataset`] with the file whose checksum does not fit, [`wake_nn::Error::Io`] or [`wake_nn::Error::InvalidSafetensors`] for a
+    /// checkpoint that cannot be read.
     pub fn newest(folder: &Path) -> Result<Option<Self>> {
         match checkpoints(folder)?.pop() {
             None => Ok(None),
@@ -123,39 +131,61 @@ impl Checkpoint {
     pub fn read(path: &Path) -> Result<Self> {
         let file = path.join("state.json");
         let text = whole_files::read_text(&file)?;
-        let mut state: Value = serde_json::from_str(&text).map_err(|source| Error::Value(wake_nn::Error::Json {
-            path: file.clone(),
-            source,
-        }))?;
-        let count = |key: &str| {
-            let count = state[key].as_u64().and_then(|n| usize::try_from(n).ok());
-            count.ok_or_else(|| Error::Dataset {
-                path: file.clone(),
-                line: 0,
-                message: format!(
-                    "no whole number '{key}'; remove this checkpoint to go on from the one before"
-                ),
-            })
-        };
-        let (step, applied) = (count("step")?, count("applied")?);
+        let object = text.strip_suffix('\n').and_then(unsealed);
+        let state = object.and_then(|object| serde_json::from_str::<State>(&object).ok());
+        let State {
+            step,
+            applied,
+            state,
+            files,
+        } = state.ok_or_else(|| damaged(&file))?;
         let mut tensors = Tensors::new();
-        let entries = fs::read_dir(path).map_err(|source| io("read", path, source))?;
-        for entry in entries {
-            let file = entry.map_err(|source| io("read", path, source))?.path();
-            if file
-                .extension()
-                .is_some_and(|extension| extension == "safetensors")
-            {
-                read_part(&file, &mut tensors)?;
+        for (name, expected) in files {
+            let file = path.join(&name);
+            // Nothing outside this folder is opened.
+            if file.file_name() != Some(name.as_ref()) {
+                return Err(damaged(&file));
             }
+            let bytes = fs::read(&file).map_err(|source| match source.kind() {
+                ErrorKind::NotFound => damaged(&file),
+                _ => io("read", &file, source),
+            })?;
+            if checksum(&bytes) != expected {
+                return Err(damaged(&file));
+            }
+            read_part(&file, &bytes, &mut tensors)?;
         }
         Ok(Self {
             step,
             applied,
-            state: state["state"].take(),
+            state,
             tensors,
         })
     }
+}
+
+/// The content of `state.json`.
+#[derive(Deserialize)]
+struct State {
+    step: usize,
+    applied: usize,
+    state: Value,
+    /// Checksums of the files of tensors by their names.
+    files: BTreeMap<String, String>,
+}
+
+/// The error for a file whose content is not what was written.
+fn damaged(file: &Path) -> Error {
+    let folder = file.parent().unwrap_or(file);
+    Error::Data(wake_dataset::Error::Dataset {
+        path: file.to_owned(),
+        line: 0,
+        message: format!(
+            "missing, damaged, or of another version: its checksum does not fit; remove the folder {} to go on from the checkpoint \
+             before it",
+            folder.file_name().unwrap_or_default().display()
+        ),
+    })
 }
 
 /// The first value in which two trees differ: its path, and both values.
@@ -229,7 +259,12 @@ fn checkpoints(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
 
 type Part<'a> = [(&'a String, &'a Vec<usize>, &'a Vec<f32>)];
 
-fn write_part(folder: &Path, number: usize, part: &Part<'_>) -> std::io::Result<()> {
+/// Writes a file of tensors and notes its checksum among those of the files before it.
+fn write_part(
+    folder: &Path,
+    files: &mut Map<String, Value>,
+    part: &Part<'_>,
+) -> std::io::Result<()> {
     let bytes: Vec<Vec<u8>> = part
         .iter()
         .map(|(.., numbers)| numbers.iter().flat_map(|x| x.to_le_bytes()).collect())
@@ -240,17 +275,19 @@ fn write_part(folder: &Path, number: usize, part: &Part<'_>) -> std::io::Result<
             .map_err(std::io::Error::other)
     });
     let views: Vec<_> = views.collect::<std::io::Result<_>>()?;
-    let path = folder.join(format!("tensors-{number:03}.safetensors"));
-    safetensors::serialize_to_file(views, None, &path).map_err(std::io::Error::other)
+    let bytes = safetensors::serialize(views, None).map_err(std::io::Error::other)?;
+    let name = format!("tensors-{:03}.safetensors", files.len());
+    fs::write(folder.join(&name), &bytes)?;
+    files.insert(name, json!(checksum(&bytes)));
+    Ok(())
 }
 
-fn read_part(path: &Path, tensors: &mut Tensors) -> Result<()> {
+fn read_part(path: &Path, bytes: &[u8], tensors: &mut Tensors) -> Result<()> {
     let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| Error::Value(wake_nn::Error::InvalidSafetensors {
         path: path.to_owned(),
         reason,
     });
-    let bytes = fs::read(path).map_err(|source| io("read", path, source))?;
-    let file = SafeTensors::deserialize(&bytes).map_err(|error| invalid(error.into()))?;
+    let file = SafeTensors::deserialize(bytes).map_err(|error| invalid(error.into()))?;
     for (name, view) in file.tensors() {
         if view.dtype() != Dtype::F32 {
             return Err(invalid(format!("{name} is no f32").into()));
@@ -333,7 +370,50 @@ mod tests {
         fs::remove_dir_all(folder.path().join("step-00000008")).unwrap();
         let file = folder.path().join("step-00000007/tensors-000.safetensors");
         fs::write(&file, b"short").unwrap();
-        let refused = Checkpoint::newest(folder.path());
-        assert!(matches!(refused, Err(Error::Value(wake_nn::Error::InvalidSafetensors { .. }))));
+        let refused = Checkpoint::newest(folder.path()).unwrap_err().to_string();
+        assert!(
+            refused.contains("tensors-000.safetensors: missing, damaged"),
+            "{refused}"
+        );
+    }
+
+    /// Any bit of any file, and a file that is missing; the message says how to go on, and that goes on.
+    #[test]
+    fn a_damaged_checkpoint_is_refused_by_the_name_of_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let small = |step| Checkpoint {
+            state: serde_json::json!({"rate": 0.1234567890123456789, "list": [1.0, null]}),
+            tensors: BTreeMap::from([("a".to_owned(), (vec![3], vec![1.0, -0.0, 2e-45]))]),
+            ..checkpoint(step)
+        };
+        for step in [7, 8] {
+            small(step).write(folder.path()).unwrap();
+        }
+        let newest = folder.path().join("step-00000008");
+        for name in ["state.json", "tensors-000.safetensors"] {
+            let file = newest.join(name);
+            let whole = fs::read(&file).unwrap();
+            for at in 0..whole.len() {
+                let mut damaged = whole.clone();
+                damaged[at] ^= 1 << (at % 8);
+                fs::write(&file, &damaged).unwrap();
+                let refused = Checkpoint::newest(folder.path()).unwrap_err().to_string();
+                assert!(refused.contains(name), "byte {at}: {refused}");
+            }
+            fs::write(&file, &whole).unwrap();
+            assert_eq!(Checkpoint::newest(folder.path()).unwrap(), Some(small(8)));
+        }
+        let file = newest.join("tensors-000.safetensors");
+        fs::write(&file, b"").unwrap();
+        let refused = Checkpoint::newest(folder.path()).unwrap_err().to_string();
+        assert!(
+            refused.contains("remove the folder step-00000008"),
+            "{refused}"
+        );
+        fs::remove_file(&file).unwrap();
+        let refused = Checkpoint::newest(folder.path()).unwrap_err().to_string();
+        assert!(refused.contains("tensors-000.safetensors"), "{refused}");
+        fs::remove_dir_all(newest).unwrap();
+        assert_eq!(Checkpoint::newest(folder.path()).unwrap(), Some(small(7)));
     }
 }

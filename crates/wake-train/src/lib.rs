@@ -65,3 +65,5 @@ pub use wake_model::{WakeStage, WakeTraining};
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;
+#[cfg(test)]
+mod numbers;

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use wake_physics::output;
 
 use super::trainer::StepReport;
 use crate::error::{Error, Result};
@@ -78,12 +77,21 @@ impl Metrics {
     }
 }
 
+/// The error for a file that cannot be read.
+pub(super) fn unreadable(path: &Path, source: std::io::Error) -> Error {
+    Error::Value(wake_nn::Error::Io {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    })
+}
+
 /// The lines of the first `step` steps; half a line at the end, which a kill left, is dropped.
 fn kept_lines(path: &Path, step: usize) -> Result<String> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
-        Err(source) => return Err(crate::files::unreadable(path, source)),
+        Err(source) => return Err(unreadable(path, source)),
     };
     let whole = bytes
         .iter()
@@ -97,11 +105,11 @@ fn kept_lines(path: &Path, step: usize) -> Result<String> {
         let parsed: Option<Value> = serde_json::from_slice(line).ok();
         let made = parsed.and_then(|line| line["step"].as_u64());
         let (Some(made), Ok(text)) = (made, std::str::from_utf8(line)) else {
-            return Err(Error::Dataset {
+            return Err(Error::Data(wake_dataset::Error::Dataset {
                 path: path.to_owned(),
                 line: number + 1,
                 message: "no line of a log of steps; move the file away to go on".to_owned(),
-            });
+            }));
         };
         if made <= step as u64 {
             kept.push_str(text);

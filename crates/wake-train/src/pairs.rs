@@ -62,7 +62,7 @@ impl TrainingPairs {
     ///
     /// As [`Source::items`].
     pub fn items(&self, positions: Range<u64>) -> Result<Vec<Pair>> {
-        self.source().items(positions)
+        Ok(self.source().items(positions)?)
     }
 
     /// The first pairs, `count` of them or fewer.
@@ -101,7 +101,7 @@ impl TrainingPairs {
             Pairs::Folder(folder) => Domain::of(folder.scenes())?,
             Pairs::Simulated(simulated) => {
                 let scenes = (0..self.count).map(|index| simulated.scene(index));
-                Domain::of(&scenes.collect::<Result<Vec<Scene>>>()?)?
+                Domain::of(&scenes.collect::<wake_dataset::Result<Vec<Scene>>>()?)?
             }
         };
         config.scene = self.set.recipe.scene.clone();

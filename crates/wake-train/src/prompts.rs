@@ -1,6 +1,6 @@
 //! Endless prompts, and what they state.
 
-use super::scenes::Simulated;
+use wake_dataset::Simulated;
 use wake_ldm::conditioning::Conditions;
 use crate::error::Result;
 use wake_nn::noise::NoiseSource;
@@ -65,7 +65,7 @@ fn rearranged(text: &str, draw: impl Fn(u64) -> f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::recipe::Recipe;
+    use wake_dataset::Recipe;
     use super::*;
 
     fn prompts() -> Prompts {

@@ -139,12 +139,12 @@ impl PipelineTraining<'_> {
             schedule: schedule(&scheduler)?,
             seed: options.seed,
         };
-        let show = |run: &Run<TextToImage>| {
+        let show = |run: &Run<TextToImage>| -> Result<()> {
             let parts = parts(run.averaged(), &autoencoder, &scheduler, &set);
             let pipeline = Pipeline::new(parts, &device)?;
             let drawn = draw(&pipeline, &examples, options.seed)?;
             write_sheet(&examples, &drawn, &out.join(SHEET))?;
-            pipeline.save(out, Precision::F16)
+            Ok(pipeline.save(out, Precision::F16)?)
         };
         let results = ["model_index.json", SHEET];
         let stage = self.stage(MODEL, options.steps(&USUAL), &results, &folder);
@@ -172,9 +172,10 @@ impl PipelineTraining<'_> {
             seed: options.seed,
         };
         let vae = folder.path().join("vae");
-        let show = |run: &Run<AutoencoderKl>| {
+        let show = |run: &Run<AutoencoderKl>| -> Result<()> {
             let (averaged, config) = (run.averaged(), &model["vae"]);
-            save_folder(&averaged, Layout::Diffusers, config, &vae, Precision::F16)
+            let precision = Precision::F16;
+            Ok(save_folder(&averaged, Layout::Diffusers, config, &vae, precision)?)
         };
         let steps = options.steps(&USUAL_AUTOENCODER);
         let stage = self.stage(AUTOENCODER, steps, &[VAE], folder);

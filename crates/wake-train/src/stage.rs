@@ -4,7 +4,7 @@ use burn::module::Module;
 use serde_json::{Map, Value, json};
 
 use super::folder::RunFolder;
-use super::metrics::Metrics;
+use super::log::Metrics;
 use super::progress::Progress;
 use super::run::{Run, Task};
 use crate::error::Error;

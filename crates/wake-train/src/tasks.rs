@@ -10,7 +10,8 @@ use wake_physics::Scene;
 use super::latents::LatentSet;
 use super::run::{Task, Terms, number};
 use wake_ldm::conditioning::{MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens};
-use wake_dataset::{Prompts, shuffled};
+use crate::prompts::Prompts;
+use wake_dataset::{shuffled};
 use wake_ldm::network::{
     ChannelWindows, Flow, Known, PatchTransform, Prior, PromptParser, SeaFields, windows,
 };

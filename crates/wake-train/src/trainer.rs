@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 use super::checkpoint::{Checkpoint, Tensors};
 use super::optimizer::{Adam, AdamOptions, Average, Rate};
 use super::tensors::{gradients, names, replaced, rounded, values};
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 
 /// Groups of a checkpoint's tensors, in the order of [`Trainer::state`].
 const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
@@ -69,7 +70,7 @@ impl TrainerOptions {
         check_range("weight_decay", weight_decay, 0.0, 1.0)?;
         check_range("largest_norm", self.largest_norm, 1e-6, 1e6)?;
         check_range("average_decay", self.average_decay, 0.0, 0.999999)?;
-        check_range("accumulation", self.accumulation as f64, 1.0, 65536.0)
+        Ok(check_range("accumulation", self.accumulation as f64, 1.0, 65536.0)?)
     }
 
     /// What two runs must have in common for one to go on from the other; more steps may be asked of the second, and

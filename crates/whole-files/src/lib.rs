@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod checksum;
 mod error;
 mod text;
 mod write;
@@ -8,6 +9,7 @@ mod write;
 mod folder;
 mod read;
 
+pub use checksum::{checksum, sealed, unsealed};
 pub use error::{Error, Result};
 pub use folder::{FolderLock, lock_folder, make_folder, sweep};
 pub use read::{fingerprint, read_text};

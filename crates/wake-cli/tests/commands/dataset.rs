@@ -175,26 +175,72 @@ fn two_processes_do_not_share_a_folder() {
     assert!(files(&shared) == files(&whole));
 }
 
-/// Killed at random moments again and again, the set still ends with the bytes of one run.
-#[test]
-fn many_kills_change_no_byte() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let [whole, killed] = ["whole", "killed"].map(|name| folder.path().join(name));
-    let arguments = [&SMALL[..], &["--count", "40", "--jobs", "2"]].concat();
-    for k in 0..15_u64 {
+/// Starts `make_dataset` again and again into a folder, and kills it after 2 to 62 ms and `longer` \[ms\].
+pub(super) fn killed_often(arguments: &[&str], folder: &Path, kills: u64, longer: u64) {
+    for k in 0..kills {
         let mut child = Command::new(example("make_dataset"))
-            .args(&arguments)
-            .args(["--out", text(&killed)])
+            .args(arguments)
+            .args(["--out", text(folder)])
             .stderr(Stdio::null())
             .stdout(Stdio::null())
             .spawn()
             .expect("an example that starts");
-        std::thread::sleep(Duration::from_millis(2 + k * 7919 % 60));
+        std::thread::sleep(Duration::from_millis(longer + 2 + k * 7919 % 60));
         // It may have ended.
         let _ = child.kill();
         child.wait().expect("an end");
     }
-    done("make_dataset", &arguments, &killed);
-    done("make_dataset", &arguments, &whole);
-    assert!(files(&killed) == files(&whole));
+}
+
+/// Killed at random moments again and again, and run again when it is complete, a set of any recipe ends with the bytes of
+/// one run.
+#[test]
+fn many_kills_change_no_byte() {
+    let quick_look = ["--set", "draw.quick_look.gain=[0.1,0.4]"];
+    for (grid, more) in [
+        ("ranges", &[][..]),
+        ("paper", &[]),
+        ("detector", &[]),
+        ("model", &[]),
+        ("ranges", &quick_look),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [whole, killed] = ["whole", "killed"].map(|name| folder.path().join(name));
+        let count = ["--grid", grid, "--count", "40", "--jobs", "2"];
+        let arguments = [&SMALL[..], &count, more].concat();
+        killed_often(&arguments, &killed, 12, 0);
+        done("make_dataset", &arguments, &killed);
+        let printed = done("make_dataset", &arguments, &killed);
+        assert!(printed.contains(", 0 of them made"), "{grid}: {printed}");
+        done("make_dataset", &arguments, &whole);
+        assert!(files(&killed) == files(&whole), "{grid} {more:?}");
+    }
+}
+
+/// Damage to an image or a line ends a run and a training with the name of the file, and nothing is changed.
+#[test]
+fn damage_is_named_and_left_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("set");
+    let arguments = [&SMALL[..], &["--grid", "detector", "--count", "4"]].concat();
+    done("make_dataset", &arguments, &out);
+    let (image, lines) = (out.join("images/000002.png"), out.join("metadata.jsonl"));
+    let (whole, text_of_lines) = (files(&out), std::fs::read(&lines).expect("lines"));
+    std::fs::copy(out.join("images/000001.png"), &image).expect("a copy");
+    let words = [
+        "images/000002.png",
+        "line 3 of metadata.jsonl",
+        "remove the file",
+    ];
+    refused_into("make_dataset", &arguments, &words, &out);
+    let data = ["autoencoder", "--data", text(&out)];
+    std::fs::remove_file(&image).expect("an image");
+    done("make_dataset", &arguments, &out);
+    assert!(files(&out) == whole);
+    let mut changed = text_of_lines.clone();
+    let at = changed.len() / 2;
+    changed[at] ^= 1;
+    std::fs::write(&lines, changed).expect("a file");
+    refused_into("make_dataset", &arguments, &["metadata.jsonl, line "], &out);
+    refused_by("train", &data, &["metadata.jsonl, line "]);
 }

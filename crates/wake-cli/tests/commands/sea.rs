@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{done, files, refused_by, refused_into, text};
+use super::{done, files, make_dataset, refused_by, refused_into, text};
 
 /// Two images of 8 and 16 bits, 200 pixels wide, of a rough sea with a bright target and a mask.
 fn images(folder: &Path) -> PathBuf {
@@ -72,8 +72,16 @@ fn a_sea_is_learnt_resumed_and_drawn_on() {
     ];
     done("make_dataset", &size, &out("set"));
     done("make_dataset", &[&sea[..], &size].concat(), &out("sea"));
-    assert!(file("set/metadata.jsonl") == file("sea/metadata.jsonl"));
+    assert!(file("set/coco.json") == file("sea/coco.json"));
     assert!(file("set/images/000001.png") != file("sea/images/000001.png"));
+    // Killed and continued, and run again when it is complete.
+    let killed = out("killed-sea");
+    let arguments = [&sea[..], &size].concat();
+    make_dataset::killed_often(&arguments, &killed, 6, 150);
+    for _ in 0..2 {
+        done("make_dataset", &arguments, &killed);
+        assert!(files(&killed) == files(&out("sea")));
+    }
     // A set of one sea is no set of another.
     refused_into(
         "make_dataset",

@@ -259,7 +259,9 @@ fn results_are_made_again_from_the_last_checkpoint() {
 fn many_kills_change_no_weight() {
     let toys = Toys::new();
     let (whole, killed) = (toys.path("whole"), toys.path("run"));
-    let arguments = toys.arguments(&["words", "--steps", "30", "--every", "2"]);
+    // A rate with all digits that a number can have.
+    let rate = "--rate=0.0012345678901234567";
+    let arguments = toys.arguments(&["words", "--steps", "30", "--every", "2", rate]);
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     done("train", &arguments, &whole);
     let resumed = [&arguments[..], &["--resume"]].concat();
@@ -295,6 +297,36 @@ fn many_kills_change_no_weight() {
         .into_keys()
         .find(|path| text(path).ends_with(".tmp"));
     assert_eq!(temporary, None);
+}
+
+/// One byte of a checkpoint that differs ends the run that would go on from it; without this checkpoint it goes on from the
+/// one before, and images that changed are not learnt from.
+#[test]
+fn a_damaged_checkpoint_or_image_is_named() {
+    let toys = Toys::new();
+    toys.train(&["mean", "--steps", "4", "--every", "2"]);
+    let out = toys.path("run");
+    let weights = std::fs::read(out.join("prior.safetensors")).expect("weights");
+    let newest = out.join("checkpoints/mean/step-00000004");
+    for name in ["tensors-000.safetensors", "state.json"] {
+        let file = newest.join(name);
+        let whole = std::fs::read(&file).expect("a file");
+        let mut damaged = whole.clone();
+        damaged[whole.len() / 2] ^= 4;
+        std::fs::write(&file, damaged).expect("a file");
+        let words = [name, "checksum", "remove the folder step-00000004"];
+        toys.refused(&["mean", "--steps", "4", "--resume"], &words);
+        std::fs::write(&file, whole).expect("a file");
+    }
+    std::fs::remove_dir_all(newest).expect("a checkpoint");
+    toys.train(&["mean", "--steps", "4", "--every", "2", "--resume"]);
+    assert!(std::fs::read(out.join("prior.safetensors")).expect("weights") == weights);
+    let images = toys.path("set/images");
+    std::fs::copy(images.join("000001.png"), images.join("000000.png")).expect("a copy");
+    toys.refused(
+        &["mean", "--steps", "6", "--resume"],
+        &["000000.png", "damaged or another image"],
+    );
 }
 
 #[test]

@@ -217,6 +217,7 @@ impl WeightFile {
 }
 
 impl Stored<'_> {
+    /// Shape of the tensor.
     pub fn shape(&self) -> &[usize] {
         &self.info.shape
     }

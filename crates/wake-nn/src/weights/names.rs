@@ -24,10 +24,12 @@ pub struct ModulePath {
 }
 
 impl ModulePath {
+    /// Goes into a module of this name, which the container holds.
     pub fn enter(&mut self, name: &str, container: &str) {
         self.segments.push((name.to_owned(), container.to_owned()));
     }
 
+    /// Leaves the module that was entered last.
     pub fn exit(&mut self) {
         self.segments.pop();
     }

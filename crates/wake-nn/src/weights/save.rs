@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use super::Precision;
 use super::names::{Layout, ModulePath};
 use crate::error::Result;
-use whole_files::write_synced;
+use whole_files::{write_atomically, write_synced};
 
 /// Writes a model's weights into one safetensors file that diffusers or transformers read.
 ///
@@ -39,7 +39,7 @@ pub fn save_noted<M: Module>(
     note: Option<(&str, &str)>,
 ) -> Result<()> {
     let header = header(model, layout, precision, note);
-    write_atomically(path, |writer| {
+    Ok(write_synced(path, |writer| {
         writer.write_all(&(header.len() as u64).to_le_bytes())?;
         writer.write_all(header.as_bytes())?;
         let mut tensors = TensorWriter {
@@ -50,7 +50,7 @@ pub fn save_noted<M: Module>(
         };
         model.visit(&mut tensors);
         tensors.result
-    })
+    })?)
 }
 
 /// Writes a model's `config.json` and weights into a folder that `from_pretrained` reads.
@@ -72,7 +72,8 @@ pub fn save_folder<M: Module>(
         Layout::ClipText => "model.safetensors",
     };
     save_as(model, layout, &folder.join(name), precision)?;
-    write_text(&folder.join("config.json"), &format!("{config:#}\n"))
+    let config = format!("{config:#}\n");
+    Ok(write_atomically(&folder.join("config.json"), config.as_bytes())?)
 }
 
 /// The header, in the order in which the parameters are visited, padded to a multiple of 8 bytes.

@@ -26,7 +26,8 @@ pub(crate) use fade::{fade_at, fill_fade};
 pub use panels::{WakePlan, Zone};
 pub(crate) use rays::Ray;
 pub use rays::{KELVIN_ANGLE, half_angle};
-pub(crate) use unresolved::{Roughness, UnresolvedWaves};
+pub(crate) use turning::RingWork;
+pub(crate) use unresolved::{LARGEST_SLOPE_VARIANCE, Roughness, UnresolvedWaves};
 
 use crate::constants::GRAVITY;
 use crate::hull::Hull;

@@ -1,6 +1,6 @@
 //! The nodes of the wake integral: as many as the tolerance, the raster and the band ask for.
 
-use super::turning::Rings;
+use super::turning::{RingWork, Rings};
 use super::zones::{Piece, Reach};
 use super::{CUSP_ANGLE, KelvinWake};
 use crate::quadrature::{GaussLegendre, largest_phase};
@@ -43,6 +43,7 @@ pub struct WakePlan {
     quadrature: Vec<(f64, f64)>,
     /// Rings of waves in the place of the nodes, behind a ship that turns.
     rings: Option<Rings>,
+    ring_work: RingWork,
 }
 
 impl WakePlan {
@@ -50,6 +51,11 @@ impl WakePlan {
     #[must_use]
     pub fn nodes(&self) -> usize {
         self.transverse_nodes + self.divergent_nodes
+    }
+
+    /// What the rings take to compute, behind a ship that turns.
+    pub(crate) fn ring_work(&self) -> RingWork {
+        self.ring_work
     }
 
     pub(super) fn quadrature(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
@@ -141,6 +147,16 @@ impl KelvinWake {
             error_bound: PANEL_SHARE * tolerance,
             rings: Some(rings),
             ..WakePlan::default()
+        }
+    }
+
+    /// The plan with what its rings take, of which a few are computed.
+    pub(crate) fn with_ring_work(&self, plan: WakePlan) -> WakePlan {
+        WakePlan {
+            ring_work: plan
+                .rings
+                .map_or(RingWork::default(), |rings| rings.work(self)),
+            ..plan
         }
     }
 

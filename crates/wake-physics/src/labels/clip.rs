@@ -2,7 +2,8 @@
 
 use crate::raster::Raster;
 
-/// The rectangle of the pixel centres \[m\].
+/// The rectangle of the pixel centres \[m\]; where an image has one row or one column of several pixels, that of their
+/// edges there, so that what crosses it has a length and a box.
 pub(super) struct Rectangle {
     low: [f64; 2],
     high: [f64; 2],
@@ -10,9 +11,19 @@ pub(super) struct Rectangle {
 
 impl Rectangle {
     pub(super) fn of(raster: &Raster) -> Self {
+        let edge = |count: usize, other: usize| match (count, other) {
+            (1, 2..) => 0.5 * raster.spacing,
+            _ => 0.0,
+        };
+        let x = edge(raster.columns, raster.rows);
+        let y = edge(raster.rows, raster.columns);
+        let (right, bottom) = (
+            raster.x(raster.columns.saturating_sub(1)),
+            raster.y(raster.rows.saturating_sub(1)),
+        );
         Self {
-            low: [raster.x(0), raster.y(raster.rows.saturating_sub(1))],
-            high: [raster.x(raster.columns.saturating_sub(1)), raster.y(0)],
+            low: [raster.x(0) - x, bottom - y],
+            high: [right + x, raster.y(0) + y],
         }
     }
 

@@ -452,3 +452,34 @@ fn a_wide_turn_has_the_label_of_a_straight_track() {
     }
     assert!((wide.length_px - straight.length_px).abs() < 0.1);
 }
+
+/// A column of pixels is as wide as one of them: what crosses it has a length, and a box of that width.
+#[test]
+fn one_column_and_one_row_have_boxes() {
+    let extent = Extent {
+        waves: 600.0,
+        dark_line: 900.0,
+        half_width: 30.0,
+        visibility: None,
+    };
+    for (heading, rows, columns) in [(0.0, 201, 1), (90.0, 1, 201)] {
+        let raster = Raster::image(rows, columns, 10.0);
+        let wake = labelled(&ship(heading, [0.0, 0.0]), 0.0, &extent, &raster).wake;
+        let [x, y, width, height] = wake.box_px.unwrap();
+        let [along, across] = if columns == 1 {
+            [[y, height], [x, width]]
+        } else {
+            [[x, width], [y, height]]
+        };
+        // From the bow at 100 m to 900 m astern of it, on rows counted down and columns to the right.
+        let first = if columns == 1 { 90.0 } else { 20.0 };
+        assert!(close(along, [first, 90.0]), "{along:?}");
+        assert!(close(across, [-0.5, 1.0]), "{across:?}");
+        assert!((wake.length_px - 90.0).abs() < 1e-9);
+        let [from, to] = ends(&wake.centreline_px);
+        assert!((from[0] - to[0]).abs() + (from[1] - to[1]).abs() > 60.0);
+        // A track that crosses it leaves a line and a box, or neither.
+        let across = labelled(&ship(heading + 60.0, [0.0, 0.0]), 0.0, &extent, &raster).wake;
+        assert!(across.box_px.is_some());
+    }
+}

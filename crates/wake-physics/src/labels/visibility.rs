@@ -8,12 +8,14 @@ use crate::modulation::{ModulationTransfer, smear};
 use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::survey::Survey;
+use crate::track::Track;
 use crate::turbulent::TurbulentWake;
 use crate::turbulent::current::WakeEdge;
 use crate::wakes::Wake;
 use crate::window::sinc;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Side of the windows in which a wake is looked for \[pixels\]: chosen.
 const WINDOW: usize = 16;
@@ -27,6 +29,9 @@ const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
 
 /// Least standard deviation of a pixel that counts: the rounding of the fields.
 const LEAST_NOISE: f64 = 1e-6;
+
+/// Rows of windows beyond which one cannot be told from the next: their numbers round to 2⁻⁴ of a row.
+const FARTHEST_ROW: f64 = (1u64 << 48) as f64;
 
 /// How clearly a wake is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -186,12 +191,17 @@ impl Background {
         let short = self.short_waves.as_ref().and_then(|short| short.of(wake));
         let turns = wake.track.turn().is_some();
         let half_length = 0.5 * wake.hull.length();
-        let farthest = (wake.track.farthest_astern(&self.raster) - half_length).max(0.0);
         let mut extent = Extent::NOTHING;
         let mut rows = Vec::new();
-        for n in 0..(farthest / step).ceil() as usize {
+        for n in rows_in(&wake.track, &self.raster, half_length, step)
+            .into_iter()
+            .flatten()
+        {
             // Middle of the row of windows, astern of the stern.
             let distance = (n as f64 + 0.5) * step;
+            let Some(windows) = self.windows(wake, distance, half_angle, &band) else {
+                continue;
+            };
             let profile = short
                 .as_ref()
                 .map(|short| short.profile(wake, distance + half_length));
@@ -209,9 +219,9 @@ impl Background {
                     },
                     band.edge,
                 );
-                self.row(wake, distance, half_angle, &rays, (&band, profile.as_ref()))
+                self.row(wake, distance, windows, &rays, (&band, profile.as_ref()))
             } else {
-                self.row(wake, distance, half_angle, &rays, (&band, profile.as_ref()))
+                self.row(wake, distance, windows, &rays, (&band, profile.as_ref()))
             };
             let end = distance + 0.5 * step + 2.0 * half_length;
             let seen = |square: f64| WINDOW as f64 * square.sqrt() >= THRESHOLD * self.noise;
@@ -278,25 +288,44 @@ impl Background {
             .collect()
     }
 
-    /// The windows across the track at one distance astern of the stern.
-    fn row(
+    /// The windows across the track at one distance astern of the stern that may be in the image: the first and the last, in
+    /// widths of a window off the track.
+    fn windows(
         &self,
         wake: &KelvinWake,
         distance: f64,
         half_angle: f64,
-        rays: &[ImagedRay],
-        (band, short): (&DarkLine, Option<&Profile>),
-    ) -> Row {
+        band: &DarkLine,
+    ) -> Option<[f64; 2]> {
         let width = WINDOW as f64 * self.raster.spacing;
         let half_length = 0.5 * wake.hull.length();
         let from_midship = distance + half_length;
         let reach = (half_angle.tan() * (from_midship + half_length)).min(self.diagonal());
         let half_band = band.half_width(distance);
-        let half = (reach.max(half_band) / width - 0.5).ceil().max(0.0) as usize;
-        let windows = 2 * half + 1;
+        let half = (reach.max(half_band) / width - 0.5).ceil().max(0.0);
+        let [starboard, port] = self.across(&wake.track.at(-from_midship))?;
+        let first = (starboard / width).ceil().max(-half);
+        let last = (port / width).floor().min(half);
+        (first <= last).then_some([first, last])
+    }
+
+    /// The windows of a row.
+    fn row(
+        &self,
+        wake: &KelvinWake,
+        distance: f64,
+        [first, last]: [f64; 2],
+        rays: &[ImagedRay],
+        (band, short): (&DarkLine, Option<&Profile>),
+    ) -> Row {
+        let width = WINDOW as f64 * self.raster.spacing;
+        let from_midship = distance + 0.5 * wake.hull.length();
+        let half_band = band.half_width(distance);
+        let windows = (last - first) as usize + 1;
         let place = |ray: &ImagedRay| {
-            let place = (ray.tangent * from_midship / width).round() + half as f64;
-            (place >= 0.0 && place < windows as f64).then_some(place as usize)
+            let place = (ray.tangent * from_midship / width).round();
+            let inside = (first..=last).contains(&place);
+            inside.then_some((place - first) as usize)
         };
         // The velocity at the places of a window, by which its waves displace themselves.
         let mut velocity = vec![0.0; windows];
@@ -313,7 +342,7 @@ impl Background {
         }
         let mut row = Row::default();
         for (n, waves) in waves.into_iter().enumerate() {
-            let off = (n as f64 - half as f64) * width;
+            let off = (first + n as f64) * width;
             if !self.holds(wake.track.on_sea([-from_midship, off])) {
                 continue;
             }
@@ -328,10 +357,24 @@ impl Background {
         row
     }
 
+    /// Smallest and largest distance off the track at which its perpendicular at a place of it may be in the image, with half
+    /// a window to spare \[m\]; `None` where all of the image lies ahead or astern of the place.
+    fn across(&self, there: &Track) -> Option<[f64; 2]> {
+        let corners = there.straight().corners(&self.raster);
+        let [astern, ahead] = span(corners.map(|corner| corner[0]));
+        let [starboard, port] = span(corners.map(|corner| corner[1]));
+        let spare = 0.5 * WINDOW as f64 * self.raster.spacing;
+        (astern <= spare && ahead >= -spare).then_some([starboard - spare, port + spare])
+    }
+
     fn holds(&self, [x, y]: [f64; 2]) -> bool {
+        let inside = |at: f64, count: usize| {
+            // One row or column reaches to the edges of its pixels.
+            let edge = if count > 1 { 0.0 } else { 0.5 };
+            (-edge..=count as f64 - 1.0 + edge).contains(&at)
+        };
         let [column, row] = self.raster.pixel(x, y);
-        (0.0..=self.raster.columns as f64 - 1.0).contains(&column)
-            && (0.0..=self.raster.rows as f64 - 1.0).contains(&row)
+        inside(column, self.raster.columns) && inside(row, self.raster.rows)
     }
 
     /// Farthest that two places of the image lie apart, twice \[m\]: windows beyond are outside.
@@ -339,6 +382,34 @@ impl Background {
         let [height, across] = [self.raster.rows, self.raster.columns].map(|n| n as f64);
         2.0 * height.hypot(across) * self.raster.spacing
     }
+}
+
+/// The rows of windows, counted from the stern, that may hold a place of the image. Their number does not grow with the distance
+/// of the ship: those that the image is long along a straight track, and those of half a circle.
+///
+/// - `half_length` of the hull, `step` from row to row \[m\]
+/// - none where the ship is so far that rows cannot be told apart
+fn rows_in(track: &Track, raster: &Raster, half_length: f64, step: f64) -> [Range<u64>; 2] {
+    let farthest = (track.farthest_astern(raster) - half_length).max(0.0);
+    let end = (farthest / step).ceil();
+    let mut next = 0.0f64;
+    track.astern(raster).map(|[near, far]| {
+        let row = |distance: f64| (distance - half_length) / step;
+        let first = (row(near).floor() - 1.0).max(next);
+        let last = (row(far).ceil() + 1.0).min(end);
+        if last >= FARTHEST_ROW || first >= last {
+            return 0..0;
+        }
+        next = last;
+        first as u64..last as u64
+    })
+}
+
+/// Smallest and largest of some values.
+fn span<const N: usize>(values: [f64; N]) -> [f64; 2] {
+    let start = [f64::INFINITY, f64::NEG_INFINITY];
+    let wider = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+    values.into_iter().fold(start, wider)
 }
 
 /// What the displacement by its own velocity leaves of the power of a wave.
@@ -372,8 +443,48 @@ struct Row {
 
 #[cfg(test)]
 mod tests {
-    use super::bunched;
+    use super::{bunched, rows_in};
+    use crate::raster::Raster;
+    use crate::track::Track;
     use std::f64::consts::TAU;
+
+    /// The rows of windows in which a place of the image may lie hold all of them, and are no more for a ship far away.
+    #[test]
+    fn rows_of_windows_do_not_grow_with_the_distance() {
+        let raster = Raster::image(64, 48, 5.0);
+        let step = 80.0;
+        let count = |track: &Track| -> u64 {
+            let rows = rows_in(track, &raster, 50.0, step);
+            rows.into_iter().map(|rows| rows.end - rows.start).sum()
+        };
+        for curvature in [0.0, 1.0 / 400.0, -1.0 / 900.0] {
+            for (position, heading) in [
+                ([40.0, 90.0], 20.0),
+                ([900.0, 700.0], 200.0),
+                ([5e3, 4e3], 50.0),
+            ] {
+                let track = Track::turning(position, heading, 0.0, curvature);
+                let rows = rows_in(&track, &raster, 50.0, step);
+                for (i, j) in (0..64).flat_map(|i| (0..48).map(move |j| (i, j))) {
+                    let [ahead, _] = track.seen_from_ship([raster.x(j), raster.y(i)]);
+                    // Within half a step of the middle of a row, which lies half a step astern of its beginning.
+                    let row = ((-ahead - 50.0) / step).floor();
+                    let inside = rows.iter().any(|rows| rows.contains(&(row as u64)));
+                    assert!(
+                        row < 0.0 || inside,
+                        "{curvature} {position:?}: {row} {rows:?}"
+                    );
+                }
+            }
+        }
+        for far in [1e7, 1e13, 1e30, 1e100] {
+            let straight = Track::new([far, far], 45.0, 0.0);
+            // 400 m from corner to corner, and three rows to spare; half a circle of 1260 m.
+            assert!(count(&straight) <= 8, "{far}");
+            let turning = Track::turning([far, far], 225.0, 0.0, 1.0 / 400.0);
+            assert!(count(&turning) <= 8 + 20, "{far}");
+        }
+    }
 
     /// The fundamental of displaced echoes by counting them: places y + (C/k) sin(ky) of even sources.
     #[test]

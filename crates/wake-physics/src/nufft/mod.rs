@@ -25,7 +25,8 @@ use crate::waves::{PlaneWaves, Quantity, Transfer, strengths};
 use crate::workspace::Workspace;
 use gridding::{Demand, Gridding, Size};
 use num_complex::{Complex, Complex64};
-use spread::Footprints;
+use rayon::prelude::*;
+use spread::{Before, Footprints};
 use std::f64::consts::TAU;
 
 /// How often the error is checked against the computed fields and improved.
@@ -79,7 +80,7 @@ pub(crate) fn synthesize_each(
     tolerance: f64,
     mut take: impl FnMut(usize, &mut Field),
 ) -> f64 {
-    let sums = CentredSums::new(waves, transfer, quantities, raster);
+    let sums = CentredSums::new((waves, transfer, quantities, raster), WAVES_AT_ONCE);
     let mut rms: Vec<f64> = sums.sizes.iter().map(|s| s.expected_rms()).collect();
     let mut todo: Vec<usize> = (0..quantities.len()).filter(|&q| rms[q] > 0.0).collect();
     let mut reached = 0.0f64;
@@ -111,90 +112,57 @@ pub(crate) fn synthesize_each(
     reached
 }
 
+/// Waves that one thread looks at by itself.
+const MANY: usize = 1 << 12;
+
+/// Waves that are spread at once: of more, only the waves themselves are held. Chosen: about a gibibyte.
+pub(crate) const WAVES_AT_ONCE: usize = 1 << 22;
+
 /// Waves with their phases counted from the raster's middle pixel.
 struct CentredSums<'a> {
-    raster: &'a Raster,
+    summands: Summands<'a>,
+    /// One a quantity.
+    sizes: Vec<Size>,
+    /// All waves, where they are spread at once.
+    whole: Option<Part>,
+    /// Waves of a part where they are not.
+    at_once: usize,
+}
+
+/// Some of the waves.
+struct Part {
     /// Wavenumbers along y and x, in cycles a pixel.
     cycles: Vec<[f64; 2]>,
     /// One vector a quantity.
     strengths: Vec<Vec<Complex64>>,
-    sizes: Vec<Size>,
 }
 
-impl<'a> CentredSums<'a> {
-    fn new(
-        waves: &PlaneWaves,
-        transfer: &Transfer,
-        quantities: &[Quantity],
-        raster: &'a Raster,
-    ) -> Self {
+impl Part {
+    fn new((waves, transfer, quantities, raster): Summands<'_>) -> Self {
         let (x, y) = (raster.x(raster.columns / 2), raster.y(raster.rows / 2));
         let phases: Vec<Complex64> = (0..waves.len())
+            .into_par_iter()
+            .with_min_len(MANY)
             .map(|n| Complex64::cis(waves.kx[n] * x + waves.ky[n] * y))
             .collect();
         let mut strengths = strengths(waves, transfer, quantities);
         for s in &mut strengths {
             s.iter_mut().zip(&phases).for_each(|(s, p)| *s *= p);
         }
-        let size = |s: &Vec<Complex64>| Size {
-            sum: s.iter().map(|c| c.norm()).sum(),
-            root: s.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt(),
-        };
         let step = raster.spacing / TAU;
         Self {
-            raster,
             cycles: (0..waves.len())
                 .map(|n| [waves.ky[n] * step, waves.kx[n] * step])
                 .collect(),
-            sizes: strengths.iter().map(size).collect(),
             strengths,
         }
     }
 
-    /// Computes the fields numbered `todo`, two at a time, and hands each to `done`.
-    fn run<T: Real>(
-        &self,
-        workspace: &mut Workspace,
-        gridding: &Gridding,
-        todo: &[usize],
-        mut done: impl FnMut(usize, &mut Field),
-    ) {
-        let [rows, columns] = gridding.lattice;
-        let scaled: Vec<[f64; 2]> = self
-            .cycles
-            .iter()
-            .map(|c| [c[0] * rows as f64, c[1] * columns as f64])
-            .collect();
-        let footprints = Footprints::<T>::new(&scaled, &gridding.kernel, gridding.lattice);
-        let mut fields = [(); 2].map(|()| workspace.field(self.raster));
-        let (blocks, planner) = T::of(workspace);
-        let synthesis = Synthesis::<T>::planned(planner, rows, columns);
-        let mut lattice = blocks.take(rows * columns);
-        let correct = |pixels, lattice| -> Vec<T> {
-            let factors = gridding.kernel.correction(pixels, lattice);
-            factors.into_iter().map(<T as Real>::from_f64).collect()
-        };
-        let down = correct(self.raster.rows, rows);
-        let right = correct(self.raster.columns, columns);
-        let start = [
-            rows / 2 - self.raster.rows / 2,
-            columns / 2 - self.raster.columns / 2,
-        ];
-        let keep = [self.raster.rows, self.raster.columns];
-        for pair in todo.chunks(2) {
-            let [re, im] = fields.each_mut().map(|field| &mut field.values[..]);
-            footprints.spread(&self.paired::<T>(pair), &mut lattice);
-            synthesis.run_window(&mut lattice, start, keep, (re, im), |i, row| {
-                for (v, &factor) in row.iter_mut().zip(&right) {
-                    *v = *v * (factor * down[i]);
-                }
-            });
-            for (&q, field) in pair.iter().zip(&mut fields) {
-                done(q, field);
-            }
-        }
-        blocks.give(lattice);
-        fields.into_iter().for_each(|field| workspace.give(field));
+    fn footprints<T: Real>(&self, gridding: &Gridding) -> Footprints<T> {
+        let [rows, columns] = gridding.lattice.map(|n| n as f64);
+        let scaled = |c: &[f64; 2]| [c[0] * rows, c[1] * columns];
+        let scaled: Vec<[f64; 2]> = self.cycles.iter().map(scaled).collect();
+        Footprints::new(&scaled, &gridding.kernel, gridding.lattice)
     }
 
     /// What k and −k carry for a pair of quantities: (c + id)/2 and (c̄ + id̄)/2.
@@ -214,6 +182,109 @@ impl<'a> CentredSums<'a> {
                 [round(c + i * d), round(c.conj() + i * d.conj())]
             })
             .collect()
+    }
+}
+
+impl<'a> CentredSums<'a> {
+    /// - `at_once`: waves that are spread at once
+    fn new(summands: Summands<'a>, at_once: usize) -> Self {
+        let (waves, _, quantities, _) = summands;
+        let mut sums = Self {
+            summands,
+            sizes: Vec::new(),
+            whole: (waves.len() <= at_once).then(|| Part::new(summands)),
+            at_once,
+        };
+        let mut totals = vec![[0.0; 2]; quantities.len()];
+        sums.each_part(|part| {
+            for (total, strengths) in totals.iter_mut().zip(&part.strengths) {
+                for strength in strengths {
+                    total[0] += strength.norm();
+                    total[1] += strength.norm_sqr();
+                }
+            }
+        });
+        let size = |[sum, squares]: [f64; 2]| Size {
+            sum,
+            root: squares.sqrt(),
+        };
+        sums.sizes = totals.into_iter().map(size).collect();
+        sums
+    }
+
+    /// Looks at the waves, part by part.
+    fn each_part(&self, mut look: impl FnMut(&Part)) {
+        if let Some(part) = &self.whole {
+            return look(part);
+        }
+        let (waves, transfer, quantities, raster) = self.summands;
+        for start in (0..waves.len()).step_by(self.at_once) {
+            let some = waves.part(start..(start + self.at_once).min(waves.len()));
+            look(&Part::new((&some, transfer, quantities, raster)));
+        }
+    }
+
+    /// Computes the fields numbered `todo`, two at a time, and hands each to `done`.
+    fn run<T: Real>(
+        &self,
+        workspace: &mut Workspace,
+        gridding: &Gridding,
+        todo: &[usize],
+        mut done: impl FnMut(usize, &mut Field),
+    ) {
+        let raster = self.summands.3;
+        let [rows, columns] = gridding.lattice;
+        let mut fields = [(); 2].map(|()| workspace.field(raster));
+        let (blocks, planner) = T::of(workspace);
+        let synthesis = Synthesis::<T>::planned(planner, rows, columns);
+        let correct = |pixels, lattice| -> Vec<T> {
+            let factors = gridding.kernel.correction(pixels, lattice);
+            factors.into_iter().map(<T as Real>::from_f64).collect()
+        };
+        let down = correct(raster.rows, rows);
+        let right = correct(raster.columns, columns);
+        let start = [rows / 2 - raster.rows / 2, columns / 2 - raster.columns / 2];
+        let keep = [raster.rows, raster.columns];
+        let mut transform = |pair: &[usize], lattice: &mut [Complex<T>]| {
+            let [re, im] = fields.each_mut().map(|field| &mut field.values[..]);
+            synthesis.run_window(lattice, start, keep, (re, im), |i, row| {
+                for (v, &factor) in row.iter_mut().zip(&right) {
+                    *v = *v * (factor * down[i]);
+                }
+            });
+            for (&q, field) in pair.iter().zip(&mut fields) {
+                done(q, field);
+            }
+        };
+        if let Some(part) = &self.whole {
+            let footprints = part.footprints::<T>(gridding);
+            let mut lattice = blocks.take(rows * columns);
+            for pair in todo.chunks(2) {
+                let before = Before::Nothing;
+                footprints.spread(&part.paired::<T>(pair), &mut lattice, before);
+                transform(pair, &mut lattice);
+            }
+            blocks.give(lattice);
+        } else {
+            // A lattice a pair, so that no part is looked at twice.
+            let mut lattices: Vec<Vec<Complex<T>>> = todo
+                .chunks(2)
+                .map(|_| blocks.take(rows * columns))
+                .collect();
+            let mut before = Before::Nothing;
+            self.each_part(|part| {
+                let footprints = part.footprints::<T>(gridding);
+                for (pair, lattice) in todo.chunks(2).zip(&mut lattices) {
+                    footprints.spread(&part.paired::<T>(pair), lattice, before);
+                }
+                before = Before::Waves;
+            });
+            for (pair, mut lattice) in todo.chunks(2).zip(lattices) {
+                transform(pair, &mut lattice);
+                blocks.give(lattice);
+            }
+        }
+        fields.into_iter().for_each(|field| workspace.give(field));
     }
 }
 

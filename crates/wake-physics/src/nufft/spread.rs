@@ -22,6 +22,15 @@ pub(crate) struct Footprints<T> {
     weights: Vec<T>,
 }
 
+/// What a lattice holds before waves are added.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Before {
+    /// Anything: it is cleared.
+    Nothing,
+    /// Other waves.
+    Waves,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Place {
     column: u32,
@@ -70,10 +79,15 @@ impl<T: Real> Footprints<T> {
         }
     }
 
-    /// Clears the transposed lattice `[columns, rows]` and adds all waves.
+    /// Adds all waves to the transposed lattice `[columns, rows]`.
     ///
     /// `strengths` holds for each wave what its wavenumber k and what −k carries.
-    pub(crate) fn spread(&self, strengths: &[[Complex<T>; 2]], lattice: &mut [Complex<T>]) {
+    pub(crate) fn spread(
+        &self,
+        strengths: &[[Complex<T>; 2]],
+        lattice: &mut [Complex<T>],
+        before: Before,
+    ) {
         let rows = self.lattice[0];
         lattice
             .par_chunks_mut(LINES * rows)
@@ -81,16 +95,20 @@ impl<T: Real> Footprints<T> {
             .for_each(|(bin, lines)| {
                 vectorized(
                     #[inline(always)]
-                    || self.spread_lines(bin, strengths, lines),
+                    || {
+                        if before == Before::Nothing {
+                            lines.fill(Complex::new(T::zero(), T::zero()));
+                        }
+                        self.spread_lines(bin, strengths, lines);
+                    },
                 );
             });
     }
 
-    /// Clears the lines of a task and adds all waves that touch them.
+    /// Adds all waves that touch the lines of a task.
     #[inline(always)]
     fn spread_lines(&self, bin: usize, strengths: &[[Complex<T>; 2]], lines: &mut [Complex<T>]) {
         let rows = self.lattice[0];
-        lines.fill(Complex::new(T::zero(), T::zero()));
         let first = bin * LINES;
         let last = first + lines.len() / rows;
         // Kernels that begin in the bin or up to width − 1 columns before it, around the end too.

@@ -103,7 +103,7 @@ fn tolerance_is_met_at_every_level() {
 fn work_follows_the_tolerance() {
     let raster = Raster::image(128, 128, 2.5);
     let waves = scattered(&raster, 500);
-    let sums = CentredSums::new(&waves, &TRANSFER, &ALL, &raster);
+    let sums = CentredSums::new((&waves, &TRANSFER, &ALL, &raster), WAVES_AT_ONCE);
     let plan = |tolerance| {
         let sizes = sums.sizes.iter().map(|&s| (s, s.expected_rms()));
         let demand = Demand::strictest(sizes, tolerance);
@@ -144,7 +144,7 @@ fn rounding_is_bounded() {
     for (rows, columns) in [(64, 64), (300, 250), (45, 700)] {
         let raster = Raster::image(rows, columns, 2.5);
         let waves = scattered(&raster, 400);
-        let sums = CentredSums::new(&waves, &TRANSFER, &ALL, &raster);
+        let sums = CentredSums::new((&waves, &TRANSFER, &ALL, &raster), WAVES_AT_ONCE);
         for oversampling in [1.25, 1.5, 2.0] {
             for error in [1e-3, 1e-5, 1e-7] {
                 let single = Gridding::new(error, oversampling, &raster, false);
@@ -170,6 +170,43 @@ fn rounding_is_bounded() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// Waves spread in parts make the fields that all at once make, to the rounding of the sums; sizes are the same bits.
+#[test]
+fn parts_of_the_waves_make_the_same_fields() {
+    let raster = Raster::image(40, 56, 2.0);
+    let waves = scattered(&raster, 300);
+    let summands = (&waves, &TRANSFER, &ALL[..], &raster);
+    let fields = |at_once: usize| {
+        let sums = CentredSums::new(summands, at_once);
+        assert_eq!(sums.whole.is_some(), at_once >= waves.len());
+        let gridding = Gridding::new(1e-9, 2.0, &raster, true);
+        let mut fields = vec![Field::default(); ALL.len()];
+        let todo: Vec<usize> = (0..ALL.len()).rev().collect();
+        sums.run::<f64>(&mut Workspace::default(), &gridding, &todo, |q, field| {
+            fields[q] = field.clone();
+        });
+        (
+            fields,
+            sums.sizes
+                .iter()
+                .map(|s| [s.sum, s.root])
+                .collect::<Vec<_>>(),
+        )
+    };
+    let (whole, sizes) = fields(1000);
+    for at_once in [1, 100, 304] {
+        let (parts, same) = fields(at_once);
+        assert_eq!(sizes, same, "{at_once}");
+        for (a, b) in whole.iter().zip(&parts) {
+            // Rounded to f32, 6e-8 of a value; the largest is some three times the rms.
+            assert!(
+                a.rms() > 0.0 && a.difference(b).0 <= 4e-7 * a.rms(),
+                "{at_once}"
+            );
         }
     }
 }

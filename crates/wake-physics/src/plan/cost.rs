@@ -1,9 +1,7 @@
 //! What a simulation costs, before it runs.
 
+use super::work::Work;
 use std::fmt;
-
-/// Seconds of a core a computed pixel, all terms and files included: measured, 0.3 to 1.0 µs on AVX-512.
-const SECONDS_PER_PIXEL: f64 = 5e-7;
 
 /// Seconds of a core above which a user should know first: chosen.
 const HIGH: f64 = 1.0;
@@ -15,18 +13,54 @@ pub struct Cost {
     pub computed: [usize; 2],
     /// Computed pixels for each pixel of the image.
     pub for_each: f64,
-    /// Time of one core \[s\], good to a factor of three.
+    /// Time of one core \[s\], good to a factor of three from a tenth of a second on.
     pub core_seconds: f64,
+    /// Memory \[bytes\]: no more is used, and a third of it or more from 64 MiB on.
+    pub bytes: u64,
+    /// What the most time is for.
+    pub(super) advice: Advice,
+}
+
+/// What makes a scene cheaper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Advice {
+    /// Most is for pixels.
+    Pixels,
+    /// Most is for the waves of ships that turn.
+    Turn,
+    /// Most is for looks through an impulse response.
+    Looks,
+    /// Most is for the table of σ⁰.
+    Tolerance,
+}
+
+impl Advice {
+    /// What to change, beginning with a verb.
+    pub(crate) fn text(self) -> &'static str {
+        match self {
+            Self::Pixels => {
+                "lower grid.rows, grid.columns, grid.oversampling or radar.range_to_velocity, or raise grid.spacing"
+            }
+            Self::Turn => {
+                "set ship.turn_rate to 0 or farther from it, for most is for the waves of a wide turn, or raise grid.spacing"
+            }
+            Self::Looks => "lower radar.looks or grid.oversampling",
+            Self::Tolerance => "raise model.tolerance",
+        }
+    }
 }
 
 impl Cost {
     /// Of an image on a larger raster of computed pixels.
-    pub(super) fn new(computed: [usize; 2], image_pixels: usize) -> Self {
+    pub(super) fn new(computed: [usize; 2], image_pixels: usize, work: &Work) -> Self {
         let pixels = computed[0] as f64 * computed[1] as f64;
+        let (core_seconds, advice) = work.seconds();
         Self {
             computed,
             for_each: pixels / image_pixels.max(1) as f64,
-            core_seconds: SECONDS_PER_PIXEL * pixels,
+            core_seconds,
+            bytes: work.bytes().0,
+            advice,
         }
     }
 
@@ -42,9 +76,12 @@ impl fmt::Display for Cost {
         let [rows, columns] = self.computed;
         write!(
             f,
-            "{rows} x {columns} pixels are computed, {:.1} for each pixel of the image: some {:.0} s of a core; lower \
-             grid.rows, grid.columns, grid.oversampling or radar.range_to_velocity, or raise grid.spacing",
-            self.for_each, self.core_seconds
+            "{rows} x {columns} pixels are computed, {:.1} for each pixel of the image: some {:.0} s of a core and up to {:.1} \
+             GiB; {}",
+            self.for_each,
+            self.core_seconds,
+            self.bytes as f64 / (1u64 << 30) as f64,
+            self.advice.text()
         )
     }
 }

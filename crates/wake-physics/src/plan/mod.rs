@@ -7,6 +7,7 @@ mod budget;
 mod cost;
 mod estimates;
 mod terms;
+mod work;
 
 pub(crate) use budget::SHARES;
 pub use cost::Cost;
@@ -21,19 +22,11 @@ use crate::scene::{Scene, Term};
 use crate::surface::lattice_size;
 use crate::survey::{Survey, modulation_variance};
 use serde::Serialize;
-
-/// Fields of four bytes a pixel that are alive at once, at most; the target of the design.
-const FIELDS_IN_MEMORY: u64 = 40;
-
-/// Bytes a pixel that a scene in strips keeps as a whole: of the computed ones the waves of the sea, the intensity and what its
-/// impulse response takes; of the image its ten fields, a complex image and one to write.
-const WHOLE: [u64; 2] = [24, 52];
+use work::Work;
 
 /// Pixels that are computed at once, margins included; more are computed in strips of at most half as many (chosen: about a
 /// gibibyte of fields, and an image of 4096 × 4096 pixels is one strip).
 const MOST_AT_ONCE: usize = 1 << 25;
-/// Bytes of a plane wave while its amplitudes are found and it is summed.
-const BYTES_OF_A_WAVE: u64 = 64;
 
 /// The plan of a simulation.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +39,8 @@ pub struct Plan {
     pub notes: Vec<String>,
     /// Pixels of the image.
     pub(crate) image_pixels: usize,
+    /// What the stages will do.
+    pub(crate) work: Work,
     /// One a ship.
     pub(crate) wakes: Vec<WakePlan>,
     /// Mean σ⁰ expected \[1\].
@@ -83,19 +78,6 @@ fn strips(computed: &Raster, image: &Raster) -> usize {
     (2 * computed.len()).div_ceil(MOST_AT_ONCE).min(image.rows)
 }
 
-/// Bytes that are needed at once, at most.
-fn needed(computed: &Raster, image: &Raster, (strips, margin): (usize, usize)) -> u64 {
-    let all = FIELDS_IN_MEMORY * 4;
-    if strips == 1 {
-        return all * computed.len() as u64;
-    }
-    let rows = computed.rows / strips + 6 * margin;
-    let [of_computed, of_image] = WHOLE;
-    all * (rows * computed.columns) as u64
-        + of_computed * computed.len() as u64
-        + of_image * image.len() as u64
-}
-
 impl Plan {
     /// Whether a term is computed.
     #[must_use]
@@ -106,7 +88,7 @@ impl Plan {
     /// What a simulation costs by this plan.
     #[must_use]
     pub fn cost(&self) -> Cost {
-        Cost::new(self.sizes.computed, self.image_pixels)
+        Cost::new(self.sizes.computed, self.image_pixels, &self.work)
     }
 
     /// Sum of the estimates of the terms left out of the image before speckle.
@@ -137,16 +119,32 @@ impl Plan {
         let margin = survey.margin(models);
         let raster = models.image.with_margin(margin[0], margin[1]);
         let strips = strips(&raster, &models.delivered);
-        let needed = needed(&raster, &models.delivered, (strips, margin[0]));
-        memory::check([scene.grid.rows, scene.grid.columns], margin, needed)?;
+        let sea_lattice = if uses(Term::Sea) {
+            lattice_size(&models.sea, &raster)
+        } else {
+            [0, 0]
+        };
+        let work = |wakes: &[WakePlan]| {
+            let what = (scene, models, survey);
+            Work::of(what, &raster, (strips, margin[0]), sea_lattice, uses, wakes)
+        };
+        let fits = |work: &Work| {
+            let (needed, advice) = work.bytes();
+            let size = [scene.grid.rows, scene.grid.columns];
+            memory::check(size, margin, (needed, advice.text()))
+        };
+        // Before the waves of the wakes are looked at, which takes longer the more pixels there are.
+        fits(&work(&[]))?;
         // Each ship's share, so that all of them keep the tolerance together.
         let share = SHARES.wake_nodes / models.wakes.len().max(1) as f64;
         let wakes = models.wakes.iter().filter(|_| uses(Term::Kelvin));
-        let wakes = wakes.map(|wake| wake.kelvin.plan(&raster, share * tolerance));
+        let wakes = wakes.map(|wake| {
+            let plan = wake.kelvin.plan(&raster, share * tolerance);
+            wake.kelvin.with_ring_work(plan)
+        });
         let wakes: Vec<WakePlan> = wakes.collect();
-        let waves = wakes.iter().map(WakePlan::nodes).max().unwrap_or(0);
-        let needed = needed + BYTES_OF_A_WAVE * waves as u64;
-        memory::check([scene.grid.rows, scene.grid.columns], margin, needed)?;
+        let work = work(&wakes);
+        fits(&work)?;
         let zones = wakes.iter().flat_map(|wake| &wake.zones);
         let directions = zones.map(|z| z.directions.map(f64::to_degrees));
         let nodes = |of: fn(&WakePlan) -> usize| wakes.iter().map(of).sum();
@@ -158,15 +156,12 @@ impl Plan {
                 margin,
                 computed: [raster.rows, raster.columns],
                 band: raster.nyquist_wavenumber(),
-                sea_lattice: if uses(Term::Sea) {
-                    lattice_size(&models.sea, &raster)
-                } else {
-                    [0, 0]
-                },
+                sea_lattice,
                 wake_nodes: [nodes(|w| w.transverse_nodes), nodes(|w| w.divergent_nodes)],
                 wake_directions: directions.collect(),
             },
             terms,
+            work,
             notes: survey.notes(scene, models),
             wakes,
             mean_sigma0: survey.mean[0] + survey.mean[1],
@@ -249,14 +244,55 @@ mod tests {
         assert_eq!(strips(&raster(1 << 20, 1 << 10), &raster(3, 9)), 3);
     }
 
-    /// Counted by hand. One piece: 160 bytes a pixel. In strips of 1000/4 rows with six margins of 10: 160 bytes on
-    /// (250 + 60) rows of 2000, 24 on all that is computed, 52 on the image of 900 × 1900.
+    /// What is counted grows with what makes it: pixels, looks, waves of a turn, nodes of a table, and the distance of a ship with
+    /// none of it.
     #[test]
-    fn memory_is_counted() {
-        let (computed, image) = (raster(1000, 2000), raster(900, 1900));
-        assert_eq!(needed(&computed, &image, (1, 10)), 160 * 2_000_000);
-        let strips = 160 * 310 * 2000 + 24 * 2_000_000 + 52 * 1_710_000;
-        assert_eq!(needed(&computed, &image, (4, 10)), strips);
+    fn work_is_counted() {
+        let base = plan(&[]).cost();
+        let looks = ["radar.sensor=sentinel-1-iw", "radar.looks=1000"];
+        let [few, many] = [&looks[..1], &looks].map(|keys| plan(keys).cost());
+        assert!(
+            many.core_seconds > 1.5 * few.core_seconds,
+            "{few:?} {many:?}"
+        );
+        assert_eq!(many.bytes, few.bytes);
+        assert!(many.to_string().contains("radar.looks"), "{many}");
+        for rate in ["0.9", "-0.1"] {
+            let turn = plan(&[&format!("ship.turn_rate={rate}")]).cost();
+            assert!(turn.core_seconds > 2.0 * base.core_seconds && turn.bytes > base.bytes);
+            assert!(turn.to_string().contains("ship.turn_rate"), "{turn}");
+        }
+        let finest = plan(&["model.tolerance=1e-6", "radar.sensor=terrasar-x-sm"]);
+        assert!(finest.work.table > 1e6 && finest.work.table <= (1u64 << 22) as f64);
+        for far in ["1e7", "1e300"] {
+            let cost = plan(&[&format!("ship.position=[{far}, {far}]")]).cost();
+            assert!(
+                cost.core_seconds < 2.0 * base.core_seconds && cost.bytes <= 2 * base.bytes,
+                "{far}"
+            );
+        }
+        // Strips hold a part of the pixels at once.
+        let large = plan(&["grid.rows=16384", "grid.columns=4096", "model.terms=[]"]);
+        assert!(large.sizes.strips > 2 && large.work.at_once < 0.5 * large.work.whole[0]);
+        assert!(large.work.computed >= large.work.whole[0]);
+    }
+
+    /// A wide turn of a large image has more waves than memory holds: refused, with what to change.
+    #[test]
+    fn waves_of_a_turn_count_as_memory() {
+        let keys = [
+            "grid.rows=16384",
+            "grid.columns=8",
+            "radar.sensor=sentinel-1-ew",
+            "ship.heading=180",
+            "ship.turn_rate=0.006",
+        ];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        match Plan::new(&scene) {
+            Err(error) => assert!(error.to_string().contains("ship.turn_rate"), "{error}"),
+            // Where there is as much, or the system does not tell.
+            Ok(plan) => assert!(plan.cost().bytes > 10 << 30),
+        }
     }
 
     /// Only terms that are not used are left out, and speckle is no part of the image before speckle.

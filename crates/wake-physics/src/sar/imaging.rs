@@ -2,6 +2,7 @@
 
 use crate::raster::{Field, Raster};
 use crate::sar::AzimuthResolution;
+use crate::sar::spread::Steps;
 use std::f64::consts::PI;
 
 /// The radar's part of velocity bunching.
@@ -49,6 +50,18 @@ pub(super) struct Response {
     pub(super) variance_per_square: f64,
     /// Row and column of the image less those of the sources.
     pub(super) offset: [i64; 2],
+}
+
+impl Imaging {
+    /// Pixels of one column over which the power of a source is spread in azimuth, about.
+    ///
+    /// - `acceleration` toward the radar [m/s²]; `spacing` of the pixels \[m\]; `tolerance` of the image
+    pub(crate) fn taps(&self, acceleration: f64, spacing: f64, tolerance: f64) -> f64 {
+        let pixel = Raster::image(1, 1, spacing);
+        let response = Response::new(self, &pixel, &pixel);
+        let steps = Steps::new(response.variance_at(0.0), tolerance);
+        steps.taps(response.variance_at(acceleration) as f32) as f64
+    }
 }
 
 impl Response {

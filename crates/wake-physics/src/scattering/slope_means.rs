@@ -42,6 +42,9 @@ pub(crate) struct SlopeMeans {
 impl SlopeMeans {
     /// The farthest node from the middle, at most, for slopes of a variance in all.
     pub(crate) fn reach(variance: f64) -> f64 {
+        if variance <= 0.0 {
+            return 0.0;
+        }
         let farthest = RULES.iter().filter_map(|rule| rule.last());
         farthest.map(|node| node[0]).fold(0.0, f64::max) * variance.sqrt()
     }

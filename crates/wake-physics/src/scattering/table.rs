@@ -6,7 +6,7 @@ use crate::scattering::slope_lattice::{SlopeLattice, radius};
 use crate::scattering::slope_means::SlopeMeans;
 use crate::scattering::slopes::PrincipalAxes;
 use crate::scattering::table_error::{OF_MEANS, Weights, error_between_nodes, interpolation_error};
-use crate::scattering::{Backscatter, FacetFields};
+use crate::scattering::{Backscatter, FacetFields, SlopeCovariance};
 use crate::vectorize::vectorized;
 use rayon::prelude::*;
 
@@ -18,6 +18,13 @@ const MOST_REFINEMENT: usize = 16;
 
 /// Steepest slope along an axis that the table covers \[1\]; steeper facets are rare and evaluated exactly.
 const STEEPEST: f64 = 1.5;
+
+/// Most nodes of a table, and for each pixel that it is made for if that is more: chosen; 32 MiB.
+const MOST_NODES: usize = 1 << 22;
+const NODES_FOR_EACH: usize = 4;
+
+/// Standard deviations of the slopes that a table covers, foreseen.
+const COVERED: f64 = 5.0;
 
 /// Most facets evaluated for one table.
 const MOST_FACETS: usize = 1 << 19;
@@ -68,6 +75,13 @@ struct MadeFor {
     variance: f64,
     /// The error asked for.
     error: f64,
+    /// Nodes at most.
+    most_nodes: usize,
+}
+
+/// Nodes of a table for some pixels, at most.
+fn most_nodes(pixels: usize) -> usize {
+    MOST_NODES.max(NODES_FOR_EACH * pixels)
 }
 
 impl MadeFor {
@@ -109,6 +123,7 @@ impl BackscatterTable {
             facets: extent(&axes, slopes),
             variance: facets.largest_unresolved(),
             error,
+            most_nodes: most_nodes(facets.slope_x.values.len()),
         };
         last.filter(|last| last.made_for == made_for && last.backscatter == backscatter)
             .unwrap_or_else(|| Self::over(backscatter, made_for))
@@ -140,7 +155,7 @@ impl BackscatterTable {
         let mut spacing = FIRST_SPACING;
         loop {
             let facets = Facets::sample(&backscatter, &axes, made_for.range(), spacing);
-            let mut average = facets.averaged(error, &weights);
+            let mut average = facets.averaged(error, &weights, made_for.most_nodes);
             let exhausted = 2 * facets.lattice.values.len() > MOST_FACETS;
             let plane = facets.std.iter().all(|&s| s <= 0.0);
             if plane && average.error <= error {
@@ -173,6 +188,40 @@ impl BackscatterTable {
             }
             spacing *= average.next_spacing(error);
         }
+    }
+
+    /// Nodes of a table, about, by the smoothness of the coarsest.
+    ///
+    /// - `slopes` of the facets; largest `variance` of unresolved ones
+    /// - `error` as in [`Self::covering`]; `pixels`: how many there are
+    pub(crate) fn foreseen(
+        backscatter: &Backscatter,
+        (slopes, variance): (&SlopeCovariance, f64),
+        (error, pixels): (f64, usize),
+    ) -> f64 {
+        // What fields of `f32` do not hold has no table.
+        if error < f64::from(f32::MIN_POSITIVE) {
+            return 0.0;
+        }
+        let axes = backscatter.tilt.principal_axes();
+        let reach = |axis: usize| {
+            let outward = COVERED * variance_along(&axes, slopes, axis).sqrt();
+            let outward = (outward / RANGE_STEP).ceil();
+            (outward * RANGE_STEP).min(STEEPEST)
+        };
+        let made_for = MadeFor {
+            facets: [0, 1].map(|axis| [-reach(axis), reach(axis)]),
+            variance,
+            error,
+            most_nodes: most_nodes(pixels),
+        };
+        let share = if made_for.variance > 0.0 { 0.5 } else { 1.0 };
+        let facets = Facets::sample(backscatter, &axes, made_for.range(), FIRST_SPACING);
+        let weights = made_for.weights();
+        let coarse = facets.averaged(f64::MAX, &weights, 1);
+        let finer = 1.1 * (coarse.error / (share * made_for.error)).powf(0.25);
+        let nodes = coarse.lattice.values.len() as f64 * finer.max(1.0).powi(2);
+        nodes.min(made_for.most_nodes as f64)
     }
 
     /// Nodes along the two principal axes of the unresolved slopes; 0 where every facet is evaluated exactly.
@@ -267,6 +316,24 @@ impl BackscatterTable {
     }
 }
 
+impl Backscatter {
+    /// Share of Gaussian slopes along the axes of the unresolved ones that are steeper than a table covers, at most 1.
+    pub(crate) fn steep_share(&self, slopes: &SlopeCovariance) -> f64 {
+        let axes = self.tilt.principal_axes();
+        let share =
+            |axis| libm::erfc(STEEPEST / (2.0 * variance_along(&axes, slopes, axis)).sqrt());
+        (share(0) + share(1)).min(1.0)
+    }
+}
+
+/// Variance of slopes along one of the axes of others.
+fn variance_along(axes: &PrincipalAxes, slopes: &SlopeCovariance, axis: usize) -> f64 {
+    let mut unit = [0.0; 2];
+    unit[axis] = 1.0;
+    let [x, y] = axes.slope(unit);
+    (slopes.xx * x * x + 2.0 * slopes.xy * x * y + slopes.yy * y * y).max(0.0)
+}
+
 impl BackscatterTable {
     /// σ⁰ of the pixels from `first` on, where some have slopes that their neighbours do not have; `bragg` is without.
     fn roughened_row(
@@ -328,7 +395,7 @@ impl Facets {
     }
 
     /// The average over tilt on a lattice fine enough for an interpolation of this error, if there is one.
-    fn averaged(&self, error: f64, weights: &Weights) -> Average {
+    fn averaged(&self, error: f64, weights: &Weights, most_nodes: usize) -> Average {
         let lattice = self.lattice.smoothed(self.std, self.radius, 1);
         let largest = lattice.values.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         let averaging = self.averaging_error(&lattice, largest, weights);
@@ -340,6 +407,8 @@ impl Facets {
         };
         let refinement = (1.1 * (interpolation / (error - averaging)).powf(0.25)).ceil();
         let resolved = self.std.iter().all(|&s| s >= self.lattice.step);
+        let finest = (most_nodes as f64 / average.lattice.values.len() as f64).sqrt();
+        let refinement = refinement.min(finest.floor());
         if resolved && averaging < error && refinement > 1.0 {
             let refinement = (refinement as usize).min(MOST_REFINEMENT);
             average.lattice = self.lattice.smoothed(self.std, self.radius, refinement);
@@ -468,6 +537,7 @@ mod tests {
             facets,
             variance: 0.0,
             error,
+            most_nodes: MOST_NODES,
         }
     }
 

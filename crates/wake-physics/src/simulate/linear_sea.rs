@@ -68,7 +68,9 @@ impl LinearSea {
         let [rows, columns] = [scene.grid.rows, scene.grid.columns];
         let period = fast_length(rows.max(columns) + GUARD);
         // White numbers, waves, two fields.
-        memory::check([rows, columns], [0, 0], 24 * (period * period) as u64)?;
+        let needed = 24 * (period * period) as u64;
+        let advice = "lower grid.rows or grid.columns";
+        memory::check([rows, columns], [0, 0], (needed, advice))?;
         let mut models = Models::new(&scene);
         let survey = Survey::new(&scene, &models);
         let (slopes, velocity) = survey.resolved_sea();

@@ -91,6 +91,8 @@ impl Stages<'_> {
         // The mean is known now; without a sea near nadir it is far from the one that was expected.
         let mean = sigma0.mean();
         if mean > 0.0 && table.error() > asked * mean {
+            // One table in memory, not two.
+            drop(table);
             table = table_for(None, mean);
             table.fill_sigma0(&mut sigma0, &facets);
         }

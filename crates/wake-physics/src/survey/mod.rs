@@ -206,11 +206,20 @@ impl Survey {
         };
         let radial = |w: &WaveSample| self.modulation.transfer.radial(w.k, w.omega);
         let velocity = rms(&self.sea, radial).hypot(WEDGE.sqrt() * rms(&self.wake, radial));
-        let acceleration = deviation(Quantity::RadialAcceleration);
+        let acceleration = self.acceleration();
         let width = self.resolution.at(acceleration) / (SQRT_2 * PI);
         let azimuth = (models.range_to_velocity * velocity).hypot(width);
         let range = deviation(Quantity::Elevation) / models.incidence.tan();
         [azimuth, range].map(|d| (DEVIATIONS * d / models.image.spacing).ceil() as usize + 1)
+    }
+
+    /// Standard deviation of the acceleration toward the radar, where the wake is [m/s²].
+    pub(crate) fn acceleration(&self) -> f64 {
+        let factor = |w: &WaveSample| {
+            let quantity = Quantity::RadialAcceleration;
+            self.modulation.transfer.factor(quantity, w.k, w.omega)
+        };
+        rms(&self.sea, factor).hypot(WEDGE.sqrt() * rms(&self.wake, factor))
     }
 
     /// What a user should know.

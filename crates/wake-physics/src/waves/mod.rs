@@ -7,6 +7,7 @@ pub use matrix_product::matrix_product;
 use crate::raster::{Field, Raster};
 use num_complex::Complex64;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Plane waves of the sea surface at one instant:
 ///
@@ -30,6 +31,26 @@ pub struct PlaneWaves {
 }
 
 impl PlaneWaves {
+    /// No wave, and room for as many.
+    pub(crate) fn with_capacity(count: usize) -> Self {
+        Self {
+            kx: Vec::with_capacity(count),
+            ky: Vec::with_capacity(count),
+            omega: Vec::with_capacity(count),
+            amplitude: Vec::with_capacity(count),
+        }
+    }
+
+    /// Some of the waves, in their order.
+    pub(crate) fn part(&self, range: Range<usize>) -> Self {
+        Self {
+            kx: self.kx[range.clone()].to_vec(),
+            ky: self.ky[range.clone()].to_vec(),
+            omega: self.omega[range.clone()].to_vec(),
+            amplitude: self.amplitude[range].to_vec(),
+        }
+    }
+
     /// Number of waves.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -204,6 +225,8 @@ pub fn strengths(
 ) -> Vec<Vec<Complex64>> {
     let one = |&quantity: &Quantity| {
         (0..waves.len())
+            .into_par_iter()
+            .with_min_len(1 << 12)
             .map(|n| {
                 let factor = transfer.factor(quantity, [waves.kx[n], waves.ky[n]], waves.omega[n]);
                 factor * waves.amplitude[n]

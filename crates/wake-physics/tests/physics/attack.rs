@@ -1,16 +1,13 @@
-//! Random scenes at the ends of all ranges: finite, no negative power, and the fast methods as near the oracles as asked.
+//! Random scenes at the ends of all ranges: finite, no negative power, labels, and the fast methods as near the oracles as
+//! asked. `tests/cost` tells what such scenes cost beside what their plans say.
 
-use crate::assert_sound;
+use crate::any_scene::{self, ends, terms};
+use crate::{assert_sound, small};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use wake_physics::labels::Labels;
 use wake_physics::scene::{Grid, HullForm, Polarization, Ship, SpectrumModel, SpreadingModel};
-use wake_physics::scene::{Term, TermRule, Terms};
 use wake_physics::{Method, Plan, Scene, simulate, simulate_with};
-
-/// An end of a range, or anything between.
-fn ends(min: f64, max: f64) -> impl Strategy<Value = f64> {
-    prop_oneof![Just(min), Just(max), min..=max]
-}
 
 prop_compose! {
     fn grid()(rows in 1_usize..=9, columns in 1_usize..=9, spacing in ends(0.1, 100.0)) -> Grid {
@@ -40,14 +37,6 @@ prop_compose! {
             ..Ship::default()
         }
     }
-}
-
-fn terms() -> impl Strategy<Value = Terms> {
-    prop_oneof![
-        Just(Terms::Rule(TermRule::Needed)),
-        Just(Terms::Rule(TermRule::All)),
-        proptest::sample::subsequence(Term::ALL.to_vec(), 1..=10).prop_map(Terms::List),
-    ]
 }
 
 prop_compose! {
@@ -121,6 +110,56 @@ proptest! {
         prop_assume!(pixels(&plan) <= MOST_PIXELS);
         let simulation = simulate(&scene).unwrap();
         assert_sound(&simulation, &scene.to_toml().unwrap());
+    }
+}
+
+/// Seconds of a core and bytes, as told, of the scenes over all keys that are simulated here.
+const MOST_SECONDS: f64 = 1.0;
+const MOST_BYTES: u64 = 1 << 28;
+
+proptest! {
+    #![proptest_config(cases(150))]
+
+    /// All keys at once, and ships as far away as numbers go: an image and labels without a number that is none, or a
+    /// sentence; written and read again the same scene.
+    #[test]
+    fn any_scene_is_sound_or_refused(scene in any_scene::scene(600)) {
+        prop_assert!(scene.validate().is_ok(), "{:?}", scene.validate());
+        let toml = scene.to_toml().unwrap();
+        prop_assert_eq!(&Scene::from_toml(&toml).unwrap(), &scene);
+        let Ok(plan) = Plan::new(&scene) else { return Ok(()) };
+        let cost = plan.cost();
+        prop_assert!(cost.core_seconds.is_finite() && cost.core_seconds > 0.0 && cost.bytes > 0, "{}", cost);
+        prop_assume!(cost.core_seconds <= MOST_SECONDS && cost.bytes <= MOST_BYTES);
+        let simulation = simulate(&scene).unwrap();
+        assert_sound(&simulation, &toml);
+        let labels = serde_json::to_string(&simulation.labels).unwrap();
+        let read: Labels = serde_json::from_str(&labels).unwrap();
+        prop_assert_eq!(read.ships.len(), scene.ships.len());
+    }
+}
+
+/// However far a ship is, its labels look at no more windows than the image has; at ends of the range of numbers as well.
+#[test]
+fn a_ship_at_any_distance_is_labelled() {
+    for keys in [
+        &["ship.position=[1e7, 1e7]"][..],
+        &["ship.position=[1e13, 1e13]"],
+        &["ship.position=[1e300, -1e300]"],
+        &["ship.position=[1.7e308, 1.7e308]", "ship.edge=true"],
+        &[
+            "ship.position=[-1.7e308, 1e80]",
+            "ship.turn_rate=0.5",
+            "ship.edge=true",
+        ],
+        &["ship.position=[1e13, 1e13]", "ship.turn_rate=0.006"],
+        &["sea.time=1e5", "ship.speed=40"],
+        &["sea.time=1e5", "ship.speed=40", "ship.turn_rate=0.1"],
+    ] {
+        let scene = small(16, 16, keys);
+        let simulation = simulate(&scene).unwrap();
+        assert_sound(&simulation, &keys.join(" "));
+        assert_eq!(simulation.labels.ships[0].wake.box_px, None, "{keys:?}");
     }
 }
 

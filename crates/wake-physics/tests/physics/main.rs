@@ -7,10 +7,12 @@
     reason = "a scene is a default with some values changed"
 )]
 
+mod any_scene;
 mod attack;
 mod expected;
 mod hard_cases;
 mod methods;
+mod numbers;
 mod plan;
 mod refinement;
 mod satellite;

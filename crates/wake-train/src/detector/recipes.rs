@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use wake_ldm::WakeSampler;
-use wake_dataset::{Mixture, Recipe as SceneRecipe, Sampled, Simulated, Source};
+use wake_dataset::{Mixture, Recipe as SceneRecipe, Simulated, Source};
+use wake_ldm::{Sampled, WakeSampler};
 use wake_nn::device_named;
 
 use super::cluttered::Cluttered;

@@ -4,7 +4,7 @@ use burn::tensor::activation::{log_sigmoid, sigmoid};
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::sample::Sample;
-use wake_ldm::network::{ANGLE_UNIT, INPUTS, LENGTH_UNIT, Map, STRIDE};
+use wake_detector::network::{ANGLE_UNIT, INPUTS, LENGTH_UNIT, Map, STRIDE};
 use wake_detector::normalize;
 use wake_detector::Wake;
 
@@ -229,7 +229,7 @@ impl Prepared {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wake_ldm::network::OUTPUTS;
+    use wake_detector::network::OUTPUTS;
 
     fn sample(wakes: Vec<Wake>) -> Sample {
         let size = 128;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde_json::json;
 use wake_dataset::{Batches, Loader, Source};
 use wake_nn::device_named;
-use wake_train::{AdamOptions, Checkpoint, Metrics, Rate, Trainer, TrainerOptions};
+use crate::{AdamOptions, Checkpoint, Metrics, Rate, Trainer, TrainerOptions};
 use wake_nn::weights::{Layout, Precision, load, save_as};
 
 use super::draw::Draw;
@@ -17,7 +17,7 @@ use super::repeated::Repeated;
 use super::sample::Sample;
 use super::targets::{Batch, Prepared};
 use crate::error::{Error, Result};
-use wake_ldm::network::Network;
+use wake_detector::network::Network;
 
 /// Images of a step.
 const BATCH: usize = 16;
@@ -117,7 +117,7 @@ pub fn train(
     if let Some(checkpoint) = Checkpoint::newest(&checkpoints)? {
         trainer.restore(checkpoint, &state)?;
     }
-    std::fs::create_dir_all(out).map_err(|source| wake_ldm::Error::Io {
+    std::fs::create_dir_all(out).map_err(|source| wake_nn::Error::Io {
         action: "make",
         path: out.to_owned(),
         source,

@@ -5,11 +5,10 @@ use std::path::Path;
 
 use burn::tensor::Device;
 use serde_json::{Value, json};
-use wake_physics::output;
 
 use super::super::checkpoint::Checkpoint;
 use super::super::folder::check_begin;
-use super::super::metrics::Metrics;
+use super::super::log::Metrics;
 use super::super::progress::Progress;
 use super::super::stage_options::{StageOptions, Usual};
 use super::super::trainer::TrainerOptions;
@@ -161,7 +160,7 @@ impl FineTuning<'_> {
             };
             for entry in entries {
                 let path = entry
-                    .map_err(|source| crate::files::unreadable(&folder, source))?
+                    .map_err(|source| crate::log::unreadable(&folder, source))?
                     .path();
                 let name = path.file_name().unwrap_or_default();
                 let name = name.to_string_lossy();

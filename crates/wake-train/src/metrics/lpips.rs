@@ -9,7 +9,8 @@ use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
 use burn::tensor::{Device, Tensor, TensorData};
 use safetensors::{Dtype, SafeTensors};
 
-use crate::error::{Error, Mismatch, Misshapen, Result};
+use crate::error::{Error, Result};
+use wake_nn::{Mismatch, Misshapen};
 
 /// The network whose features are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

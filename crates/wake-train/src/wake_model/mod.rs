@@ -184,12 +184,12 @@ impl<'a> WakeTraining<'a> {
     }
 
     fn fingerprint(&self, name: &str) -> Result<String> {
-        fingerprint(&self.out(name))
+        Ok(fingerprint(&self.out(name))?)
     }
 
     /// A part of the model with the weights of an earlier stage.
     fn part<M: Module>(&self, module: M, name: &str) -> Result<M> {
-        load(module, Layout::Diffusers, &self.out(name))
+        Ok(load(module, Layout::Diffusers, &self.out(name))?)
     }
 
     /// Encodes all pairs and the images expected of their scenes, which then stay in memory.
@@ -210,5 +210,5 @@ impl<'a> WakeTraining<'a> {
 
 /// Writes a part of the model as it ships.
 fn keep(part: &impl Module, path: &std::path::Path) -> Result<()> {
-    save_as(part, Layout::Diffusers, path, Precision::F16)
+    Ok(save_as(part, Layout::Diffusers, path, Precision::F16)?)
 }

@@ -1,7 +1,6 @@
 //! The first stage: squares of pixels as latents, in closed form.
 
 use serde_json::json;
-use wake_physics::output;
 
 use super::super::latents::fit_patches;
 use super::super::progress::counted;

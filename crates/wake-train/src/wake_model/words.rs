@@ -8,7 +8,8 @@ use super::super::stage_options::StageOptions;
 use super::super::tasks::WordsTask;
 use super::{PARSER, WakeStage, WakeTraining, keep};
 use wake_ldm::conditioning::Vocabulary;
-use wake_dataset::{Prompts, Recipe, Simulated};
+use crate::prompts::Prompts;
+use wake_dataset::{Recipe, Simulated};
 use crate::error::Result;
 use wake_ldm::network::{PromptParser, WakeModelConfig};
 

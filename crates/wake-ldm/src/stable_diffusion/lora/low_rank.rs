@@ -104,9 +104,9 @@ impl LowRank {
         let file = views
             .collect::<Result<Vec<_>, _>>()
             .and_then(|views| safetensors::serialize(views, Some(format)));
-        write_atomically(path, |writer| {
+        Ok(write_synced(path, |writer| {
             writer.write_all(&file.map_err(std::io::Error::other)?)
-        })
+        })?)
     }
 }
 

@@ -7,7 +7,8 @@ use serde_json::Value;
 use wake_text::{TOKENS, Tokenizer};
 
 use super::{Pipeline, PipelineParts};
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 use whole_files::read_text;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;
 use crate::stable_diffusion::scheduler::SchedulerConfig;

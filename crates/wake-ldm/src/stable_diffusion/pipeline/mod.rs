@@ -18,7 +18,8 @@ use std::sync::{Mutex, PoisonError};
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use wake_text::Tokenizer;
 
-use crate::error::{Result, check_range};
+use crate::error::Result;
+use wake_nn::check_range;
 #[cfg(feature = "flex")]
 use crate::self_check::check_once;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;

@@ -2,7 +2,8 @@
 
 use burn::tensor::Tensor;
 
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
 

@@ -72,5 +72,5 @@ impl Pipeline {
 }
 
 fn write_json(path: &Path, json: &Value) -> Result<()> {
-    write_text(path, &format!("{json:#}\n"))
+    Ok(write_atomically(path, format!("{json:#}\n").as_bytes())?)
 }

@@ -19,7 +19,6 @@ pub const QUANTITIES: usize = 7;
 /// # Shapes
 ///
 /// `[QUANTITIES, 3]`
-#[cfg(any(test, feature = "train"))]
 pub fn statement(conditions: &Conditions) -> Vec<f32> {
     let number = |value: Option<f64>, range: Range| value.map(|v| [range.scaled(v), 0.0]);
     let direction = |degrees: Option<f64>| {

@@ -7,7 +7,8 @@ use wake_physics::Scene;
 use wake_physics::grey::GreyScale;
 
 use super::domain::Domain;
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 use crate::unet::UNetConfig;
 use crate::wake_model::conditioning::{FEATURES, Vocabulary};
 
@@ -124,7 +125,7 @@ impl WakeModelConfig {
                 expected: "an even number".to_owned(),
             }));
         }
-        self.unet().validate()
+        Ok(self.unet().validate()?)
     }
 
     /// What a prompt leaves open, on the pixels of the model.

@@ -64,6 +64,7 @@ impl SeaNoise {
 }
 
 /// Seas of some scenes, each from its own source, before they are encoded.
+#[derive(Debug)]
 pub struct SeaFields {
     seas: Vec<SeaNoise>,
     fields: Vec<Vec<f32>>,

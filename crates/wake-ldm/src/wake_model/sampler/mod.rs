@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
 use wake_physics::{Field, Scene, labels_of};
-use wake_text::{Reading, Wording};
+use wake_text::{Reading, Unread, Wording};
 
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 use wake_nn::check_finite;
 use wake_nn::noise::NoiseSource;
 #[cfg(feature = "flex")]
@@ -34,7 +35,8 @@ const STEPS: usize = 3;
 /// What the model is told about a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Conditioning {
-    /// The numbers that [`wake_text`] reads from the words; where it leaves words unread, also those that the model reads.
+    /// The numbers that [`wake_text`] reads from the words; where it leaves numbers or words of the field unread, also those
+    /// that the model reads.
     #[default]
     Both,
     /// The words alone, as the model reads them.
@@ -183,7 +185,7 @@ impl WakeSampler {
             Ok(Input {
                 known: Conditions::of_prompt(&reading.scene),
                 words: (*prompt).to_owned(),
-                unread: !reading.unread.is_empty(),
+                unread: reading.unread.iter().any(Unread::is_of_the_field),
                 scene,
             })
         };
@@ -363,7 +365,7 @@ fn levels(steps: usize) -> impl Iterator<Item = [f64; 2]> {
 struct Input {
     known: Conditions,
     words: String,
-    /// Whether some of the words were not understood.
+    /// Whether some of the words were not understood that may state a value.
     unread: bool,
     /// What the numbers are put into, and its seed.
     scene: Scene,

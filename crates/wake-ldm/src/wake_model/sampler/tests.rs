@@ -156,6 +156,8 @@ fn nothing_is_added_to_words_that_are_understood() {
     for prompt in [
         "A ship moving at 8 mps toward 45 degrees.",
         "wind 6 m/s toward 200 degrees",
+        // What only describes states nothing that the model could add.
+        "a red ship moving at 8 mps toward 45 degrees",
     ] {
         let scene = sampler.sample(prompt, 3).unwrap().scene;
         let said = Reading::of(prompt).unwrap().scene;

@@ -4,7 +4,8 @@ use wake_physics::Field;
 use wake_physics::correlated::{CorrelatedNoise, Correlation};
 use wake_physics::measure::{Texture, texture};
 
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
 use crate::streams::SEA_TEXTURE_STREAM;
 

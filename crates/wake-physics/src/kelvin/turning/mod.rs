@@ -43,6 +43,29 @@ const ONSET: f64 = 3.0;
 /// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp: chosen.
 const LONG: [f64; 2] = [0.6, 1.0];
 
+/// Rings that are counted one by one.
+const MOST_COUNTED: usize = 1 << 14;
+
+/// Rings from which the number of waves that are kept is foreseen, and waves that are looked at for it at most: chosen.
+const LOOKED_AT: usize = 12;
+const MOST_LOOKED_AT: f64 = 2e6;
+
+/// Waves of ships that turn, as counted before they are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct RingWork {
+    /// Waves, of all ships and of the ship that has most.
+    pub(crate) nodes: f64,
+    pub(crate) most_nodes: f64,
+    /// Waves that are strong enough to be summed, likewise.
+    pub(crate) kept: f64,
+    pub(crate) most_kept: f64,
+    /// Bessel functions, and sums of them.
+    pub(crate) terms: f64,
+}
+
+/// Rings whose transforms are planned at once: a plan takes as much memory as the waves of its ring.
+const PLANNED_AT_ONCE: usize = 64;
+
 /// Which waves of a turning ship are summed: rings of wavenumbers, each as many directions as the raster asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rings {
@@ -126,30 +149,60 @@ impl Rings {
 
     /// Waves of all rings up to a wavenumber, and beyond it, before the weak ones are left out.
     pub(super) fn nodes(&self, cusp: f64) -> [usize; 2] {
+        // Rings change little from one to the next: of very many only some are counted, each for its neighbours.
+        let every = self.count.div_ceil(MOST_COUNTED).max(1);
         let mut nodes = [0; 2];
-        for ring in 0..self.count {
-            nodes[usize::from(self.wavenumber(ring) >= cusp)] += self.directions(ring);
+        for first in (0..self.count).step_by(every) {
+            let some = every.min(self.count - first);
+            let ring = first + some / 2;
+            nodes[usize::from(self.wavenumber(ring) >= cusp)] += some * self.directions(ring);
         }
         nodes
     }
 
+    /// What the rings take to compute.
+    pub(super) fn work(&self, wake: &KelvinWake) -> RingWork {
+        let [count, mean] = [self.count as f64, 0.5 * self.step * self.count as f64];
+        let nodes = self.nodes(f64::INFINITY)[0] as f64;
+        let kept = (self.kept_share(wake, nodes) * nodes).ceil();
+        RingWork {
+            nodes,
+            most_nodes: nodes,
+            kept,
+            most_kept: kept,
+            terms: 2.0 * count * mean * self.radius,
+        }
+    }
+
+    /// Share of the waves that are not weak, from a few rings; all of them where even a few are too many to look at.
+    fn kept_share(&self, wake: &KelvinWake, nodes: f64) -> f64 {
+        let every = self.count.div_ceil(LOOKED_AT).max(1);
+        let rings: Vec<usize> = (every / 2..self.count).step_by(every).collect();
+        if nodes / every as f64 > MOST_LOOKED_AT || rings.is_empty() {
+            return 1.0;
+        }
+        let rings = self.amplitudes_of(wake, &rings);
+        let squares = || rings.iter().flatten().map(Complex64::norm_sqr);
+        let count = squares().count().max(1) as f64;
+        let least = self.least.powi(2) * squares().sum::<f64>() / count;
+        squares().filter(|&square| square > least).count() as f64 / count
+    }
+
     /// The waves.
     pub(super) fn waves(&self, wake: &KelvinWake) -> PlaneWaves {
-        let mut planner = Circle::planner();
-        let circles: Vec<Circle> = (0..self.count)
-            .map(|ring| Circle::planned(&mut planner, self.directions(ring)))
-            .collect();
-        let rings: Vec<Vec<Complex64>> = circles
-            .par_iter()
-            .enumerate()
-            .map(|(ring, circle)| self.amplitudes(wake, ring, circle))
+        let rings: Vec<Vec<Complex64>> = (0..self.count)
+            .step_by(PLANNED_AT_ONCE)
+            .flat_map(|first| {
+                let some = first..(first + PLANNED_AT_ONCE).min(self.count);
+                self.amplitudes_of(wake, &some.collect::<Vec<_>>())
+            })
             .collect();
         let amplitudes = || rings.iter().flatten().map(Complex64::norm_sqr);
         let count = rings.iter().map(Vec::len).sum::<usize>().max(1);
         let least = self.least.powi(2) * amplitudes().sum::<f64>() / count as f64;
-        let mut out = PlaneWaves::default();
+        let mut out = PlaneWaves::with_capacity(amplitudes().filter(|&a| a > least).count());
         let centre = self.centre(wake);
-        for (ring, amplitudes) in rings.iter().enumerate() {
+        for (ring, amplitudes) in rings.into_iter().enumerate() {
             let k = self.wavenumber(ring);
             let omega = angular_frequency(k, wake.depth);
             let turn = TAU / amplitudes.len() as f64;
@@ -164,6 +217,15 @@ impl Rings {
             }
         }
         out
+    }
+
+    /// The amplitudes of some rings.
+    fn amplitudes_of(&self, wake: &KelvinWake, rings: &[usize]) -> Vec<Vec<Complex64>> {
+        let mut planner = Circle::planner();
+        let plan = |&ring: &usize| Circle::planned(&mut planner, self.directions(ring));
+        let circles: Vec<Circle> = rings.iter().map(plan).collect();
+        let of_ring = |(&ring, circle)| self.amplitudes(wake, ring, circle);
+        rings.par_iter().zip(&circles).map(of_ring).collect()
     }
 
     /// The centre of the circle (x, y) \[m\].

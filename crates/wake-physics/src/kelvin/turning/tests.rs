@@ -1,3 +1,5 @@
+#![allow(clippy::float_cmp, reason = "counts")]
+
 use super::*;
 use crate::hull::Hull;
 use crate::track::Track;
@@ -238,4 +240,42 @@ fn weak_waves_are_left_out_and_counted_before() {
             "{least}: {kept} {strong}"
         );
     }
+}
+
+/// The waves that are kept are foreseen from a few rings to a fifth, all waves of few rings exactly; of rings too many to look
+/// at, all count.
+#[test]
+fn waves_that_are_kept_are_foreseen() {
+    let wake = boat(20.0, 300.0);
+    for least in [1e-5, 1e-2, 0.3] {
+        let rings = Rings {
+            least,
+            ..Rings::of(&wake, &raster(), 1e-3).unwrap()
+        };
+        let work = rings.work(&wake);
+        let kept = rings.waves(&wake).len() as f64;
+        assert!(
+            (work.kept / kept - 1.0).abs() < 0.2,
+            "{least}: {} {kept}",
+            work.kept
+        );
+        assert!(work.nodes >= work.kept && work.most_kept == work.kept && work.terms > 0.0);
+    }
+    let fine = Rings {
+        count: 10 * MOST_COUNTED,
+        step: 1e-6,
+        ..Rings::of(&wake, &raster(), 1e-3).unwrap()
+    };
+    let one_by_one: usize = (0..fine.count).map(|ring| fine.directions(ring)).sum();
+    let counted = fine.nodes(f64::INFINITY)[0] as f64;
+    assert!(
+        (counted / one_by_one as f64 - 1.0).abs() < 1e-3,
+        "{counted} {one_by_one}"
+    );
+    let many = Rings {
+        count: 1 << 20,
+        ..Rings::of(&wake, &raster(), 1e-3).unwrap()
+    };
+    let work = many.work(&wake);
+    assert_eq!(work.kept, work.nodes);
 }

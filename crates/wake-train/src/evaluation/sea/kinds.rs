@@ -44,7 +44,7 @@ pub fn kinds(
             .collect()
     };
     let own = draw(&|_, seed| Ok(amplitude(&learnt.sample(seed, PATCH, PATCH)?)))?;
-    let told = draw(&|pair, seed| learnt.amplitude(&pair.style, seed, PATCH, PATCH))?;
+    let told = draw(&|pair, seed| Ok(learnt.amplitude(&pair.style, seed, PATCH, PATCH)?))?;
     let gaussian = draw(&|pair, seed| Ok(gaussian_amplitude(&pair.style, seed)))?;
     let white = draw(&|pair, seed| Ok(white_speckle(&pair.left, seed)))?;
     let recipe = Recipe::detector()?.with_assignments(&OPEN_SEA)?;

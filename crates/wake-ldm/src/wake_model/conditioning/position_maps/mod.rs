@@ -10,7 +10,6 @@ pub const PATCH: usize = 8;
 /// Maps at the size of the latents.
 pub const PLACES: usize = 8;
 /// Which of them says whether a place is in the wedge.
-#[cfg(any(test, feature = "train"))]
 pub const WEDGE: usize = 5;
 /// Half-width of the band behind the stern \[m\], on pixels of 4 m as all lengths here.
 const BAND: f64 = 40.0;

@@ -9,7 +9,8 @@ use wake_physics::{Field, Scene, available_memory, expected_intensity};
 
 use super::flow::{MULTIPLE, SeaFlow};
 use super::style::{LAGS, NUMBERS, SeaStyle};
-use crate::error::{Error, Result, check_range};
+use crate::error::{Error, Result};
+use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
 use crate::streams;
 use wake_nn::weights::files::WeightFiles;
@@ -137,7 +138,8 @@ impl SeaTexture {
         };
         let spacing = self.spacing.map(|spacing| spacing.to_string());
         let note = spacing.as_ref().map(|spacing| (SPACING, spacing.as_str()));
-        save_noted(&stored, Layout::Diffusers, path, Precision::F16, note)
+        let precision = Precision::F16;
+        Ok(save_noted(&stored, Layout::Diffusers, path, precision, note)?)
     }
 
     /// Side of the pixels that were learnt \[m\], where it is known.

@@ -1,0 +1,291 @@
+//! What the stages of a simulation will do, counted before they do it: operations, the time they take, and memory.
+
+use super::cost::Advice;
+use crate::kelvin::{LARGEST_SLOPE_VARIANCE, RingWork, WakePlan};
+use crate::models::Models;
+use crate::nufft::WAVES_AT_ONCE;
+use crate::raster::Raster;
+use crate::sar::Imaging;
+use crate::scattering::{BackscatterTable, SlopeCovariance};
+use crate::scene::{Scene, Term};
+use crate::survey::Survey;
+
+/// Tolerance below which sums of waves are transformed in double precision: of the order of `f32`'s rounding over the share
+/// that a sum has.
+const PRECISE: f64 = 1e-3;
+
+/// Accelerations of the fastest pixels over their standard deviation, and columns that a thread sums at once.
+const FARTHEST_MOVED: f64 = 5.0;
+const BLOCK: usize = 64;
+
+/// Counts of what the stages work on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Work {
+    /// Pixels computed, those of overlapping strips once for each.
+    pub(crate) computed: f64,
+    /// Pixels in memory at once, computed or as sources.
+    pub(crate) at_once: f64,
+    /// Pixels that are kept as a whole while strips are computed: computed, and of the image.
+    pub(crate) whole: [f64; 2],
+    /// Pixels of the image.
+    pub(crate) image: f64,
+    /// Points of the periodic lattice of the sea.
+    pub(crate) lattice: f64,
+    /// Fields by non-uniform FFTs: the swell's and the wakes', as many as have waves.
+    pub(crate) sums: f64,
+    /// Whether they are asked for more exactly than single precision allows.
+    pub(crate) precise: bool,
+    /// Ships with a dark line, with edges, and with waves that pixels do not carry.
+    pub(crate) ships: [f64; 3],
+    /// Ships among those of the first two that turn: each pixel is looked for on a circle.
+    pub(crate) turning: f64,
+    /// Slicks and gusts.
+    pub(crate) patterns: f64,
+    /// Ranges of pixels that the return of one is spread over.
+    pub(crate) taps: f64,
+    /// Nodes of the table of σ⁰, and pixels steeper than it covers.
+    pub(crate) table: f64,
+    pub(crate) steep: f64,
+    /// Values of the image that is summed up, spread as far as any pixel is.
+    pub(crate) summed: f64,
+    /// Pixels that an impulse response looks at, and looks.
+    pub(crate) sources: f64,
+    pub(crate) looks: f64,
+    /// Waves of ships that turn.
+    pub(crate) rings: RingWork,
+}
+
+/// Seconds of a core for each of what is counted, measured on x86-64 with AVX-512 at 2 to 3 GHz.
+mod seconds {
+    /// Survey, plan and labels of a scene; what a ship adds to them.
+    pub(super) const SCENE: f64 = 0.004;
+    pub(super) const SHIP: f64 = 0.02;
+    /// A pixel: σ⁰ and the fields; what one tap of the imaging adds.
+    pub(super) const PIXEL: f64 = 6e-8;
+    pub(super) const TAP: f64 = 3e-10;
+    /// A pixel steeper than the table of σ⁰.
+    pub(super) const STEEP: f64 = 1e-4;
+    /// A point of the sea's lattice, all fields.
+    pub(super) const LATTICE: f64 = 5e-8;
+    /// A pixel of the fields of one sum of waves; the same in double precision.
+    pub(super) const SUM: [f64; 2] = [6.5e-8, 1e-7];
+    /// A pixel of a ship's dark line, its edges, its short waves; of one that turns besides.
+    pub(super) const SHIPS: [f64; 3] = [1.5e-8, 3e-8, 8e-8];
+    pub(super) const TURNING: f64 = 1e-7;
+    /// A pixel of slicks or gusts.
+    pub(super) const PATTERN: f64 = 1.5e-8;
+    /// A node of the table.
+    pub(super) const NODE: f64 = 1e-7;
+    /// A source of one look, and a pixel of the image that has speckle of its own.
+    pub(super) const LOOK: f64 = 6e-9;
+    pub(super) const SPECKLE: f64 = 1e-8;
+    /// A wave of a ring, one that is kept, a Bessel function.
+    pub(super) const RING: f64 = 3e-8;
+    pub(super) const KEPT: f64 = 1.8e-6;
+    pub(super) const BESSEL: f64 = 1e-7;
+}
+
+/// Bytes for each of what is counted.
+mod bytes {
+    /// Whatever the scene: tables of formulas, plans of small FFTs, threads.
+    pub(super) const SCENE: f64 = 16e6;
+    /// A pixel at once; what a sum of waves adds, in single and in double precision; short waves; slicks and gusts.
+    pub(super) const PIXEL: f64 = 60.0;
+    pub(super) const SUM: [f64; 2] = [60.0, 110.0];
+    pub(super) const SHORT: f64 = 12.0;
+    pub(super) const PATTERN: f64 = 4.0;
+    /// A point of the sea's lattice: amplitudes and half a spectrum.
+    pub(super) const LATTICE: f64 = 20.0;
+    /// A value of the image that is summed up.
+    pub(super) const SUMMED: f64 = 8.0;
+    /// A source of an impulse response.
+    pub(super) const SOURCE: f64 = 24.0;
+    /// A computed pixel and one of the image while others are computed in strips.
+    pub(super) const WHOLE: [f64; 2] = [8.0, 52.0];
+    /// A node of the table while it is made.
+    pub(super) const NODE: f64 = 16.0;
+    /// A wave of a ring, one that is kept, and one of those spread at once.
+    pub(super) const RING: f64 = 18.0;
+    pub(super) const KEPT: f64 = 40.0;
+    pub(super) const SPREAD: [f64; 2] = [400.0, 640.0];
+}
+
+impl Work {
+    /// Counts the work of a scene by its plan.
+    pub(super) fn of(
+        (scene, models, survey): (&Scene, &Models, &Survey),
+        raster: &Raster,
+        (strips, margin): (usize, usize),
+        lattice: [usize; 2],
+        uses: impl Fn(Term) -> bool,
+        wakes: &[WakePlan],
+    ) -> Self {
+        let when = |is: bool| f64::from(u8::from(is));
+        let all = raster.len() as f64;
+        let rows = match strips {
+            1 => raster.rows,
+            // A margin and the overlap on both sides of a strip.
+            _ => raster.rows / strips + 6 * margin,
+        };
+        let at_once = (rows * raster.columns) as f64;
+        let moving = || models.wakes.iter().filter(|wake| wake.kelvin.speed > 0.0);
+        let [dark, edges] =
+            [(uses(Term::Turbulent), true), (uses(Term::Edge), false)].map(|(used, dark)| {
+                moving()
+                    .filter(|wake| used && (dark || wake.edge.is_some()))
+                    .map(|wake| wake.kelvin.track.turn().is_some())
+                    .collect::<Vec<bool>>()
+            });
+        let turning = dark.iter().chain(&edges).filter(|turns| **turns).count();
+        let waves = wakes.iter().filter(|wake| wake.nodes() > 0).count();
+        let swell = uses(Term::Swell) && models.swell.is_some();
+        let tolerance = scene.model.tolerance;
+        // Transverse and divergent waves, both as steep as they can be.
+        let short_waves = when(uses(Term::Unresolved)) * 2.0 * LARGEST_SLOPE_VARIANCE;
+        let leans = if uses(Term::RangeBunching) { 2.0 } else { 1.0 };
+        let backscatter = models.backscatter(uses(Term::TiltAverage), false);
+        let moves = uses(Term::Sea) || swell || waves > 0;
+        let coherent = uses(Term::Coherence);
+        let taps = leans * taps(models, survey, (coherent, moves), tolerance);
+        let slopes = if moves {
+            survey.resolved
+        } else {
+            SlopeCovariance::NONE
+        };
+        let strip = strips as f64;
+        Self {
+            computed: strip * at_once,
+            at_once,
+            whole: match strips {
+                1 => [0.0; 2],
+                _ => [all, models.delivered.len() as f64],
+            },
+            image: models.delivered.len() as f64,
+            lattice: (lattice[0] * lattice[1]) as f64,
+            sums: waves as f64 + when(swell),
+            precise: tolerance < PRECISE,
+            ships: [
+                dark.len() as f64,
+                edges.len() as f64,
+                when(uses(Term::Unresolved)) * models.unresolved.len() as f64,
+            ],
+            turning: turning as f64,
+            patterns: when(uses(Term::Slicks)) + when(uses(Term::Gusts)),
+            taps,
+            table: BackscatterTable::foreseen(
+                &backscatter,
+                (&slopes, short_waves),
+                (
+                    super::SHARES.table * tolerance * (survey.mean[0] + survey.mean[1]),
+                    raster.len(),
+                ),
+            ),
+            steep: all * backscatter.steep_share(&survey.resolved_sea().0) * when(moves),
+            summed: (taps / leans * FARTHEST_MOVED) * (models.image.columns + BLOCK) as f64,
+            sources: models.response.map_or(0.0, |_| models.image.len() as f64),
+            looks: looks(scene, models, uses(Term::Speckle)),
+            rings: wakes
+                .iter()
+                .map(WakePlan::ring_work)
+                .fold(RingWork::default(), |sum, one| RingWork {
+                    // One ship after the other.
+                    nodes: sum.nodes + one.nodes,
+                    most_nodes: sum.most_nodes.max(one.most_nodes),
+                    kept: sum.kept + one.kept,
+                    most_kept: sum.most_kept.max(one.most_kept),
+                    terms: sum.terms + one.terms,
+                }),
+        }
+    }
+
+    /// Seconds of a core, and what to change.
+    pub(super) fn seconds(&self) -> (f64, Advice) {
+        use seconds::*;
+        let per_pixel = PIXEL
+            + TAP * self.taps
+            + STEEP * self.steep / self.computed.max(1.0)
+            + SUM[usize::from(self.precise)] * self.sums
+            + (0..3).map(|n| SHIPS[n] * self.ships[n]).sum::<f64>()
+            + TURNING * self.turning
+            + PATTERN * self.patterns;
+        let ships = self.ships[0].max(self.sums);
+        let pixels = SCENE + SHIP * ships + self.computed * per_pixel + LATTICE * self.lattice;
+        let rings = RING * self.rings.nodes + KEPT * self.rings.kept + BESSEL * self.rings.terms;
+        let looks = LOOK * self.sources * (1.0 + self.looks) + SPECKLE * self.image;
+        let table = NODE * self.table;
+        let parts = [
+            (pixels, Advice::Pixels),
+            (rings, Advice::Turn),
+            (looks, Advice::Looks),
+            (table, Advice::Tolerance),
+        ];
+        let sum = parts.iter().map(|part| part.0).sum();
+        let most = parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        (sum, most.map_or(Advice::Pixels, |part| part.1))
+    }
+
+    /// Bytes at once, at most, and what to change.
+    pub(super) fn bytes(&self) -> (u64, Advice) {
+        use bytes::*;
+        let precise = usize::from(self.precise);
+        let any = |count: f64| count.min(1.0);
+        let per_pixel = PIXEL
+            + SUM[precise] * any(self.sums)
+            + SHORT * any(self.ships[2])
+            + PATTERN * self.patterns;
+        let many = self.rings.most_kept > WAVES_AT_ONCE as f64;
+        // Lattices of all fields at once.
+        let per_pixel = per_pixel + if many { 3.0 * SUM[precise] } else { 0.0 };
+        let pixels = SCENE
+            + per_pixel * self.at_once
+            + LATTICE * self.lattice
+            + WHOLE[0] * self.whole[0]
+            + WHOLE[1] * self.whole[1]
+            + SUMMED * self.summed
+            + SOURCE * self.sources;
+        let kept = self.rings.most_kept;
+        let rings = RING * self.rings.most_nodes
+            + KEPT * kept
+            + SPREAD[precise] * kept.min(WAVES_AT_ONCE as f64);
+        let table = NODE * self.table;
+        let advice = if rings > pixels {
+            Advice::Turn
+        } else {
+            Advice::Pixels
+        };
+        ((pixels + rings + table) as u64, advice)
+    }
+}
+
+/// Pixels over which the imaging spreads one that moves as most do.
+fn taps(models: &Models, survey: &Survey, (coherent, moves): (bool, bool), tolerance: f64) -> f64 {
+    let imaging = Imaging {
+        range_to_velocity: models.range_to_velocity,
+        incidence: models.incidence,
+        resolution: if coherent {
+            models.resolution()
+        } else {
+            models.resolution_at_rest()
+        },
+    };
+    let acceleration = if coherent && moves {
+        survey.acceleration()
+    } else {
+        0.0
+    };
+    let tolerance = super::SHARES.kernels * tolerance;
+    imaging.taps(acceleration, models.image.spacing, tolerance)
+}
+
+/// Looks that are drawn through an impulse response.
+fn looks(scene: &Scene, models: &Models, speckled: bool) -> f64 {
+    let Some(response) = models.response.filter(|_| speckled) else {
+        return 0.0;
+    };
+    let overlap = scene.radar.look_overlap.unwrap_or(0.0);
+    let window = response.range.window;
+    window
+        .overlapping_looks(scene.radar.looks, overlap)
+        .ceil()
+        .max(1.0)
+}

@@ -1,0 +1,131 @@
+//! Filler: words that change no value of a scene.
+//!
+//! A word that is neither here nor in another room's vocabulary is unknown, and a reading names it as unread. A word
+//! belongs here only if no value can mean anything else with it than without it.
+
+/// Articles, pronouns and forms of "be" and "have".
+const GRAMMAR: [&str; 29] = [
+    "a", "an", "the", "one", "this", "that", "these", "those", "it", "its", "itself", "there",
+    "here", "which", "we", "me", "i", "is", "are", "was", "were", "be", "been", "being", "has",
+    "have", "having", "had", "any",
+];
+
+/// Prepositions and conjunctions.
+const JOINTS: [&str; 29] = [
+    "of", "in", "on", "at", "by", "to", "toward", "towards", "from", "under", "over", "onto",
+    "for", "with", "and", "or", "but", "while", "as", "along", "near", "amid", "during", "out",
+    "via", "upon", "where", "so", "also",
+];
+
+/// Words of images and of how they come about.
+const PICTURES: [&str; 52] = [
+    "image",
+    "images",
+    "imagery",
+    "picture",
+    "pictures",
+    "photo",
+    "photograph",
+    "scene",
+    "scenes",
+    "view",
+    "frame",
+    "sar",
+    "synthetic",
+    "aperture",
+    "simulated",
+    "simulation",
+    "simulate",
+    "sentinel",
+    "prompt",
+    "capture",
+    "captured",
+    "acquired",
+    "acquisition",
+    "taken",
+    "recorded",
+    "observed",
+    "seen",
+    "see",
+    "visible",
+    "sight",
+    "show",
+    "shows",
+    "showing",
+    "shown",
+    "contain",
+    "contains",
+    "containing",
+    "depict",
+    "depicts",
+    "depicting",
+    "generate",
+    "generated",
+    "draw",
+    "drawn",
+    "create",
+    "render",
+    "make",
+    "made",
+    "please",
+    "give",
+    "want",
+    "present",
+];
+
+/// Words of the sea, and verbs of what ships, wind and waves do at any speed.
+const SEA: [&str; 47] = [
+    "sea",
+    "seas",
+    "ocean",
+    "oceans",
+    "water",
+    "waters",
+    "surface",
+    "open",
+    "night",
+    "day",
+    "first",
+    "shaped",
+    "shape",
+    "driven",
+    "raised",
+    "leaves",
+    "leave",
+    "leaving",
+    "trailing",
+    "trails",
+    "producing",
+    "produces",
+    "blow",
+    "blows",
+    "blowing",
+    "blown",
+    "doing",
+    "does",
+    "making",
+    "makes",
+    "keeping",
+    "keeps",
+    "holding",
+    "holds",
+    "pointing",
+    "points",
+    "directed",
+    "oriented",
+    "aimed",
+    "aligned",
+    "set",
+    "sets",
+    "underway",
+    "equals",
+    "value",
+    "steady",
+    "constant",
+];
+
+/// Whether a word is filler.
+pub(crate) fn is_listed(word: &str) -> bool {
+    let groups: [&[&str]; 4] = [&GRAMMAR, &JOINTS, &PICTURES, &SEA];
+    groups.into_iter().any(|group| group.contains(&word))
+}
