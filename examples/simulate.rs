@@ -1,130 +1,27 @@
-//! From a scene to a SAR image: every field, the labels and a report.
-//!
-//! ```text
-//! cargo run --release --example simulate
-//! cargo run --release --example simulate -- --set sea.wind_speed=3 --set ship.heading=90 --out out/light_wind
-//! cargo run --release --example simulate -- --scene assets/scenes/satellite/*.toml --compare REAL_IMAGES
-//! ```
-//!
-//! Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`, of several scenes into a folder each; with
-//! `--overlay` the picture with its labels drawn, `overlay.png`; with `--export` every field as a NumPy array or a TIFF with
-//! the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
-//! `comparison.json`, and quick-looks of what was simulated, `sheet.png`.
+//! A scene becomes a labelled radar image: `cargo run --release --no-default-features --example simulate`.
 
-#![warn(clippy::print_stdout, clippy::print_stderr)]
+use std::path::Path;
 
-#[path = "simulate/across.rs"]
-mod across;
-#[path = "simulate/arguments.rs"]
-mod arguments;
-#[path = "simulate/compare.rs"]
-mod compare;
-#[path = "common/exit.rs"]
-mod exit;
-#[path = "common/progress.rs"]
-mod progress;
-#[path = "simulate/real.rs"]
-mod real;
-#[path = "simulate/results.rs"]
-mod results;
+use wake_physics::{Scene, Simulator};
 
-use arguments::{Arguments, MethodName};
-use clap::Parser;
-use serde_json::Value;
-use std::error::Error;
-use std::process::ExitCode;
-use wake_physics::measure::ImageFigures;
-use wake_physics::picture::Picture;
-use wake_physics::{Method, Plan, Scene, Simulation, output, simulate_with};
-
-/// Pixels of a quick-look along its longer side, and quick-looks in a row of the sheet.
-const SIDE: usize = 334;
-const ACROSS: usize = 3;
-
-fn main() -> ExitCode {
-    exit::code(|| run(&Arguments::parse()))
-}
-
-fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let scenes = scenes(arguments)?;
-    // A scene that cannot be simulated leaves no folder behind.
-    let plans = scenes.iter().map(|(_, scene)| Plan::new(scene));
-    for plan in plans.collect::<wake_physics::Result<Vec<_>>>()? {
-        let cost = plan.cost();
-        if cost.is_high() {
-            exit::note(&format!("note: {cost}"));
-        }
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // Any keys of a scene file may be given, such as `ship.speed=8`.
+    let changes: Vec<String> = std::env::args().skip(1).collect();
+    let scene = Scene::default()
+        .with_assignments(&["sea.wind_speed=3"])?
+        .with_assignments(&changes)?;
+    // A simulator keeps plans and memory for the next scene of the same size.
+    let mut simulator = Simulator::default();
+    let simulation = simulator.simulate(&scene)?;
+    println!("{}", simulation.plan);
+    for ship in &simulation.labels.ships {
+        println!("wake from pixel {:.0?}", ship.wake.tip_px);
     }
-    let real = arguments.compare.as_deref().map(real::figures);
-    let real = real.transpose()?;
-    output::make_folder(&arguments.out)?;
-    let (mut reports, mut rows, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
-    for (name, scene) in &scenes {
-        let out = match scenes.len() {
-            1 => arguments.out.clone(),
-            _ => arguments.out.join(name),
-        };
-        let simulation = simulated(scene, arguments.method)?;
-        reports.push(results::write(&simulation, arguments, &out)?);
-        if !arguments.json {
-            exit::say(&results::summary(&simulation, &out))?;
-        }
-        if arguments.compare.is_some() {
-            rows.push(ImageFigures::of_simulation(name, &simulation));
-            let levels = simulation.levels(&simulation.quick_look());
-            let picture = Picture::reduced(&levels, simulation.raster.columns, SIDE);
-            pictures.push(picture.captioned(name));
-        }
-    }
-    if let Some(real) = real {
-        let page = compare::page(&rows, &real);
-        let out = |name: &str| arguments.out.join(name);
-        output::write_atomically(&out("comparison.md"), page.as_bytes())?;
-        rows.extend(real);
-        output::write_json(&out("comparison.json"), &rows)?;
-        Picture::sheet(&pictures, ACROSS).write(&out("sheet.png"))?;
-        if !arguments.json {
-            exit::say(&page)?;
-        }
-    }
-    match (arguments.json, &reports[..]) {
-        (true, [report]) => exit::say(&format!("{report:#}"))?,
-        (true, reports) => exit::say(&format!("{:#}", Value::from(reports)))?,
-        (false, _) => {}
-    }
+    let out = Path::new("out/simulate");
+    simulation.write_in(out, &simulation.quick_look())?;
+    println!(
+        "image.png, labels.json, fields.safetensors and report.json in {}",
+        out.display()
+    );
     Ok(())
-}
-
-/// The scenes by the names of their files.
-fn scenes(arguments: &Arguments) -> Result<Vec<(String, Scene)>, Box<dyn Error>> {
-    let changed = |scene: Scene| scene.with_assignments(&arguments.set);
-    if arguments.scene.is_empty() {
-        return Ok(vec![("default".to_owned(), changed(Scene::default())?)]);
-    }
-    let mut scenes: Vec<(String, Scene)> = Vec::new();
-    for path in &arguments.scene {
-        let name = path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        if scenes.iter().any(|(other, _)| *other == name) {
-            let path = path.display();
-            return Err(format!("{path}: another scene file is called {name} too, and each has a folder of its name; rename one").into());
-        }
-        scenes.push((name, changed(Scene::read(path)?)?));
-    }
-    Ok(scenes)
-}
-
-fn simulated(scene: &Scene, method: MethodName) -> wake_physics::Result<Simulation> {
-    match method {
-        MethodName::Fast => simulate_with(scene, Method::Fast),
-        MethodName::Direct => {
-            let clock = progress::clock("summing wave by wave and pixel by pixel");
-            let simulation = simulate_with(scene, Method::Direct);
-            clock.finish_and_clear();
-            simulation
-        }
-    }
 }

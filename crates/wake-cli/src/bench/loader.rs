@@ -1,0 +1,102 @@
+//! Images a second through the data set's loader, as a training loop gets them.
+
+use serde::Serialize;
+use std::sync::Arc;
+use std::time::Instant;
+use wake_dataset::{Loader, Recipe, Sampled, Simulated, Source};
+use wake_ldm::{WakeSampler, device_named};
+
+use crate::exit::Outcome;
+
+/// Threads that make batches, as many as there are cores at most; on each the physics of one batch is computed while the device draws
+/// another.
+const THREADS: [usize; 4] = [1, 2, 4, 8];
+/// Images of a batch.
+const BATCH: usize = 16;
+/// Batches that are timed, after as many as there are threads.
+const BATCHES: usize = 8;
+/// The seed of both sources; the scenes are those of the recipe `detector`.
+const SEED: u64 = 3;
+
+/// One source through the loader.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct LoaderRow {
+    pub(crate) stage: &'static str,
+    /// Who makes the images: the simulator or the model, of the same scenes.
+    pub(crate) source: &'static str,
+    /// Where the model computes and the batches end.
+    pub(crate) device: String,
+    pub(crate) threads: usize,
+    pub(crate) batch: usize,
+    pub(crate) images_per_second: f64,
+}
+
+/// Number of times that [`measure`] says it has done something.
+pub(crate) fn parts() -> u64 {
+    2 * threads().count() as u64
+}
+
+/// Those of [`THREADS`] that this machine has cores for.
+fn threads() -> impl Iterator<Item = usize> {
+    let cores = rayon::current_num_threads();
+    THREADS.into_iter().filter(move |&threads| threads <= cores)
+}
+
+/// All rows; `done` hears of each.
+pub(crate) fn measure(device: &str, done: impl Fn()) -> Outcome<Vec<LoaderRow>> {
+    let scenes = Simulated::new(Recipe::detector()?, SEED)?;
+    let sampler = WakeSampler::pretrained(&device_named(device)?)?;
+    let sampled = Sampled::new(sampler, scenes.clone())?;
+    let sources: [(_, Arc<dyn Source>); 2] = [
+        ("simulator", Arc::new(scenes)),
+        ("model", Arc::new(sampled)),
+    ];
+    let mut rows = Vec::new();
+    for (name, source) in sources {
+        for threads in threads() {
+            rows.push(LoaderRow {
+                stage: "loader",
+                source: name,
+                device: device.to_owned(),
+                threads,
+                batch: BATCH,
+                images_per_second: images_per_second(Arc::clone(&source), threads, device)?,
+            });
+            done();
+        }
+    }
+    Ok(rows)
+}
+
+/// Images a second of a loop that does nothing with them.
+fn images_per_second(source: Arc<dyn Source>, threads: usize, device: &str) -> Outcome<f64> {
+    let loader = Loader::new(source).batch(BATCH).threads(threads);
+    let mut batches = loader.on(&device_named(device)?)?;
+    for batch in batches.by_ref().take(threads) {
+        batch?;
+    }
+    let begin = Instant::now();
+    for batch in batches.take(BATCHES) {
+        batch?;
+    }
+    Ok((BATCH * BATCHES) as f64 / begin.elapsed().as_secs_f64())
+}
+
+/// The rows as a table in Markdown: images a second by the number of threads.
+pub(crate) fn table(rows: &[LoaderRow]) -> String {
+    let cores = rayon::current_num_threads();
+    let mut text =
+        format!("{cores} cores, batches of {BATCH}; images a second.\n\n| images of | device |");
+    for threads in threads() {
+        text += &format!(" threads {threads} |");
+    }
+    text += &format!("\n| --- | --- |{}\n", " --- |".repeat(threads().count()));
+    for of_source in rows.chunk_by(|a, b| a.source == b.source) {
+        text += &format!("| {} | {} |", of_source[0].source, of_source[0].device);
+        for row in of_source {
+            text += &format!(" {:.1} |", row.images_per_second);
+        }
+        text += "\n";
+    }
+    text
+}

@@ -1,0 +1,95 @@
+//! `wake bench`: every fast method against its oracle: seconds, error, and the frontier.
+//!
+//! The first part is the simulator. Sea and wake get the 10⁴ strongest waves of the default scene, the paper's own method
+//! and scale; the oracle of both is the harmonic sum, the strong baseline the same sum as a matrix product. Where an
+//! oracle is too slow for all pixels it runs on random ones of the same size, as many as the table says, and its time is
+//! scaled up; that of the whole scene stage by stage. One image on finer and finer pixels shows what its spacing does. The
+//! second part is the model: steps, batch size and weights against many steps from the same noise. The third is the loader:
+//! images a second that a training loop gets of the simulator and of the model, by threads.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod arguments;
+mod loader;
+mod model;
+mod model_row;
+mod plot;
+mod reference;
+mod rounding;
+mod row;
+mod spacing;
+mod stages;
+mod sweep;
+
+pub(crate) use arguments::Arguments;
+
+use arguments::Part;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::exit::{self, Outcome};
+use crate::progress;
+
+/// Writes `report.json`, `simulator.md`, `spacing.md`, `model.md`, `loader.md`, `frontier.svg` and `model.svg` (log-log).
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
+    let out = &arguments.out;
+    whole_files::make_folder(out)?;
+    let (mut rows, mut parts) = (Vec::new(), Vec::new());
+    let asked = |part| {
+        let all = arguments.part == Part::All && arguments.stage.is_empty();
+        all || arguments.part == part
+    };
+    if asked(Part::Simulator) || !arguments.stage.is_empty() {
+        let measured = sweep::measure(arguments.largest as usize, &arguments.stage)?;
+        plot::draw(&out.join("frontier.svg"), &plot::SIMULATOR, &measured)?;
+        parts.push(("simulator.md", sweep::table(&measured)));
+        add(&mut rows, &measured)?;
+    }
+    if asked(Part::Simulator) && arguments.stage.is_empty() {
+        let bar = progress::bar(spacing::COUNT, "rows of the spacing");
+        let measured = spacing::measure(|| bar.inc(1))?;
+        bar.finish_and_clear();
+        parts.push(("spacing.md", spacing::table(&measured)));
+        add(&mut rows, &measured)?;
+    }
+    if asked(Part::Model) {
+        let bar = progress::bar(model::PARTS as u64, "rows of the model");
+        let measured = model::measure(|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let steps = model_row::steps(&measured);
+        plot::draw(&out.join("model.svg"), &plot::MODEL, &steps)?;
+        parts.push(("model.md", model_row::table(&measured)));
+        add(&mut rows, &measured)?;
+    }
+    if asked(Part::Loader) {
+        let bar = progress::bar(loader::parts(), "rows of the loader");
+        let measured = loader::measure(&arguments.device, || bar.inc(1))?;
+        bar.finish_and_clear();
+        parts.push(("loader.md", loader::table(&measured)));
+        add(&mut rows, &measured)?;
+    }
+    let report = json!({ "rows": rows });
+    whole_files::write_json(&out.join("report.json"), &report)?;
+    for (name, table) in &parts {
+        whole_files::write_atomically(&out.join(name), table.as_bytes())?;
+    }
+    if arguments.json {
+        exit::say(&report.to_string())?;
+    } else {
+        let tables: Vec<&str> = parts.iter().map(|(_, table)| table.as_str()).collect();
+        exit::say(&format!(
+            "{}\nwritten to {}",
+            tables.join("\n"),
+            out.display()
+        ))?;
+    }
+    Ok(())
+}
+
+/// Adds measured rows to those of the report.
+fn add(rows: &mut Vec<Value>, measured: &[impl Serialize]) -> serde_json::Result<()> {
+    for row in measured {
+        rows.push(serde_json::to_value(row)?);
+    }
+    Ok(())
+}

@@ -1,0 +1,54 @@
+//! What is told of the model: one row for each way to draw.
+
+use super::model::{REFERENCE, STEPS};
+use super::row::Row;
+use serde::Serialize;
+
+/// One way to draw images against the reference.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct ModelRow {
+    /// Seconds are those of one image; the oracle is the same model with [`REFERENCE`] steps, one image at a time.
+    /// Errors are those of grey, relative to the reference's standard deviation.
+    #[serde(flatten)]
+    pub(crate) row: Row,
+    /// Steps from noise to image.
+    pub(crate) steps: usize,
+    /// How a step is made.
+    pub(crate) sampler: &'static str,
+    /// Bits of the weights; all arithmetic is in f32.
+    pub(crate) precision: &'static str,
+    /// Images at a time.
+    pub(crate) batch: usize,
+    /// Largest difference of the mean radial spectrum up to half the Nyquist frequency \[dB\].
+    pub(crate) spectrum_db: f64,
+}
+
+/// The rows of the steps alone, for a plot.
+pub(crate) fn steps(rows: &[ModelRow]) -> Vec<Row> {
+    let steps = rows.iter().take(STEPS.len());
+    steps.map(|row| row.row.clone()).collect()
+}
+
+/// The rows as a table in Markdown.
+pub(crate) fn table(rows: &[ModelRow]) -> String {
+    let mut text =
+        "| steps | sampler | weights | batch | ms per image | ratio | max error | rms error | spectrum dB |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+            .to_owned();
+    for r in rows {
+        text += &format!(
+            "| {} | {} | {} | {} | {:.1} | {:.1} | {:.1e} | {:.1e} | {:.2} |\n",
+            r.steps,
+            r.sampler,
+            r.precision,
+            r.batch,
+            1e3 * r.row.fast_seconds,
+            r.row.ratio,
+            r.row.max_error,
+            r.row.rms_error,
+            r.spectrum_db
+        );
+    }
+    let reference = rows.first().map_or(0.0, |r| r.row.oracle_seconds);
+    text + &format!("\nReference: {REFERENCE} steps, {reference:.2} s per image.\n")
+}

@@ -1,0 +1,52 @@
+//! Where the oracles run, and the row that comes of it.
+
+use crate::bench::row::{Errors, Row};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use wake_physics::Raster;
+
+/// Pixels of the oracle where the whole raster takes too long.
+const SAMPLE: usize = 4_096;
+/// Pixels of the quadrature of σ⁰, which takes a millisecond each.
+pub(crate) const QUADRATURES: usize = 1_024;
+/// Largest raster, as pixels along a side, on which the oracles run whole.
+pub(crate) const WHOLE: usize = 128;
+
+/// The pixels of the oracle, and how many times more there are.
+pub(crate) fn pixels(raster: &Raster) -> (Vec<[usize; 2]>, f64) {
+    if raster.rows <= WHOLE {
+        let all = (0..raster.len()).map(|n| [n / raster.columns, n % raster.columns]);
+        return (all.collect(), 1.0);
+    }
+    (sample(raster, SAMPLE), raster.len() as f64 / SAMPLE as f64)
+}
+
+/// Random pixels of a raster.
+pub(crate) fn sample(raster: &Raster, count: usize) -> Vec<[usize; 2]> {
+    let mut random = StdRng::seed_from_u64(1);
+    let mut one = || [raster.rows, raster.columns].map(|n| random.random_range(0..n));
+    (0..count).map(|_| one()).collect()
+}
+
+/// A row without a matrix product.
+pub(crate) fn row(
+    stage: &'static str,
+    raster: &Raster,
+    tolerance: Option<f64>,
+    fast_seconds: f64,
+    (oracle_seconds, pixels): (f64, usize),
+    errors: Errors,
+) -> Row {
+    Row {
+        stage,
+        size: raster.rows,
+        tolerance,
+        fast_seconds,
+        oracle_seconds,
+        pixels,
+        matrix_product_seconds: None,
+        ratio: oracle_seconds / fast_seconds,
+        max_error: errors.max,
+        rms_error: errors.rms,
+    }
+}

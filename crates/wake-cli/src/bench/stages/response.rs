@@ -1,0 +1,79 @@
+//! The image as a satellite delivers it: through its impulse response.
+
+use super::RUNS;
+use super::oracle::{QUADRATURES, row, sample};
+use super::surface::fields;
+use crate::bench::row::{Errors, Row, median_seconds, seconds};
+use rayon::prelude::*;
+use wake_physics::sar::ImpulseResponse;
+use wake_physics::sar::impulse::{Axis, PointTarget, Reflectivity};
+use wake_physics::waves::Quantity;
+use wake_physics::window::Window;
+use wake_physics::{Field, Raster};
+
+/// Pixels of the image, two sources a pixel, and the resolution along both axes \[m\].
+const PIXEL: f64 = 10.0;
+const RESOLUTION: f64 = 20.0;
+/// Sources that the direct sum over the response looks at, over all pixels.
+const SCATTERERS: usize = 1 << 29;
+/// How much farther from the image the direct sum looks than the fast method.
+const FARTHER: usize = 4;
+
+/// The mean image through the response by FFTs against the sum over scatterers with its closed form, which looks four times
+/// as far beyond the image.
+pub(crate) fn response(size: usize) -> Row {
+    let axis = Axis {
+        resolution: RESOLUTION,
+        window: Window::Hamming(0.75),
+    };
+    let response = ImpulseResponse {
+        range: axis,
+        azimuth: axis,
+    };
+    let image = Raster::image(size, size, PIXEL);
+    let spacing = 0.5 * PIXEL;
+    let fine = Raster::image(2 * size, 2 * size, spacing);
+    let [rows, columns] = response.guard(spacing);
+    let near = fine.with_margin(rows, columns);
+    let far = fine.with_margin(FARTHER * rows, FARTHER * columns);
+    let slope = fields(&far, &[Quantity::SlopeX]).swap_remove(0);
+    let all = Field::from_fn(&far, |i, j| 0.03 * (5.0 * slope.at(i, j)).exp());
+    let more = FARTHER - 1;
+    let seen = Field::from_fn(&near, |i, j| all.at(i + more * rows, j + more * columns));
+    let ship = PointTarget {
+        position: [3.1, -42.7],
+        cross_section: 1e3,
+    };
+    let sources = Reflectivity {
+        raster: &near,
+        intensity: &seen,
+        points: &[ship],
+    };
+    let (fast_seconds, mean) = median_seconds(RUNS, || response.mean(&sources, &image));
+    let pixels = sample(&image, (SCATTERERS / far.len()).min(QUADRATURES));
+    // |h|²Δ/∫|h|² of one axis.
+    let weight = |distance: f64| {
+        let gain = 10f64.powf(-0.1 * axis.window.loss()) * axis.bandwidth() * spacing;
+        gain * axis.window.response(distance * axis.bandwidth()).powi(2)
+    };
+    let power = ship.cross_section / (spacing * spacing);
+    let (oracle, exact) = seconds(|| -> Vec<f64> {
+        let of_pixel = |&[i, j]: &[usize; 2]| {
+            let [x, y] = [image.x(j), image.y(i)];
+            let along: Vec<f64> = (0..far.columns).map(|c| weight(x - far.x(c))).collect();
+            let of_row = |(r, row): (usize, &[f32])| {
+                let values = row.iter().zip(&along).map(|(&v, w)| f64::from(v) * w);
+                weight(y - far.y(r)) * values.sum::<f64>()
+            };
+            let rows = all.values.chunks(far.columns).enumerate();
+            let point = weight(x - ship.position[0]) * weight(y - ship.position[1]);
+            power * point + rows.map(of_row).sum::<f64>()
+        };
+        pixels.par_iter().map(of_pixel).collect()
+    });
+    let values = pixels.iter().map(|&[i, j]| f64::from(mean.at(i, j)));
+    let errors = Errors::of(values, &exact, mean.mean());
+    let scale = image.len() as f64 / pixels.len() as f64;
+    let oracle = (oracle * scale, pixels.len());
+    row("response", &image, None, fast_seconds, oracle, errors)
+}

@@ -1,0 +1,103 @@
+//! Sums of plane waves: sea, swell and wake.
+
+use super::RUNS;
+use super::oracle::{WHOLE, pixels, row};
+use super::surface::{TRANSFER, spectrum, wake};
+use crate::bench::row::{Errors, Row, median_seconds, seconds};
+use wake_physics::surface::Surface;
+use wake_physics::swell::Swell;
+use wake_physics::waves::{PlaneWaves, Quantity, harmonic_sum, matrix_product};
+use wake_physics::{Field, Raster, nufft};
+
+/// Waves of sea and wake: the paper's scale.
+const WAVES: usize = 10_000;
+/// Rows of a matrix product on a large raster, scaled up.
+const PRODUCT_ROWS: usize = 48;
+
+/// The six fields of surface and velocity.
+const QUANTITIES: [Quantity; 6] = [
+    Quantity::Elevation,
+    Quantity::SlopeX,
+    Quantity::SlopeY,
+    Quantity::VelocityX,
+    Quantity::VelocityY,
+    Quantity::VelocityZ,
+];
+
+/// FFT of the sea with its strongest waves.
+pub(crate) fn sea(raster: &Raster, tolerance: f64) -> Row {
+    let surface = Surface::new(&spectrum(), 7, 0.0, raster).strongest(WAVES);
+    let fast = || surface.fields(&TRANSFER, &QUANTITIES, tolerance);
+    sum("sea", raster, tolerance, &surface.modes(), fast)
+}
+
+/// Swell on the non-uniform FFT, its draw included, against the harmonic sum.
+pub(crate) fn swell(raster: &Raster, tolerance: f64) -> Row {
+    let swell = Swell {
+        height: 2.0,
+        wavelength: 200.0,
+        toward: 1.0,
+    };
+    let draw = || {
+        swell.waves(
+            (7, 0.0),
+            f64::INFINITY,
+            std::f64::consts::PI / raster.spacing,
+        )
+    };
+    let fast = || nufft::synthesize(&draw(), &TRANSFER, &QUANTITIES, raster, tolerance);
+    sum("swell", raster, tolerance, &draw(), fast)
+}
+
+/// Non-uniform FFT of the wake, nodes and their amplitudes included.
+pub(crate) fn kelvin(raster: &Raster, tolerance: f64) -> Row {
+    let wake = wake();
+    let waves = wake.waves(&wake.plan(raster, tolerance)).strongest(WAVES);
+    let fast = || {
+        let waves = wake.waves(&wake.plan(raster, tolerance)).strongest(WAVES);
+        nufft::synthesize(&waves, &TRANSFER, &QUANTITIES, raster, tolerance)
+    };
+    sum("kelvin", raster, tolerance, &waves, fast)
+}
+
+/// A sum of plane waves against the harmonic sum and the matrix product.
+fn sum(
+    stage: &'static str,
+    raster: &Raster,
+    tolerance: f64,
+    waves: &PlaneWaves,
+    fast: impl Fn() -> Vec<Field>,
+) -> Row {
+    let (fast_seconds, fields) = median_seconds(RUNS, fast);
+    let (pixels, scale) = pixels(raster);
+    let (oracle, exact) = seconds(|| harmonic_sum(waves, &TRANSFER, &QUANTITIES, raster, &pixels));
+    let errors = fields
+        .iter()
+        .zip(&exact)
+        .fold(Errors::default(), |worst, (field, exact)| {
+            let values = pixels.iter().map(|&[i, j]| f64::from(field.at(i, j)));
+            worst.worst(Errors::of(values, exact, field.rms()))
+        });
+    let (matrix_product_seconds, _) = product(raster, waves);
+    Row {
+        matrix_product_seconds: Some(matrix_product_seconds),
+        ..row(
+            stage,
+            raster,
+            Some(tolerance),
+            fast_seconds,
+            (oracle * scale, pixels.len()),
+            errors,
+        )
+    }
+}
+
+/// Seconds of the matrix product, on some rows of a large raster, and its fields.
+fn product(raster: &Raster, waves: &PlaneWaves) -> (f64, Vec<Field>) {
+    let whole = raster.rows <= WHOLE;
+    let rows = if whole { raster.rows } else { PRODUCT_ROWS };
+    let part = Raster { rows, ..*raster };
+    let (seconds, fields) =
+        median_seconds(1, || matrix_product(waves, &TRANSFER, &QUANTITIES, &part));
+    (seconds * raster.rows as f64 / rows as f64, fields)
+}

@@ -1,0 +1,45 @@
+//! What is asked for on the command line.
+
+use clap::Args;
+use std::path::PathBuf;
+use wake_dataset::Shard;
+
+/// Simulate a labelled data set of ship wakes.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), detector (what satellites
+    /// deliver), or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = "ranges")]
+    pub(crate) grid: String,
+    /// Change one value of the recipe, such as speckle=true; may be repeated; keys: see docs/dataset.md
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Number of images of the whole set [default: 100; 3456 for the paper's grid]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    pub(crate) count: Option<u64>,
+    /// Seed of the whole set
+    #[arg(long, default_value_t = 7)]
+    pub(crate) seed: u64,
+    /// Share of the images that are for validation, 0 to 1
+    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
+    pub(crate) val_share: f64,
+    /// Draw the scenes on a sea learnt from real images: a file that `wake train sea` wrote
+    #[cfg(feature = "generate")]
+    #[arg(long, value_name = "FILE", conflicts_with = "merge")]
+    pub(crate) sea: Option<PathBuf>,
+    /// Make only share i of n, into the folder shard-i
+    #[arg(long, value_name = "I/N")]
+    pub(crate) shard: Option<Shard>,
+    /// Join the shards made before
+    #[arg(long, conflicts_with_all = ["shard", "count", "set"])]
+    pub(crate) merge: bool,
+    /// Images made at the same time [default: one for each core]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) jobs: Option<u16>,
+    /// Folder of the set, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/dataset")]
+    pub(crate) out: PathBuf,
+    /// Print a report as JSON on standard output, and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+}

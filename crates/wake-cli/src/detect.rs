@@ -1,0 +1,173 @@
+//! `wake detect`: searches images, draws them with their wakes, and tells them as JSON.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use indicatif::ProgressBar;
+use serde_json::{Map, Value, json};
+use wake_detector::drawing::Drawing;
+use wake_detector::{
+    Detection, Detector, Finder, GreyImage, image_files, image_name, picture_name,
+};
+
+use crate::exit::{self, Outcome};
+use crate::{named, picture, progress};
+
+/// How wakes are looked for.
+#[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+enum Method {
+    /// The trained network
+    Network,
+    /// A normalised Radon transform around bright targets and over the whole image
+    Radon,
+}
+
+/// Find ship wakes in radar images.
+#[derive(clap::Args, Debug, Clone)]
+pub(crate) struct Arguments {
+    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them, whose *.wakes.png are left out
+    #[arg(required = true, value_name = "FILE|DIR")]
+    images: Vec<PathBuf>,
+    /// Pixel spacing [m]; without it the scale comes from the image
+    #[arg(long, value_parser = named::spacing)]
+    spacing: Option<f32>,
+    /// How wakes are looked for
+    #[arg(long, value_enum, default_value_t = Method::Network)]
+    method: Method,
+    /// Weights of the network, by default those in the repository
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Least score that is told, 0 to 1; from 0.25 on there are few false alarms
+    #[arg(long, default_value_t = 0.03, value_parser = named::score)]
+    least_score: f32,
+    /// Print the wakes as JSON, and nothing else
+    #[arg(long)]
+    json: bool,
+    /// flex, ndarray, wgpu or cuda, where compiled in
+    #[arg(long, default_value = "flex")]
+    device: String,
+    /// Folder of the pictures, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/detect")]
+    out: PathBuf,
+}
+
+/// Draws each image with its wakes into `--out`, and prints every wake by tip, axis, half-angle, visible length and score. Files
+/// of a folder that cannot be read are named, and the others are searched.
+pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
+    let files = image_files(&arguments.images)?;
+    let finder = finder(arguments)?;
+    let bar = progress::bar(files.len() as u64, "images");
+    let mut told = Told::default();
+    let searched = search(&files, &finder, arguments, &mut told, &bar);
+    bar.finish_and_clear();
+    // Also when the search ended early: the results until then are printed.
+    if arguments.json && !told.images.is_empty() {
+        let told = json!({ "images": told.images, "unread": told.unread });
+        exit::say(&format!("{told:#}"))?;
+    }
+    searched?;
+    match told.unread.len() {
+        0 => Ok(()),
+        count => Err(format!("{count} of {} images were not read; see above", files.len()).into()),
+    }
+}
+
+fn finder(arguments: &Arguments) -> Outcome<Finder> {
+    match arguments.method {
+        Method::Radon => Ok(Finder::Radon),
+        Method::Network => {
+            let weights = arguments.weights.as_deref();
+            let detector = named::network(weights, &arguments.device, arguments.least_score)?;
+            Ok(Finder::from(match arguments.spacing {
+                Some(metres) => detector.with_spacing(metres)?,
+                None => detector,
+            }))
+        }
+    }
+}
+
+/// Results by the names of the images.
+#[derive(Default)]
+struct Told {
+    /// The wakes of each image.
+    images: Map<String, Value>,
+    /// Why an image was not read.
+    unread: Map<String, Value>,
+}
+
+/// Searches and draws all files that can be read. A single one that cannot is an error, one of several is noted.
+fn search(
+    files: &[PathBuf],
+    finder: &Finder,
+    arguments: &Arguments,
+    told: &mut Told,
+    bar: &ProgressBar,
+) -> Outcome<()> {
+    for file in files {
+        let name = image_name(file);
+        bar.inc(1);
+        let image = match GreyImage::read(file) {
+            Ok(image) => image,
+            Err(error) if files.len() == 1 => return Err(error.into()),
+            Err(error) => {
+                bar.suspend(|| exit::note(&format!("error: {error}")));
+                told.unread.insert(name, error.to_string().into());
+                continue;
+            }
+        };
+        // What cannot be read leaves no folder behind.
+        if told.images.is_empty() {
+            whole_files::make_folder(&arguments.out)?;
+        }
+        let found = finder.find(&image);
+        draw(&image, &found, arguments, file)?;
+        if !arguments.json {
+            bar.suspend(|| exit::say(&summary(&name, &found)))?;
+        }
+        told.images
+            .insert(name, found.iter().map(as_json).collect());
+    }
+    Ok(())
+}
+
+fn draw(image: &GreyImage, found: &[Detection], arguments: &Arguments, file: &Path) -> Outcome<()> {
+    let mut drawing = Drawing::new(image);
+    // Radon's score has no upper end; all that it tells is above its threshold.
+    let sure = |one: &&Detection| {
+        arguments.method == Method::Radon || one.score >= Detector::OPERATING_POINT
+    };
+    drawing.found(found.iter().filter(sure));
+    let path = arguments.out.join(picture_name(file));
+    picture::write(&drawing.into_picture(), &path)
+}
+
+/// The wakes of an image that are likely ones, a line each.
+fn summary(name: &str, found: &[Detection]) -> String {
+    let sure: Vec<&Detection> = found
+        .iter()
+        .filter(|one| one.score >= Detector::OPERATING_POINT)
+        .collect();
+    let mut text = format!("{name}: {} wakes", sure.len());
+    for one in sure {
+        let (wake, [column, row]) = (&one.wake, one.wake.tip);
+        // Writing into a string cannot fail.
+        let _ = write!(
+            text,
+            "\n  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
+            one.score, wake.axis_deg, wake.length
+        );
+    }
+    text
+}
+
+/// A detection as the program prints it.
+fn as_json(one: &Detection) -> Value {
+    json!({
+        "score": one.score,
+        "tip": one.wake.tip,
+        "axis_deg": one.wake.axis_deg,
+        "half_angle_deg": one.wake.half_angle_deg,
+        "length_px": one.wake.length,
+        "oriented_box": one.wake.oriented_box(),
+    })
+}

@@ -1,0 +1,156 @@
+//! `wake evaluate detector`: how well wakes are found in simulated images that were held out, and in real tiles.
+
+mod real;
+mod real_sea;
+mod recall;
+mod report;
+
+use std::path::{Path, PathBuf};
+
+use image::RgbImage;
+use wake_detector::Finder;
+use wake_detector::drawing::sheet;
+use wake_train::detector::Recipe;
+use wake_train::detector::judging::{Searched, compared};
+
+use crate::exit::{self, Outcome};
+use crate::{named, picture, progress};
+use recall::{by_scene, by_visibility};
+use report::Report;
+
+/// Measure how well wakes are found, in simulated images that were held out and in real tiles.
+#[derive(clap::Args, Debug, Clone)]
+pub(crate) struct Options {
+    /// Simulated images of each recipe
+    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    images: u32,
+    /// Folder of real tiles with labels.json, which are then searched, too
+    #[arg(long, value_name = "DIR")]
+    real: Option<PathBuf>,
+    /// Weights of the network, by default those in the repository
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Weights of another run, as a row of the table of what transfer needs; may be repeated
+    #[arg(long, value_name = "NAME=FILE", value_parser = rung)]
+    rung: Vec<(String, PathBuf)>,
+    /// flex, ndarray, wgpu or cuda, where compiled in
+    #[arg(long, default_value = "flex")]
+    device: String,
+    /// Folder of the results, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/evaluate_detector")]
+    out: PathBuf,
+}
+
+/// A name and a file.
+fn rung(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, file))
+            if !name.is_empty() && !name.contains(['/', '\\']) && !file.is_empty() =>
+        {
+            Ok((name.to_owned(), PathBuf::from(file)))
+        }
+        _ => Err("expected NAME=FILE, with a name that can be part of a file's".to_owned()),
+    }
+}
+
+/// Seed of held-out images: no run trains on it.
+pub(crate) const HELD_OUT: u64 = 900_001;
+/// Rows and columns of a simulated image.
+pub(crate) const SIZE: usize = 512;
+/// Scores below this are no part of any curve.
+const LEAST_SCORE: f32 = 0.01;
+/// Contrast from which on a simulated wake is clear \[dB\].
+const CLEAR: f64 = 1.0;
+/// Images drawn of each recipe.
+const PICTURES: usize = 24;
+
+/// Searches, and writes `report.md`, `report.json` and pictures into the folder.
+pub(crate) fn run(options: &Options) -> Outcome<()> {
+    let network = |weights: Option<&Path>| -> Outcome<Finder> {
+        let detector = named::network(weights, &options.device, LEAST_SCORE)?;
+        Ok(Finder::from(detector))
+    };
+    let mut finders = vec![
+        ("network", network(options.weights.as_deref())?),
+        ("Radon", Finder::Radon),
+    ];
+    for (name, file) in &options.rung {
+        // Pictures bear these names, in small letters.
+        if finders
+            .iter()
+            .any(|(other, _)| other.eq_ignore_ascii_case(name))
+        {
+            return Err(format!("--rung {name} has the name of another finder; rename it").into());
+        }
+        finders.push((name, network(Some(file))?));
+    }
+    let (tiles, sea) = match &options.real {
+        None => (Vec::new(), Vec::new()),
+        Some(folder) => {
+            let tiles = real::tiles(folder)?;
+            let sea = real_sea::windows(folder, &tiles)?;
+            (tiles, sea)
+        }
+    };
+    whole_files::make_folder(&options.out)?;
+    let mut report = Report {
+        rungs: options.rung.iter().map(|(name, _)| name.clone()).collect(),
+        ..Report::default()
+    };
+    let mut speeds = String::new();
+    for recipe in [Recipe::Detector, Recipe::Painted] {
+        speeds.push_str(&simulated(&finders, recipe, options, &mut report)?);
+    }
+    for (name, finder) in &finders {
+        if !tiles.is_empty() {
+            real::judge(name, finder, &tiles, &options.out, &mut report)?;
+        }
+    }
+    if !sea.is_empty() {
+        report.sea = real_sea::told_apart(&sea)?;
+    }
+    report.write(&options.out)?;
+    Ok(exit::say(&format!("{speeds}{}", report.text()))?)
+}
+
+/// Adds the rows of a recipe, and draws its first images; gives a line with the speed of the search.
+fn simulated(
+    finders: &[(&str, Finder)],
+    recipe: Recipe,
+    options: &Options,
+    report: &mut Report,
+) -> Outcome<String> {
+    let source = recipe.source(HELD_OUT, SIZE)?;
+    let count = u64::from(options.images);
+    let bar = progress::bar(count, recipe.name());
+    let mut pictures: Vec<RgbImage> = Vec::new();
+    let all: Vec<&Finder> = finders.iter().map(|(_, finder)| finder).collect();
+    let searched = Searched::of(source.as_ref(), count, &all, |image, wakes, found| {
+        if pictures.len() < PICTURES {
+            pictures.push(compared(image, wakes, &found[0]));
+        }
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    for (number, (name, _)) in finders.iter().enumerate() {
+        report.add(recipe.name(), name, &searched.judged[number]);
+        if recipe == Recipe::Detector {
+            let set = format!("{}, above {CLEAR:.0} dB", recipe.name());
+            report.add(&set, name, &searched.clear(number, CLEAR));
+        }
+    }
+    let names: Vec<&str> = finders.iter().map(|(name, _)| *name).collect();
+    let by_visibility = by_visibility(recipe, &names, &searched);
+    report.visibility.push(by_visibility);
+    if recipe == Recipe::Detector {
+        report.scenes = by_scene(recipe, &names, &searched);
+    }
+    let megapixels = (SIZE * SIZE) as f64 * 1e-6;
+    let path = options.out.join(format!("{}.png", recipe.name()));
+    picture::write(&sheet(&pictures, 4), &path)?;
+    let speed = megapixels / searched.seconds;
+    Ok(format!(
+        "{}: {speed:.2} megapixels a second\n",
+        recipe.name()
+    ))
+}

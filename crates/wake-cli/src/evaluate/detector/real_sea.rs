@@ -1,0 +1,104 @@
+//! Whether a small network tells the open sea of real tiles from a simulated one.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+use wake_dataset::Source;
+use wake_detector::GreyImage;
+use wake_nn::device_named;
+use wake_physics::Field;
+use wake_train::detector::Recipe;
+use wake_train::detector::judging::{Tile, paired_windows};
+use wake_train::{TwoSampleOptions, two_sample};
+
+use super::HELD_OUT;
+use crate::exit::Outcome;
+
+/// Rows and columns of a window of open sea.
+const WINDOW: usize = 128;
+/// Windows of each half of a tile, at most.
+const OF_A_HALF: usize = 4;
+
+/// Windows of open sea of the tiles of a folder, without what `NAME_mask.png` marks.
+pub(crate) fn windows(folder: &Path, tiles: &[Tile]) -> Outcome<Vec<Field>> {
+    let mut windows = Vec::new();
+    for tile in tiles {
+        let stem = Path::new(&tile.name).with_extension("");
+        let mask = folder.join(format!("{}_mask.png", stem.display()));
+        let mask = mask.is_file().then(|| GreyImage::read(&mask)).transpose()?;
+        let found = paired_windows(&tile.image, mask.as_ref(), WINDOW, OF_A_HALF);
+        windows.extend(found.into_iter().map(field));
+    }
+    Ok(windows)
+}
+
+fn field(values: Vec<f32>) -> Field {
+    Field {
+        rows: WINDOW,
+        columns: WINDOW,
+        values,
+    }
+}
+
+/// As many windows of a source.
+fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
+    let pairs = source.items(0..count as u64)?;
+    let levels = |pair: wake_dataset::Pair| {
+        let levels = pair.image.levels();
+        field(levels.into_iter().map(f32::from).collect())
+    };
+    Ok(pairs.into_iter().map(levels).collect())
+}
+
+/// How often real windows are told from those of each recipe, and the recipe detector from itself: the floor.
+pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
+    let device = device_named("flex")?;
+    let sea = |plain: bool, seed: u64| -> Outcome<Vec<Field>> {
+        simulated(&Recipe::open_sea(plain, seed, WINDOW)?, real.len())
+    };
+    let detector = sea(false, HELD_OUT)?;
+    let rows = [
+        (
+            "real sea and pixels without response",
+            real,
+            sea(true, HELD_OUT)?,
+        ),
+        ("real sea and recipe detector", real, detector.clone()),
+        (
+            "recipe detector and itself, other seeds",
+            &detector,
+            sea(false, HELD_OUT + 1)?,
+        ),
+    ];
+    let row = |(name, first, second): (&str, &[Field], Vec<Field>)| {
+        let found = two_sample(first, &second, &TwoSampleOptions::default(), &device)?;
+        Ok(json!({
+            "kinds": name, "accuracy": found.accuracy, "half_width": found.half_width, "images": found.images,
+        }))
+    };
+    rows.into_iter().map(row).collect()
+}
+
+/// A table of how often a small network tells one sea from another.
+pub(crate) fn table(rows: &[Value]) -> String {
+    let mut text = "\n## The open sea\n\nHow often a small network, trained on windows of the left halves of the real tiles, is \
+         right on patches of 64² pixels of the right halves (docs/evaluation.md; 0.5: nothing tells the two kinds apart). \
+         The tiles come from other sensors and in other stretches of grey than the recipe has.\n\n\
+         | kinds | right | windows |\n| --- | --- | --- |\n"
+        .to_owned();
+    for row in rows {
+        let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
+        // Writing into a string cannot fail.
+        let _ = writeln!(
+            text,
+            "| {} | {:.2} ± {:.2} | {} |",
+            row["kinds"].as_str().unwrap_or_default(),
+            number("accuracy"),
+            number("half_width"),
+            row["images"],
+        );
+    }
+    text
+}

@@ -1,0 +1,137 @@
+//! What `evaluate` writes.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use wake_detector::score::{Curve, Judged, Rule};
+use wake_physics::output::write_atomically;
+
+use super::real_sea;
+
+/// False alarms an image at which recall is told.
+pub(crate) const FALSE_ALARMS: f64 = 0.5;
+
+/// One row a finder and set of images.
+#[derive(Default)]
+pub(crate) struct Report {
+    pub(crate) rows: Vec<Value>,
+    /// Names of other runs.
+    pub(crate) rungs: Vec<String>,
+    /// What was told apart.
+    pub(crate) sea: Vec<Value>,
+    /// Tables of recall by visibility.
+    pub(crate) visibility: Vec<String>,
+    /// Tables of recall by sensor, wind and heading.
+    pub(crate) scenes: String,
+}
+
+impl Report {
+    /// Adds a row, and gives the curve by the ray rule.
+    pub(crate) fn add(&mut self, set: &str, finder: &str, images: &[Judged]) {
+        let (rays, boxes) = (Curve::new(images, Rule::Ray), Curve::new(images, Rule::Box));
+        let (right, wrong) = rays.totals();
+        let (recall, score) = rays.recall_at(FALSE_ALARMS).unwrap_or_default();
+        self.rows.push(json!({
+            "images": set, "finder": finder, "count": images.len(), "wakes": rays.labels,
+            "average_precision": rays.average_precision(), "average_precision_boxes": boxes.average_precision(),
+            "recall_at_half_false_alarm": recall, "at_score": Some(score).filter(|s| s.is_finite()),
+            "right": right, "false_alarms": wrong,
+        }));
+    }
+
+    /// Writes `report.json` and `report.md` into a folder.
+    pub(crate) fn write(&self, folder: &Path) -> wake_physics::Result<()> {
+        let rows = format!("{:#}\n", json!({"rows": self.rows, "sea": self.sea}));
+        for (name, text) in [("report.json", rows), ("report.md", self.text())] {
+            write_atomically(&folder.join(name), text.as_bytes())?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn text(&self) -> String {
+        let count = self.rows.first().and_then(|row| row["count"].as_u64());
+        let count = count.unwrap_or(0);
+        let rungs = match self.rungs.is_empty() {
+            true => "",
+            false => " --rung NAME=FILE …",
+        };
+        let mut text = format!(
+            "<!-- Written by: wake evaluate detector --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n\
+             AP: average precision by the ray rule (axis within 10°; tip within 60 pixels, or axis line within 25 pixels of tip \
+             and middle). AP boxes: oriented boxes from the tip to the end of what is visible, IoU 0.5. Recall: with at most half \
+             a false alarm an image.\n\n\
+             | images | number | wakes | found by | AP | AP boxes | recall | at score |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        );
+        let number = |value: &Value| value.as_f64().map_or("–".to_owned(), |x| format!("{x:.3}"));
+        let told = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+        let of_rung = |row: &&Value| self.rungs.iter().any(|rung| row["finder"] == **rung);
+        for row in self.rows.iter().filter(|row| !of_rung(row)) {
+            // Writing into a string cannot fail.
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {} | {} | {} |",
+                told(&row["images"]),
+                row["count"],
+                row["wakes"],
+                told(&row["finder"]),
+                number(&row["average_precision"]),
+                number(&row["average_precision_boxes"]),
+                number(&row["recall_at_half_false_alarm"]),
+                number(&row["at_score"]),
+            );
+        }
+        text.push_str(
+            "\nRecall by visibility, with at most half a false alarm an image: of simulated wakes by the expected change of the \
+             intensity (docs/labels.md), of painted ones by the signal over noise of a filter that knows the wake.\n",
+        );
+        text.push_str(&self.visibility.join(""));
+        text.push_str(
+            "\nThe same recall of simulated wakes by sensor, by wind, and by the angle between the wake and the flight of the radar: at \
+             0° the ship sails along the flight, at 90° across it.\n",
+        );
+        text.push_str(&self.scenes);
+        if !self.rungs.is_empty() {
+            text.push_str(&self.transfer());
+        }
+        if !self.sea.is_empty() {
+            text.push_str(&real_sea::table(&self.sea));
+        }
+        text
+    }
+
+    /// A table of average precision by what the images of training showed, a column each set of images.
+    fn transfer(&self) -> String {
+        let mut sets: Vec<&Value> = Vec::new();
+        for row in &self.rows {
+            if !sets.contains(&&row["images"]) {
+                sets.push(&row["images"]);
+            }
+        }
+        let name = |set: &&&Value| set.as_str().unwrap_or_default().to_owned();
+        let titles: Vec<String> = sets.iter().map(|set| name(&set)).collect();
+        let mut text = format!(
+            "\n## What transfer needs\n\nThe same network trained on other images, AP by the ray rule (and recall).\n\n| trained on | {} |\n| --- |{}\n",
+            titles.join(" | "),
+            " --- |".repeat(titles.len()),
+        );
+        for rung in &self.rungs {
+            let cell = |set: &&Value| {
+                let found = |row: &&Value| row["finder"] == **rung && row["images"] == **set;
+                self.rows.iter().find(found).map_or("–".to_owned(), |row| {
+                    let number = |key: &str| row[key].as_f64().unwrap_or(0.0);
+                    let (precision, recall) = (
+                        number("average_precision"),
+                        number("recall_at_half_false_alarm"),
+                    );
+                    format!("{precision:.3} ({recall:.2})")
+                })
+            };
+            let cells: Vec<String> = sets.iter().map(cell).collect();
+            // Writing into a string cannot fail.
+            let _ = writeln!(text, "| {rung} | {} |", cells.join(" | "));
+        }
+        text
+    }
+}

@@ -1,0 +1,58 @@
+//! The report over a recipe: text, and a sheet of images.
+
+use serde::Serialize;
+use wake_physics::picture::Picture;
+use wake_train::TwoSample;
+use wake_train::evaluation::{DomainRow, Views};
+
+/// Scenes that are shown, each simulated and drawn by the model.
+const PICTURED: usize = 6;
+/// Grey of the sheet beyond the median of each scene to both sides.
+const REACH: f32 = 0.2;
+
+/// Everything that `domain.json` holds.
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    pub(crate) recipe: String,
+    pub(crate) scenes: usize,
+    pub(crate) rows: Vec<DomainRow>,
+}
+
+/// The report in Markdown.
+pub(crate) fn markdown(report: &Report) -> String {
+    let told = |t: &Option<TwoSample>| {
+        t.as_ref().map_or("–".to_owned(), |t| {
+            format!("{:.3} ± {:.3}", t.accuracy, t.half_width)
+        })
+    };
+    let mut text = format!(
+        "{} scenes of the recipe `{}`.\n\n| image | told apart, before speckle | with speckle | seconds an image |\n|---|---|---|---|\n",
+        report.scenes, report.recipe
+    );
+    for row in &report.rows {
+        let [plain, speckled] = [&row.before_speckle, &row.with_speckle].map(told);
+        text += &format!(
+            "| {} | {plain} | {speckled} | {:.3} |\n",
+            row.image, row.seconds
+        );
+    }
+    text
+}
+
+/// Two rows a kind: before speckle and with it; the simulator's above the model's.
+pub(crate) fn sheet(simulated: &Views, model: &Views) -> Picture {
+    let mut panels = Vec::new();
+    for (name, views) in [("simulator", simulated), ("model", model)] {
+        for images in [&views.plain, &views.speckled] {
+            panels.extend(images.iter().take(PICTURED).map(|image| {
+                let mut sorted = image.values.clone();
+                let middle = sorted.len() / 2;
+                let median = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+                let level = |v: &f32| (127.5 * (1.0 + (v - median) / REACH)).round() as u8;
+                let levels: Vec<u8> = image.values.iter().map(level).collect();
+                Picture::from_levels(&levels, image.columns).captioned(name)
+            }));
+        }
+    }
+    Picture::sheet(&panels, PICTURED)
+}

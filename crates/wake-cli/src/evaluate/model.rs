@@ -1,0 +1,22 @@
+//! The wake model that is judged.
+
+use crate::exit::Outcome;
+use std::path::Path;
+use wake_ldm::WakeSampler;
+use wake_nn::burn::tensor::Device;
+
+/// The model of a folder, or the one in the crate; with its own number of steps, unless another is asked for.
+pub(crate) fn load(
+    folder: Option<&Path>,
+    steps: Option<usize>,
+    device: &Device,
+) -> Outcome<WakeSampler> {
+    let sampler = match folder {
+        Some(folder) => WakeSampler::from_folder(folder, device)?,
+        None => WakeSampler::pretrained(device)?,
+    };
+    Ok(match steps {
+        Some(steps) => sampler.with_steps(steps)?,
+        None => sampler,
+    })
+}

@@ -1,0 +1,92 @@
+//! The report of seas as text.
+
+use super::sea::SeaReport;
+use wake_train::TwoSample;
+use wake_train::evaluation::sea::SeaRow;
+
+/// The report in Markdown.
+pub(crate) fn markdown(report: &SeaReport) -> String {
+    let mut text = format!(
+        "<!-- Written by: wake evaluate sea --real DIR --weights FILE -->\n\n\
+         # A sea learnt from real images\n\n{}\n\n\
+         {} windows of 128 x 128 pixels of open sea of the right halves of {} real images stand against as many of each kind. \
+         Learnt was from the left halves alone (`wake train sea --half left`), without labels. All kinds are levels of 8 bits; \
+         what is drawn like a left window has its median.\n\n\
+         ![Gaussian noise of four styles, and below it what the flow makes of the same noise](learned_sea.png)\n\n\
+         Four styles: above, Gaussian noise with their correlations; below, what the flow makes of the same noise.\n\n\
+         | sea | told from real | spectrum dB | along rows 1, 2 | along columns 1, 2 | skewness | blocks of 8, 32 |\n\
+         | --- | --- | --- | --- | --- | --- | --- |\n",
+        finding(report),
+        report.windows,
+        report.images
+    );
+    for row in &report.rows {
+        let told = row.two_sample.map_or("–".to_owned(), |t| accuracy(&t));
+        let [r1, r2, c1, c2] = row.correlations;
+        let [fine, coarse] = row.block_variation;
+        text += &format!(
+            "| {} | {told} | {:.2} | {r1:.3}, {r2:.3} | {c1:.3}, {c2:.3} | {:.3} | {fine:.3}, {coarse:.3} |\n",
+            row.kind, row.spectrum_db, row.skewness
+        );
+    }
+    text + "\nTold from real: how often a small network, trained on half of the windows, is right on patches of 64² pixels of \
+        the others, with its 95 % interval ([evaluation](../evaluation.md)): 0.5 where nothing tells the two kinds apart. \
+        Spectrum: root mean square difference of the radial spectrum over all rings. Correlations, skewness and the variation of \
+        the means of blocks are those of `measure::texture`, means over the windows. Gaussian noise has the mean, spread \
+        and correlations of one left window each, 32 pixels far; the learnt sea told the same windows starts from that very noise. \
+        With its own styles the learnt sea shows those of patches that chance takes from its file, so images and sensors come in \
+        other shares than among the windows, which is seen too. Intervals are those of the windows: how the judge's own training \
+        turns out is not in them. Windows of both halves leave out what `wake train sea` leaves out; wakes that nobody masked are in \
+        both.\n"
+}
+
+fn accuracy(found: &TwoSample) -> String {
+    format!("{:.2} ± {:.2}", found.accuracy, found.half_width)
+}
+
+/// The first paragraph: what learning adds, by the numbers.
+fn finding(report: &SeaReport) -> String {
+    let find = |start: &str| -> Option<(&SeaRow, TwoSample)> {
+        let row = report.rows.iter().find(|row| row.kind.starts_with(start))?;
+        Some((row, row.two_sample?))
+    };
+    let (Some(floor), Some(learnt), Some(gaussian), Some(simulated), Some(real)) = (
+        find("real, left"),
+        find("learnt, styles"),
+        find("Gaussian"),
+        find("simulated"),
+        report.rows.first(),
+    ) else {
+        return String::new();
+    };
+    let gain = gaussian.1.accuracy - learnt.1.accuracy;
+    // Two independent intervals of 95 %.
+    let doubt = gaussian.1.half_width.hypot(learnt.1.half_width);
+    let verdict = if gain > doubt {
+        "so the flow adds what a judge can see beyond a spectrum"
+    } else if gain < -doubt {
+        "so to a judge the flow takes more away than it adds"
+    } else {
+        "so a judge sees no difference: Gaussian noise with measured correlations does as well"
+    };
+    let skewness = |row: &SeaRow| format!("{:.2}", row.skewness);
+    format!(
+        "A small network tells the learnt sea from the real one in {} of all patches, Gaussian noise with the correlations of \
+         the same windows in {}, {verdict}. Gaussian noise is made of those correlations and has the real spectrum to {:.2} dB, \
+         the learnt sea to {:.2} dB. Skewness is {} in real windows, {} in learnt and {} in Gaussian ones; means of blocks of 32 \
+         pixels vary by {:.3}, {:.3} and {:.3}. The simulated sea of the recipe detector, which knows nothing of these sensors, \
+         is told in {}; the other halves of the same images in {}, the floor.",
+        accuracy(&learnt.1),
+        accuracy(&gaussian.1),
+        gaussian.0.spectrum_db,
+        learnt.0.spectrum_db,
+        skewness(real),
+        skewness(learnt.0),
+        skewness(gaussian.0),
+        real.block_variation[1],
+        learnt.0.block_variation[1],
+        gaussian.0.block_variation[1],
+        accuracy(&simulated.1),
+        accuracy(&floor.1),
+    )
+}

@@ -1,0 +1,128 @@
+//! How the program begins, speaks and ends.
+
+use std::error::Error;
+use std::io::{self, ErrorKind, Write};
+use std::process::ExitCode;
+
+/// What a subcommand returns.
+pub(crate) type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// More threads than any machine has cores.
+const MOST_THREADS: usize = 1024;
+/// No sentence on standard error is longer.
+const LONGEST: usize = 2000;
+
+/// Runs a subcommand: exit code 0; or one sentence on standard error and exit code 2 for bad input (arguments, files that
+/// they name, folders that cannot be written to), 1 for any other failure (a full disk).
+pub(crate) fn code(work: impl FnOnce() -> Outcome<()>) -> ExitCode {
+    match threads().map_err(Into::into).and_then(|()| work()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            note(&format!("error: {error}"));
+            ExitCode::from(if is_failure(error.as_ref()) { 1 } else { 2 })
+        }
+    }
+}
+
+/// Whether an error has another cause than the input.
+fn is_failure(error: &(dyn Error + 'static)) -> bool {
+    #[cfg(feature = "train")]
+    if let Some(error) = error.downcast_ref::<wake_train::Error>() {
+        use wake_train::Error as E;
+        return match error {
+            E::Value(error) => is_failure(error),
+            E::Model(error) => is_failure(error),
+            E::Data(error) => is_failure(error),
+            E::Detector(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            E::Diverged { .. } => true,
+            _ => false,
+        };
+    }
+    #[cfg(feature = "dataset")]
+    if let Some(error) = error.downcast_ref::<wake_dataset::Error>() {
+        use wake_dataset::Error as E;
+        return match error {
+            E::Value(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            E::Source(error) => is_failure(error.as_ref()),
+            E::Threads { .. } => true,
+            _ => false,
+        };
+    }
+    #[cfg(feature = "generate")]
+    if let Some(error) = error.downcast_ref::<wake_ldm::Error>() {
+        use wake_ldm::Error as E;
+        return match error {
+            E::Model(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            _ => false,
+        };
+    }
+    #[cfg(feature = "detect")]
+    if let Some(wake_detector::Error::Model(error)) = error.downcast_ref() {
+        return is_failure(error);
+    }
+    #[cfg(any(feature = "dataset", feature = "generate", feature = "detect"))]
+    if let Some(error) = error.downcast_ref::<wake_nn::Error>() {
+        use wake_nn::Error as E;
+        return match error {
+            E::Io { action, .. } => is_of_writing(action),
+            E::NotFinite { .. } | E::WrongNumbers { .. } => true,
+            _ => false,
+        };
+    }
+    #[cfg(feature = "simulate")]
+    if let Some(wake_physics::Error::File { action, .. }) = error.downcast_ref() {
+        return is_of_writing(action);
+    }
+    match error.downcast_ref::<whole_files::Error>() {
+        Some(error) => is_of_writing(error.action),
+        None => error.is::<io::Error>(),
+    }
+}
+
+/// Whether a file failed while it was written; a folder that cannot be written to was named wrongly.
+fn is_of_writing(action: &str) -> bool {
+    matches!(action, "write" | "encode")
+}
+
+/// Prints a result. That its reader has left, as `head` does, is no error; that a disk is full is one.
+pub(crate) fn say(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            let message = format!("cannot write to standard output: {error}");
+            Err(io::Error::new(error.kind(), message))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Says something on standard error, without the control characters of foreign text; if nobody can hear it, nobody does.
+pub(crate) fn note(text: &str) {
+    let harmless = text.chars().take(LONGEST).map(|c| match c {
+        '\n' => "\n".to_owned(),
+        c if c.is_control() => c.escape_unicode().to_string(),
+        c => c.to_string(),
+    });
+    let harmless: String = harmless.collect();
+    let _ = writeln!(io::stderr(), "{harmless}");
+}
+
+/// Refuses numbers of threads that no machine can start: rayon would try.
+fn threads() -> Result<(), String> {
+    let name = "RAYON_NUM_THREADS";
+    let Some(number) = std::env::var(name)
+        .ok()
+        .and_then(|n| n.trim().parse::<usize>().ok())
+    else {
+        return Ok(());
+    };
+    if number > MOST_THREADS {
+        return Err(format!(
+            "{name} is {number}, outside 0 to {MOST_THREADS}; 0 takes one for each core"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,52 @@
+//! Recipes, numbers and networks as the command line names them.
+
+use std::path::Path;
+
+#[cfg(feature = "train")]
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use wake_detector::Detector;
+use wake_nn::device_named;
+#[cfg(feature = "train")]
+use wake_train::detector::Recipe;
+
+use crate::exit::Outcome;
+
+#[cfg(feature = "train")]
+/// Reads the name of a recipe; `--help` tells what each shows.
+pub(crate) fn recipe() -> impl TypedValueParser<Value = Recipe> {
+    let names = Recipe::ALL.map(|recipe| PossibleValue::new(recipe.name()).help(recipe.about()));
+    PossibleValuesParser::new(names).try_map(|name| {
+        let found = Recipe::ALL.into_iter().find(|recipe| recipe.name() == name);
+        found.ok_or("no such recipe")
+    })
+}
+
+/// Reads the side of a pixel \[m\].
+pub(crate) fn spacing(text: &str) -> Result<f32, String> {
+    bounded(text, 0.5, 100.0, "m")
+}
+
+/// Reads a score.
+pub(crate) fn score(text: &str) -> Result<f32, String> {
+    bounded(text, 0.0, 1.0, "probability")
+}
+
+fn bounded(text: &str, low: f32, high: f32, unit: &str) -> Result<f32, String> {
+    let number: f32 = text
+        .parse()
+        .map_err(|_| format!("give a number of {unit}"))?;
+    match (low..=high).contains(&number) {
+        true => Ok(number),
+        false => Err(format!("it lies outside {low} to {high} {unit}")),
+    }
+}
+
+/// The network of a file, or the one that ships, which tells wakes from a score on.
+pub(crate) fn network(weights: Option<&Path>, device: &str, least_score: f32) -> Outcome<Detector> {
+    let device = device_named(device)?;
+    let detector = match weights {
+        Some(file) => Detector::load(file, &device)?,
+        None => Detector::pretrained(&device)?,
+    };
+    Ok(detector.with_least_score(least_score)?)
+}

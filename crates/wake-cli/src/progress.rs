@@ -1,0 +1,23 @@
+//! Progress of long work, on standard error.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A progress bar of so many `things`.
+#[cfg(any(feature = "dataset", feature = "generate", feature = "detect"))]
+pub(crate) fn bar(length: u64, things: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}, {per_sec}, {eta} left");
+    ProgressBar::new(length)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        .with_message(things)
+}
+
+/// A sign of life with the time gone by, for work that cannot say how far it is.
+#[cfg(feature = "simulate")]
+pub(crate) fn clock(what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} gone by");
+    let clock = ProgressBar::new_spinner()
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
+        .with_message(what);
+    clock.enable_steady_tick(std::time::Duration::from_millis(200));
+    clock
+}

@@ -1,0 +1,50 @@
+//! `wake completions` and `wake man`: what a shell and a manual reader need of the command line.
+
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+use std::path::PathBuf;
+
+use crate::exit::{self, Outcome};
+
+/// Print the completions of a shell.
+#[derive(Args)]
+#[command(
+    after_help = "For bash: wake completions bash > ~/.local/share/bash-completion/completions/wake"
+)]
+pub(crate) struct Completions {
+    #[arg(value_name = "SHELL")]
+    shell: Shell,
+}
+
+/// Write a manual page of each subcommand.
+#[derive(Args)]
+pub(crate) struct Man {
+    /// Folder of the pages, made if absent
+    #[arg(value_name = "DIR", default_value = "out/man")]
+    out: PathBuf,
+}
+
+pub(crate) fn completions(arguments: &Completions) -> Outcome<()> {
+    let mut text = Vec::new();
+    clap_complete::generate(
+        arguments.shell,
+        &mut crate::Program::command(),
+        "wake",
+        &mut text,
+    );
+    exit::say(String::from_utf8(text)?.trim_end())?;
+    Ok(())
+}
+
+pub(crate) fn man(arguments: &Man) -> Outcome<()> {
+    let out = &arguments.out;
+    whole_files::make_folder(out)?;
+    clap_mangen::generate_to(crate::Program::command(), out)
+        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    exit::say(&format!(
+        "manual pages in {}; man -l {}/wake.1",
+        out.display(),
+        out.display()
+    ))?;
+    Ok(())
+}

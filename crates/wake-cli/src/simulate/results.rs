@@ -1,0 +1,52 @@
+//! What is written of one simulation, and what is said of it.
+
+use serde_json::Value;
+use std::path::Path;
+use wake_physics::grey::GreyScale;
+use wake_physics::picture::Picture;
+use wake_physics::{Simulation, export};
+
+use super::arguments::{Arguments, Export, GreyName};
+
+/// Writes everything but what several scenes share, and gives the report.
+pub(crate) fn write(
+    simulation: &Simulation,
+    arguments: &Arguments,
+    out: &Path,
+) -> wake_physics::Result<Value> {
+    let grey = match arguments.grey {
+        GreyName::Decibel => GreyScale::default(),
+        GreyName::Amplitude => simulation.quick_look(),
+    };
+    let report = simulation.write_in(out, &grey)?;
+    if arguments.overlay {
+        let levels: Vec<u8> = simulation.levels(&grey);
+        let mut picture = Picture::from_levels(&levels, simulation.raster.columns);
+        picture.draw_labels(&simulation.labels);
+        picture.write(&out.join("overlay.png"))?;
+    }
+    for form in &arguments.export {
+        write_fields(simulation, *form, out)?;
+    }
+    Ok(report)
+}
+
+fn write_fields(simulation: &Simulation, form: Export, out: &Path) -> wake_physics::Result<()> {
+    for (name, field) in simulation.named_fields() {
+        match form {
+            Export::Npy => export::write_npy(&out.join(format!("{name}.npy")), field)?,
+            Export::Tiff => {
+                export::write_tiff(&out.join(format!("{name}.tif")), &simulation.raster, field)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What is said of a simulation.
+pub(crate) fn summary(simulation: &Simulation, out: &Path) -> String {
+    let notes = simulation.plan.notes.iter();
+    let notes: String = notes.map(|note| format!("note: {note}\n")).collect();
+    let (plan, seconds) = (&simulation.plan, &simulation.seconds);
+    format!("{plan}\n{notes}{seconds}\nwritten to {}", out.display())
+}

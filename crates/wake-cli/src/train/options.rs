@@ -1,0 +1,95 @@
+//! What every run is told on the command line.
+
+use std::path::PathBuf;
+
+use clap::{Arg, Args};
+use wake_nn::burn::tensor::Device;
+use wake_nn::device_named;
+use wake_train::{Result, StageOptions};
+
+/// Where a run begins and ends, and what it computes on.
+#[derive(Args, Clone)]
+pub(crate) struct Place {
+    /// Steps between checkpoints, and what is written of the results
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) every: u32,
+    /// Seed of everything that is drawn, simulated pairs included
+    #[arg(long, default_value_t = 7)]
+    pub(crate) seed: u64,
+    /// Go on from the newest checkpoint in --out
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// flex, ndarray, wgpu or cuda, where compiled in; a comma between several
+    #[arg(long, default_value = "flex")]
+    device: String,
+    /// Folder of the results, made if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// How long a run is, and how fast.
+#[derive(Args, Clone)]
+pub(crate) struct Pace {
+    /// Steps
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) steps: u32,
+    /// Examples of a batch
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    batch: u16,
+    /// Largest step of the optimizer
+    #[arg(long)]
+    rate: f64,
+}
+
+/// What spares memory, and some precision.
+#[derive(Args, Clone)]
+pub(crate) struct Thrift {
+    /// Keep less for the way back through the model, and compute it again; slower
+    #[arg(long)]
+    pub(crate) checkpointing: bool,
+    /// Compute losses and gradients in bfloat16, where the device can; weights keep 32 bits
+    #[arg(long)]
+    pub(crate) bf16: bool,
+}
+
+/// Defaults of one subcommand, by the names of its options.
+pub(crate) fn defaults(
+    values: &'static [(&'static str, &'static str)],
+) -> impl FnMut(Arg) -> Arg + 'static {
+    move |arg| {
+        let found = values.iter().find(|(name, _)| arg.get_id() == *name);
+        match found {
+            Some((_, value)) => arg.required(false).default_value(value),
+            None => arg,
+        }
+    }
+}
+
+impl Place {
+    /// The devices, outside autodiff.
+    pub(crate) fn devices(&self) -> Result<Vec<Device>> {
+        let devices = self.device.split(',').map(device_named);
+        Ok(devices.collect::<wake_nn::Result<_>>()?)
+    }
+
+    /// How a stage runs that takes what is usual for it.
+    pub(crate) fn stage(&self) -> Result<StageOptions> {
+        Ok(StageOptions {
+            every: self.every as usize,
+            seed: self.seed,
+            resume: self.resume,
+            devices: self.devices()?,
+            ..StageOptions::default()
+        })
+    }
+
+    /// How a stage runs at a pace.
+    pub(crate) fn paced(&self, pace: &Pace) -> Result<StageOptions> {
+        Ok(StageOptions {
+            steps: Some(pace.steps as usize),
+            batch: Some(usize::from(pace.batch)),
+            rate: Some(pace.rate),
+            ..self.stage()?
+        })
+    }
+}

@@ -1,0 +1,79 @@
+//! A small model of Stable Diffusion's kind is learnt from nothing, from images and prompts alone.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use wake_dataset::Recipe;
+use wake_train::{PipelineTraining, TrainingPairs};
+
+use super::options::{Pace, Place};
+use super::screen::Screen;
+use super::source::{check_memory, folder};
+use crate::exit::Outcome;
+
+/// What is simulated without --data: the recipe `ranges` with the ship in the middle, of whose place prompts say nothing.
+const RECIPE: &str = r#"
+base = "paper"
+speckle = false
+scene.grid = { rows = 256, columns = 256, spacing = 4.0 }
+scene.model.tolerance = 1e-2
+[draw]
+count = { one_of = [0, 1], weights = [1, 4] }
+"ship.speed" = [6.0, 12.0]
+"ship.heading" = [0.0, 360.0]
+"sea.wind_speed" = [3.0, 7.0]
+"sea.wind_toward" = [0.0, 360.0]
+"sea.fetch" = { log = [10e3, 70e3] }
+"radar.incidence" = [16.0, 32.0]
+"#;
+
+/// Defaults of the options that all runs have.
+pub(crate) const DEFAULTS: &[(&str, &str)] = &[
+    ("steps", "5000"),
+    ("batch", "16"),
+    ("rate", "5e-4"),
+    ("every", "1000"),
+    ("out", "out/text_to_image"),
+];
+
+/// Train a small model of Stable Diffusion's layout from nothing, on images and prompts alone.
+///
+/// The autoencoder first, then text encoder and U-Net together; `wake generate --weights`, `wake evaluate --text-to-image` and
+/// `wake train fine-tune --weights` read the model.
+#[derive(Args)]
+pub(crate) struct Options {
+    /// Folder that `wake dataset` wrote; without it, pairs are simulated first
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Pairs to simulate where there is no --data
+    #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
+    count: u64,
+    /// Steps of the autoencoder; --steps are those of text encoder and U-Net
+    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
+    autoencoder_steps: u32,
+    #[command(flatten)]
+    pace: Pace,
+    #[command(flatten)]
+    place: Place,
+}
+
+pub(crate) fn run(options: &Options) -> Outcome<()> {
+    let constants = options.place.paced(&options.pace)?;
+    let pairs = match &options.data {
+        Some(path) => TrainingPairs::folder(folder(path)?),
+        None => {
+            let recipe = Recipe::from_toml(RECIPE)?;
+            TrainingPairs::simulated(recipe, options.place.seed, options.count)?
+        }
+    };
+    let training = PipelineTraining {
+        pairs: &pairs,
+        autoencoder_steps: Some(options.autoencoder_steps as usize),
+        options: constants,
+    };
+    training.check()?;
+    check_memory(pairs.len(), training.bytes())?;
+    let screen = Screen::new(&options.place.out);
+    training.train(&options.place.out, &screen.watch())?;
+    screen.end()
+}
