@@ -60,5 +60,3 @@ pub use wake_model::{WakeStage, WakeTraining};
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;
-#[cfg(test)]
-mod numbers;
