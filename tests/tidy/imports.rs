@@ -289,10 +289,13 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Whether a file holds nothing but the tests of its neighbour.
+/// Whether a file holds nothing but the tests of its neighbour, or of that of its folder.
 fn is_test(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    stem == "tests" || stem.ends_with("_tests")
+    let inside = path
+        .parent()
+        .is_some_and(|folder| folder.ends_with("tests"));
+    inside || stem == "tests" || stem.ends_with("_tests")
 }
 
 #[cfg(test)]

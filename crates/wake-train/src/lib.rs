@@ -65,5 +65,3 @@ pub use wake_model::{WakeStage, WakeTraining};
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;
-#[cfg(test)]
-mod numbers;

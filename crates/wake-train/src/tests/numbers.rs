@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use wake_physics::Scene;
 
-use super::{Checkpoint, RunFolder, Tensors};
+use crate::{Checkpoint, RunFolder, Tensors};
 use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::network::{Domain, WakeModelConfig};
@@ -96,7 +96,6 @@ proptest! {
 }
 
 /// The side of a pixel stands as text in the header of a learnt sea.
-#[cfg(feature = "flex")]
 #[test]
 fn the_pixels_of_a_learnt_sea() {
     use wake_ldm::sea_texture::{SeaFlow, SeaStyle, SeaTexture};
