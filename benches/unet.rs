@@ -18,9 +18,9 @@ use std::time::Instant;
 
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{Criterion, criterion_group};
+use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
 use wake_nn::attention::attention;
 use wake_nn::resnet::{ResnetBlock, ResnetShape};
-use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
 
 fn random<const D: usize>(shape: [usize; D], device: &Device) -> Tensor<D> {
     Tensor::random(shape, Distribution::Normal(0.0, 1.0), device)

@@ -22,12 +22,12 @@ use wake_dataset::{Folder, Recipe};
 use wake_ldm::network::{PatchTransform, WakeModelConfig};
 use wake_ldm::pipeline::Pipeline;
 use wake_ldm::scheduler::SchedulerConfig;
-use wake_train::{Checkpoint, Metrics};
 use wake_ldm::unet::UNetConfig;
 use wake_nn::weights::{Layout, load};
 use wake_physics::Scene;
-use whole_files::{checksum, sealed};
 use wake_text::{PartialScene, TOKENS, Tokenizer};
+use wake_train::{Checkpoint, Metrics};
+use whole_files::{checksum, sealed};
 
 /// No sentence about an input is longer [characters].
 const LONGEST: usize = 4000;

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
-use wake_nn::Error;
 use wake_ldm::lora::merge_lora;
 use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetConfig, UNetInput};
+use wake_nn::Error;
 use wake_nn::weights::Layout;
 
 use crate::golden::{Golden, devices, expect, largest, numbers, own_folder};

@@ -3,11 +3,11 @@
 use crate::golden::{Golden, folder, json};
 use burn::tensor::{Device, Tensor, TensorData};
 use serde_json::Value;
+use wake_physics::Field;
+use wake_physics::measure::{Binning, radial_spectrum};
 use wake_train::metrics::{
     Lpips, LpipsNetwork, Plane, SsimWindow, mean_square_error, psnr, ssim, ssim_map,
 };
-use wake_physics::Field;
-use wake_physics::measure::{Binning, radial_spectrum};
 
 /// Values of images are f32 and sums f64, as in the reference: only the order of sums differs.
 const ROUNDING: f64 = 1e-9;

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use burn::tensor::Tensor;
 use serde_json::Value;
-use wake_nn::Error;
 use wake_ldm::pipeline::{Pipeline, Request, StartImage, to_bytes};
 use wake_ldm::scheduler::SchedulerConfig;
+use wake_nn::Error;
 use wake_text::Tokenizer;
 
 use crate::golden::{Golden, devices, expect, folder, json, largest, numbers, own_folder};

@@ -1,9 +1,9 @@
 //! Models and weight files in half precision: as near as the numbers' own width allows.
 
 use burn::tensor::{DType, Tensor};
-use wake_nn::Error;
 use wake_ldm::autoencoder::AutoencoderKl;
 use wake_ldm::unet::UNetInput;
+use wake_nn::Error;
 use wake_nn::weights::{self, Layout, Precision};
 
 use crate::golden::{Golden, devices, difference, folder, json, largest, numbers};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use burn::tensor::Tensor;
-use wake_nn::Error;
 use wake_ldm::pipeline::{Pipeline, Prompts, Request, StartImage};
 use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
+use wake_nn::Error;
 
 use crate::golden::{devices, difference, folder, numbers};
 

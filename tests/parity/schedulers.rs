@@ -2,10 +2,10 @@
 
 use burn::tensor::{Device, Tensor};
 use serde_json::Value;
-use wake_nn::Error;
 use wake_ldm::scheduler::{
     NoiseLevel, NoiseSchedule, Scheduler, SchedulerConfig, StepInput, TerminalSnr,
 };
+use wake_nn::Error;
 
 use crate::golden::{Golden, devices, difference, folder, json, largest, numbers, tensor};
 

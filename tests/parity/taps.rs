@@ -11,6 +11,7 @@ use burn::tensor::activation::silu;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use safetensors::tensor::TensorView;
 use serde_json::Value;
+use wake_ldm::text::ClipText;
 use wake_nn::attention::CrossAttention;
 use wake_nn::feed_forward::FeedForward;
 use wake_nn::norm::GroupNorm;
@@ -18,7 +19,6 @@ use wake_nn::resample::{Downsample, Upsample};
 use wake_nn::resnet::{ResnetBlock, ResnetShape};
 use wake_nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
 use wake_nn::transformer::{Transformer2d, TransformerShape};
-use wake_ldm::text::ClipText;
 use wake_nn::weights::{self, Layout};
 
 use crate::golden::{Golden, devices, expect, folder, json, largest, numbers};

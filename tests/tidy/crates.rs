@@ -43,15 +43,28 @@ fn crates_do_not_know_what_they_may_not() {
         (
             "wake-detector",
             "flex",
-            &["wake-physics", "wake-text", "wake-dataset", "wake-ldm", "tokenizers"],
+            &[
+                "wake-physics",
+                "wake-text",
+                "wake-dataset",
+                "wake-ldm",
+                "tokenizers",
+            ],
         ),
     ];
     for (name, features, forbidden) in cases {
         let found = dependencies(name, features);
         let wrong: Vec<&String> = found
             .iter()
-            .filter(|other| forbidden.iter().any(|f| other.as_str() == *f || (f.ends_with('-') && other.starts_with(f))))
+            .filter(|other| {
+                forbidden
+                    .iter()
+                    .any(|f| other.as_str() == *f || (f.ends_with('-') && other.starts_with(f)))
+            })
             .collect();
-        assert!(wrong.is_empty(), "{name} with '{features}' depends on {wrong:?}");
+        assert!(
+            wrong.is_empty(),
+            "{name} with '{features}' depends on {wrong:?}"
+        );
     }
 }

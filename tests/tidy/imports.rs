@@ -106,6 +106,13 @@ impl Crate {
         all.any(|path| path[0] == name)
     }
 
+    /// Whether a file names an item of this crate by the path `crate::…` that ends so.
+    pub(crate) fn names_item(&self, module: &Names, item: &[&str]) -> bool {
+        let file = &self.files[module];
+        let mut all = file.paths.iter().chain(file.names.values());
+        all.any(|path| path[0] == "crate" && path[1..] == *item)
+    }
+
     /// Files that import each other round in a circle: each such set.
     pub(crate) fn circles(&self) -> Vec<Vec<Names>> {
         let reach: BTreeMap<&Names, BTreeSet<Names>> = self

@@ -234,6 +234,51 @@ fn code_of_the_front_page_is_compiled() {
     }
 }
 
+/// Each page of physics quotes formulas, and each formula stands line for line in the documentation of the module that
+/// it is quoted from.
+#[test]
+fn formulas_of_the_pages_are_those_of_the_code() {
+    let physics = root().join("crates/wake-physics/src");
+    let mut wrong = Vec::new();
+    let pages = pages::pages(&root().join("docs/physics"));
+    assert!(pages.len() >= 6, "only {} pages of physics", pages.len());
+    for page in pages {
+        let quoted = pages::quoted_formulas(&fs::read_to_string(&page).expect("a page"));
+        if quoted.is_empty() {
+            wrong.push(format!("{}: quotes no formula of a module", page.display()));
+        }
+        for (module, lines) in quoted {
+            let path = physics.join(module.replace("::", "/"));
+            let files = [path.with_extension("rs"), path.join("mod.rs")];
+            let source = files.iter().find_map(|file| fs::read_to_string(file).ok());
+            let blocks = pages::documented_formulas(&source.unwrap_or_default());
+            let stands = blocks.iter().any(|block| {
+                !lines.is_empty() && block.windows(lines.len()).any(|part| part == lines)
+            });
+            if !stands {
+                let formula = lines.join("\n");
+                wrong.push(format!("{}: not in {module}:\n{formula}", page.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The rooms that read `Scene` are those that the page names.
+#[test]
+fn the_readers_of_the_scene_are_those_of_the_page() {
+    let page = page();
+    let (code, rooms) = (read("wake-physics"), rooms(&page, "wake-physics"));
+    let paths = [&["scene", "Scene"][..], &["Scene"]];
+    let readers = code.files.keys().filter(|module| !module.is_empty());
+    let readers = readers.filter(|module| paths.iter().any(|path| code.names_item(module, path)));
+    let mut readers: BTreeSet<String> = readers.map(|module| module[0].clone()).collect();
+    readers.insert("scene".to_owned());
+    assert!(rooms.len() > readers.len());
+    let named = pages::listed(&page, "`Scene` is read by");
+    assert_eq!(named, readers, "page and code name other readers");
+}
+
 /// Asserts that a file of the documentation is what the code makes of it, or writes it where `DRAW` is set.
 fn is_drawn(name: &str, drawn: &str) {
     let path = root().join(name);

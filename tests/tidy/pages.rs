@@ -105,6 +105,56 @@ pub(crate) fn rust_blocks(text: &str) -> Vec<Vec<String>> {
     blocks
 }
 
+/// Formulas that a page quotes from a module: blocks fenced as `text` with the path of a module, as (path, lines).
+pub(crate) fn quoted_formulas(text: &str) -> Vec<(String, Vec<String>)> {
+    let mut found = Vec::new();
+    let mut block: Option<(String, Vec<String>)> = None;
+    for line in text.lines() {
+        match (&mut block, line.strip_prefix("```")) {
+            (None, Some(kind)) => {
+                let path = kind.strip_prefix("text ").unwrap_or_default();
+                block = Some((path.trim().to_owned(), Vec::new()));
+            }
+            (Some(_), Some(_)) => found.extend(block.take().filter(|(path, _)| !path.is_empty())),
+            (Some((_, lines)), None) => lines.extend(words(line)),
+            (None, None) => {}
+        }
+    }
+    found
+}
+
+/// Formulas in the documentation of a module: the lines of each of its blocks of text.
+pub(crate) fn documented_formulas(source: &str) -> Vec<Vec<String>> {
+    let mut found = Vec::new();
+    let mut block: Option<Vec<String>> = None;
+    for line in source.lines() {
+        let line = line.trim_start();
+        let comment = line.strip_prefix("//!").or(line.strip_prefix("///"));
+        match (&mut block, comment.map(str::trim)) {
+            (None, Some("```text")) => block = Some(Vec::new()),
+            (Some(_), Some("```")) => found.extend(block.take()),
+            (Some(lines), Some(line)) => lines.extend(words(line)),
+            (_, None) => block = None,
+            _ => {}
+        }
+    }
+    found
+}
+
+/// A line with single spaces between its words; none of an empty one.
+fn words(line: &str) -> Option<String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    (!words.is_empty()).then(|| words.join(" "))
+}
+
+/// The words in backticks of the sentence that begins so.
+pub(crate) fn listed(text: &str, beginning: &str) -> BTreeSet<String> {
+    let start = text.find(beginning).expect(beginning) + beginning.len();
+    let sentence = text[start..].split([';', '.']).next().unwrap_or_default();
+    let names = sentence.split('`').skip(1).step_by(2);
+    names.map(str::to_owned).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,6 +167,23 @@ mod tests {
             anchor("## How far the arms open").as_deref(),
             Some("how-far-the-arms-open")
         );
+    }
+
+    #[test]
+    fn formulas_are_quoted_with_their_module() {
+        let page = "```text sar::geometry\na =  b\n\nc = d\n```\n```text\nno\n```\n```rust\nlet a = b;\n```";
+        let lines = ["a = b", "c = d"].map(str::to_owned).to_vec();
+        assert_eq!(
+            quoted_formulas(page),
+            [("sar::geometry".to_owned(), lines.clone())]
+        );
+        let source = "//! ```text\n//! a = b\n//!  c = d\n//! ```\n    /// ```\n    /// a();\n    /// ```\nfn a() {}";
+        assert_eq!(documented_formulas(source), [lines]);
+        let list = listed(
+            "So `a` is read by `b`, `c` and `d`; `e` is not.",
+            "`a` is read by",
+        );
+        assert_eq!(list, ["b", "c", "d"].map(str::to_owned).into());
     }
 
     #[test]

@@ -321,6 +321,9 @@ fn assigned(key: &str, value: &str) -> Result<Scene> {
     Scene::default().with_assignments(&[
         "ship.hull=full",
         "radar.range_resolution=10",
+        "ship.echo=true",
+        "ship.edge=true",
+        "radar.ambiguity=-25",
         "radar.pulse_rate=1000",
         &format!("{key}={value}"),
     ])

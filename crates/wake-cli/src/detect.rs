@@ -1,13 +1,18 @@
 //! `wake detect`: searches images, draws them with their wakes, and tells them as JSON.
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use indicatif::ProgressBar;
 use serde_json::{Map, Value, json};
 use wake_detector::drawing::Drawing;
-use wake_detector::{Detection, Detector, Finder, GreyImage, image_files};
+use wake_detector::{
+    Detection, Detector, Finder, GreyImage, image_files, image_name, picture_name,
+};
+use whole_files::make_folder;
 
 use crate::exit::{self, Outcome};
-use crate::{named, progress};
+use crate::{named, picture, progress};
 
 /// How wakes are looked for.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +26,7 @@ enum Method {
 /// Find ship wakes in radar images.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Arguments {
-    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them
+    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them, whose *.wakes.png are left out
     #[arg(required = true, value_name = "FILE|DIR")]
     images: Vec<PathBuf>,
     /// Pixel spacing [m]; without it the scale comes from the image
@@ -47,48 +52,81 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
-/// Draws each image with its wakes into `--out`, and prints every wake by tip, axis, half-angle, visible length and score.
+/// Prints every wake by tip, axis, half-angle, visible length and score, and draws the wakes of `NAME` into `NAME.wakes.png`
+/// in `--out`. Files of a folder that cannot be read are named, and the others are searched.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let files = image_files(&arguments.images)?;
-    let finder = match arguments.method {
-        Method::Radon => Finder::Radon,
+    let finder = finder(arguments)?;
+    let bar = progress::bar(files.len() as u64, "images");
+    let mut told = Told::default();
+    let searched = search(&files, &finder, arguments, &mut told, &bar);
+    bar.finish_and_clear();
+    // Also when the search ended early: what was found until then is told.
+    if arguments.json && !told.images.is_empty() {
+        let told = json!({ "images": told.images, "unread": told.unread });
+        exit::say(&format!("{told:#}"))?;
+    }
+    searched?;
+    match told.unread.len() {
+        0 => Ok(()),
+        count => Err(format!("{count} of {} images were not read; see above", files.len()).into()),
+    }
+}
+
+fn finder(arguments: &Arguments) -> Outcome<Finder> {
+    match arguments.method {
+        Method::Radon => Ok(Finder::Radon),
         Method::Network => {
             let weights = arguments.weights.as_deref();
             let detector = named::network(weights, &arguments.device, arguments.least_score)?;
-            Finder::from(match arguments.spacing {
+            Ok(Finder::from(match arguments.spacing {
                 Some(metres) => detector.with_spacing(metres)?,
                 None => detector,
-            })
+            }))
         }
-    };
-    // What cannot be read leaves no folder behind.
-    let first = GreyImage::read(&files[0])?;
-    whole_files::make_folder(&arguments.out)?;
-    let bar = progress::bar(files.len() as u64, "images");
-    let mut told = Map::new();
-    let mut next = Some(first);
-    for file in &files {
-        let image = match next.take() {
-            Some(image) => image,
-            None => GreyImage::read(file)?,
+    }
+}
+
+/// Results by the names of the images.
+#[derive(Default)]
+struct Told {
+    /// The wakes of each image.
+    images: Map<String, Value>,
+    /// Why an image was not read.
+    unread: Map<String, Value>,
+}
+
+/// Searches and draws all files that can be read. A single one that cannot is an error, one of several is noted.
+fn search(
+    files: &[PathBuf],
+    finder: &Finder,
+    arguments: &Arguments,
+    told: &mut Told,
+    bar: &ProgressBar,
+) -> Outcome<()> {
+    for file in files {
+        let name = image_name(file);
+        bar.inc(1);
+        let image = match GreyImage::read(file) {
+            Ok(image) => image,
+            Err(error) if files.len() == 1 => return Err(error.into()),
+            Err(error) => {
+                bar.suspend(|| exit::note(&format!("error: {error}")));
+                told.unread.insert(name, error.to_string().into());
+                continue;
+            }
         };
+        // What cannot be read leaves no folder behind.
+        if told.images.is_empty() {
+            make_folder(&arguments.out)?;
+        }
         let found = finder.find(&image);
         draw(&image, &found, arguments, file)?;
-        let name = file
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
         if !arguments.json {
             bar.suspend(|| exit::say(&summary(&name, &found)))?;
         }
-        told.insert(name, found.iter().map(as_json).collect());
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    let told = json!({ "images": told });
-    if arguments.json {
-        exit::say(&format!("{told:#}"))?;
+        told.images
+            .insert(name, found.iter().map(as_json).collect());
     }
     Ok(())
 }
@@ -105,28 +143,27 @@ fn draw(
         arguments.method == Method::Radon || one.score >= Detector::OPERATING_POINT
     };
     drawing.found(found.iter().filter(sure));
-    let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let path = arguments.out.join(format!("{name}.wakes.png"));
-    drawing
-        .into_picture()
-        .save(&path)
-        .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-    Ok(())
+    let path = arguments.out.join(picture_name(file));
+    picture::write(&drawing.into_picture(), &path)
 }
 
-/// What is said of one image.
+/// The wakes of an image that are likely ones, a line each.
 fn summary(name: &str, found: &[Detection]) -> String {
-    let sure = |one: &&Detection| one.score >= Detector::OPERATING_POINT;
-    let sure: Vec<&Detection> = found.iter().filter(sure).collect();
-    let mut lines = vec![format!("{name}: {} wakes", sure.len())];
-    lines.extend(sure.iter().map(|one| {
+    let sure: Vec<&Detection> = found
+        .iter()
+        .filter(|one| one.score >= Detector::OPERATING_POINT)
+        .collect();
+    let mut text = format!("{name}: {} wakes", sure.len());
+    for one in sure {
         let (wake, [column, row]) = (&one.wake, one.wake.tip);
-        format!(
-            "  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
+        // Writing into a string cannot fail.
+        let _ = write!(
+            text,
+            "\n  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
             one.score, wake.axis_deg, wake.length
-        )
-    }));
-    lines.join("\n")
+        );
+    }
+    text
 }
 
 /// A detection as the program prints it.

@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod exit;
 #[cfg(any(feature = "simulate", feature = "detect"))]
 mod progress;
@@ -20,6 +22,8 @@ mod generate;
 mod detect;
 #[cfg(feature = "detect")]
 mod named;
+#[cfg(feature = "detect")]
+mod picture;
 
 #[cfg(feature = "train")]
 mod sea_images;

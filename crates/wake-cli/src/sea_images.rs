@@ -37,7 +37,7 @@ pub(crate) struct SeaFile {
     pub(crate) mask: Option<PathBuf>,
 }
 
-/// The images of a folder by name, without the masks.
+/// The images of a folder by name, without the masks and the detector's pictures of wakes (`*.wakes.png`).
 pub(crate) fn list(folder: &Path) -> Outcome<Vec<SeaFile>> {
     let place = folder.display();
     let unreadable = |error: std::io::Error| format!("cannot read {place}: {error}");
@@ -47,10 +47,12 @@ pub(crate) fn list(folder: &Path) -> Outcome<Vec<SeaFile>> {
         let ending = path.extension().unwrap_or_default().to_string_lossy();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let is_image = ENDINGS.iter().any(|e| ending.eq_ignore_ascii_case(e));
-        if !is_image || stem.ends_with("_mask") {
+        if !is_image || stem.ends_with("_mask") || stem.ends_with(".wakes") {
             continue;
         }
-        let mask = folder.join(format!("{stem}_mask.png"));
+        let mut mask = path.file_stem().unwrap_or_default().to_owned();
+        mask.push("_mask.png");
+        let mask = folder.join(mask);
         files.push(SeaFile {
             mask: mask.is_file().then_some(mask),
             path,

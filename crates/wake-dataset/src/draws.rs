@@ -2,14 +2,14 @@
 
 use super::distribution::{Distribution, Value, choose, refused};
 use crate::error::{Error, Result};
-use wake_nn::noise::NoiseSource;
 use crate::streams;
 use serde::de::Error as _;
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
-use wake_physics::scene::Ship;
+use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
+use wake_physics::scene::Ship;
 use whole_files::sentence;
 
 /// Distributions by the path of their value, such as `ship.speed`.
@@ -47,6 +47,11 @@ const SENSOR: &str = "radar.sensor";
 const POSITION: &str = "ship.position";
 /// The position that is drawn in the image.
 const ANYWHERE: &str = "anywhere";
+/// Keys of a ship that only an echo or the edges of its wake have: a ship that is drawn without has none of them.
+const NEEDS: [(&str, &[&str]); 2] = [
+    ("echo", &["roll"]),
+    ("edge", &["edge_time", "edge_outflow"]),
+];
 /// Keys that cannot be drawn, and why.
 const REFUSED: [(&str, &str); 3] = [
     ("seed", "no key: every scene has a seed of its own"),
@@ -319,6 +324,11 @@ fn ship(
             }
             ("ship.length", Value::Number(length)) => with_length(&mut ship, tenths(*length)),
             _ => set(&mut ship, key, toml(&value, false))?,
+        }
+    }
+    for (of, keys) in NEEDS {
+        if ship.get(of).and_then(toml::Value::as_bool) != Some(true) {
+            ship.retain(|key, _| !keys.contains(&key.as_str()));
         }
     }
     Ok(ship.into())

@@ -4,16 +4,16 @@ use super::recipe::{Draw, Recipe};
 use super::scenes::{PAPER_SCENES, Simulated};
 use super::shuffle::shuffled;
 use crate::error::{Error, Result};
-use wake_nn::check_range;
-use whole_files::read_text;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use wake_nn::check_range;
 use wake_physics::Plan;
-use whole_files::{sealed, unsealed};
 use wake_physics::grey::GreyScale;
+use whole_files::read_text;
+use whole_files::{sealed, unsealed};
 
 /// Version of the layout; a reader refuses others.
 const FORMAT: u32 = 5;

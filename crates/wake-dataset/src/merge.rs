@@ -4,8 +4,8 @@ use super::layout::{Layout, Manifest, Shard, broken, cannot};
 use super::metadata::{Rows, parse};
 use super::write::{claim, finish, is_text};
 use crate::error::Result;
-use whole_files::read_text;
 use std::path::{Path, PathBuf};
+use whole_files::read_text;
 
 /// Folder of a shard below that of its set.
 pub fn shard_folder(folder: &Path, shard: Shard) -> PathBuf {

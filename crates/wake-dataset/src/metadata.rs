@@ -9,8 +9,8 @@ use std::fs::{File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use wake_physics::Scene;
-use whole_files::{checksum, sealed, unsealed};
 use wake_physics::scene::Ship;
+use whole_files::{checksum, sealed, unsealed};
 
 /// One pair as a line of `metadata.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

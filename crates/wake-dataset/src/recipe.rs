@@ -5,9 +5,9 @@ use crate::error::{Error, Result};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::path::Path;
+use wake_physics::Scene;
 use wake_physics::grey::GreyScale;
 use wake_physics::scene::Grid;
-use wake_physics::Scene;
 use whole_files::sentence;
 
 /// The recipe of a detector.

@@ -2,10 +2,10 @@
 
 use super::recipe::{Draw, Recipe};
 use crate::error::Result;
-use wake_nn::noise::NoiseSource;
-use crate::streams;
 use crate::sea::Sea;
+use crate::streams;
 use std::sync::Arc;
+use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
 use wake_physics::scene::paper_grid;
 use wake_text::{PartialScene, Wording};
@@ -414,6 +414,28 @@ mod tests {
             let json = serde_json::to_string(&recipe).unwrap();
             assert_eq!(serde_json::from_str::<Recipe>(&json).unwrap(), recipe);
         }
+    }
+
+    /// Echo and roll, edges and their response are drawn apart: a ship without the one has none of the other, as a scene
+    /// must.
+    #[test]
+    fn a_ship_has_only_the_keys_that_act() {
+        let changes = [
+            "draw.count = 1",
+            "draw.ship.roll = [0.1, 0.4]",
+            "draw.ship.edge_time = [100, 200]",
+            "draw.ship.echo = { one_of = [true, false] }",
+            "draw.ship.edge = { one_of = [false, true] }",
+        ];
+        let recipe = Recipe::default().with_assignments(&changes).unwrap();
+        let source = Simulated::new(recipe, 1).unwrap();
+        let mut seen = BTreeSet::new();
+        for index in 0..40 {
+            let ship = &source.scene(index).unwrap().ships[0];
+            assert_eq!((ship.roll > 0.0, ship.edge_time.is_some()), (ship.echo, ship.edge));
+            seen.insert((ship.echo, ship.edge));
+        }
+        assert_eq!(seen.len(), 4);
     }
 
     #[test]

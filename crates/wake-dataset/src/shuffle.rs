@@ -1,7 +1,7 @@
 //! Orders of things, each once a round, without a list of them.
 
-use wake_nn::noise::NoiseSource;
 use crate::streams;
+use wake_nn::noise::NoiseSource;
 
 /// Rounds of the network that shuffles.
 const ROUNDS: u32 = 6;

@@ -2,12 +2,12 @@
 
 use super::*;
 use crate::error::{Error, Result};
-use wake_nn::noise::NoiseSource;
-use wake_physics::{Field, Scene};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use wake_nn::noise::NoiseSource;
+use wake_physics::{Field, Scene};
 use whole_files::{sealed, unsealed};
 
 const COUNT: u64 = 7;

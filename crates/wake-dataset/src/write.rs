@@ -9,9 +9,9 @@ use crate::error::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
-use whole_files::checksum;
 use wake_physics::output;
 use whole_files::FolderLock;
+use whole_files::checksum;
 
 /// How far a data set is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,11 +70,13 @@ pub fn write(
 /// Whether a source makes the pairs of a manifest.
 fn check_source(manifest: &Manifest, source: &Simulated) -> Result<()> {
     let same = source.seed() == manifest.seed && *source.recipe() == manifest.recipe;
-    let refuse = |value: &str, expected: &str| Error::Value(wake_nn::Error::InvalidOption {
-        option: "source".to_owned(),
-        value: value.to_owned(),
-        expected: expected.to_owned(),
-    });
+    let refuse = |value: &str, expected: &str| {
+        Error::Value(wake_nn::Error::InvalidOption {
+            option: "source".to_owned(),
+            value: value.to_owned(),
+            expected: expected.to_owned(),
+        })
+    };
     match (source.sea(), &manifest.sea) {
         _ if !same => Err(refuse(
             "of another recipe or seed",

@@ -10,6 +10,7 @@ use crate::image::GreyImage;
 use crate::maps::Maps;
 use crate::network::{INPUTS, Network, STRIDE};
 use crate::search::{Mapper, Search, find};
+use crate::self_check::self_check;
 use crate::wake::Detection;
 
 /// Finds ship wakes in radar images with a trained network.
@@ -43,13 +44,15 @@ impl Detector {
         Ok(Self::of(network, device))
     }
 
-    /// The network of a file, as training writes it.
+    /// The network of a file, as training writes it, after a check on one fixed image.
     ///
     /// # Errors
     ///
-    /// [`Error::Model`](crate::Error::Model) for a file that is not there or does not fit.
+    /// [`Error::Model`](crate::Error::Model) for a file that is not there or does not fit,
+    /// [`Error::WrongMaps`](crate::Error::WrongMaps) for weights that find nothing in any image, such as equal or huge ones.
     pub fn load(file: &Path, device: &Device) -> Result<Self> {
         let network = load(Network::new(device), Layout::Diffusers, file)?;
+        self_check(&network, file, device)?;
         Ok(Self::of(network, device))
     }
 

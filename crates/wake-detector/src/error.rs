@@ -8,6 +8,8 @@ pub(crate) const LONGEST_SIDE: usize = 20_000;
 pub(crate) const LONGEST_FILE: u64 = 2_000_000_000;
 /// An image takes no more memory while it is read \[bytes\]: 20,000 × 20,000 pixels of 16 bits, and as much again.
 pub(crate) const MOST_MEMORY: u64 = 1_800_000_000;
+/// Text, colour profile and other notes of an image take no more memory \[bytes\].
+pub(crate) const MOST_NOTES: u64 = 64 << 20;
 
 /// What a fallible function of this crate returns.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -80,7 +82,19 @@ pub enum Error {
         max: f64,
     },
 
-    /// Weights or a device that the network cannot take.
+    /// Weights whose maps of a plain wake show nothing.
+    #[error(
+        "the weights in {} on {device} give maps that are {why} for an image with one plain wake; \
+         use weights that `detector train` has written, or the shipped ones",
+        path.display()
+    )]
+    WrongMaps {
+        path: PathBuf,
+        device: String,
+        why: &'static str,
+    },
+
+    /// What loading weights, making images and training find wrong.
     #[error(transparent)]
     Model(#[from] wake_nn::Error),
 }

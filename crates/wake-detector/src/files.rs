@@ -1,17 +1,44 @@
-//! The images of files and folders.
+//! The images of files and folders, and the names of their results.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
 /// Endings of files that are read.
 const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
+/// What the name of a picture of wakes adds to the name of its image.
+const PICTURE: &str = ".wakes.png";
 
-/// The images that a list of files and folders names, in order; those of a folder by name. Files are not opened.
+/// Name of an image in results, unique among those of [`image_files`]: its file name, with bytes that are no UTF-8 as `\xFF`.
+#[must_use]
+pub fn image_name(image: &Path) -> String {
+    let name = image.file_name().unwrap_or_default().as_encoded_bytes();
+    let mut told = String::new();
+    for chunk in name.utf8_chunks() {
+        told.push_str(chunk.valid());
+        for byte in chunk.invalid() {
+            told.push_str(&format!("\\x{byte:02X}"));
+        }
+    }
+    told
+}
+
+/// File name of the picture of an image's wakes: the whole name of the image and `.wakes.png`, so `a.png` and `a.tif` have different ones.
+#[must_use]
+pub fn picture_name(image: &Path) -> OsString {
+    let mut name = image.file_name().unwrap_or_default().to_owned();
+    name.push(PICTURE);
+    name
+}
+
+/// The images that a list of files and folders names, in order. Files are not opened.
+///
+/// The images of a folder are its PNG, JPEG and TIFF files by name, without pictures of wakes ([`picture_name`]).
 ///
 /// # Errors
 ///
-/// [`Error::NoImages`] for a folder without any, [`Error::SameName`] for two files of one name, and [`Error::Io`].
+/// [`Error::NoImages`] for a folder without any, [`Error::SameName`] for two files of one [`image_name`], and [`Error::Io`].
 pub fn image_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {
@@ -20,11 +47,11 @@ pub fn image_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
             false => files.push(path.clone()),
         }
     }
-    let mut names: Vec<_> = files.iter().map(|file| file.file_name()).collect();
+    let mut names: Vec<String> = files.iter().map(|file| image_name(file)).collect();
     names.sort();
     match names.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => Err(Error::SameName {
-            name: pair[0].unwrap_or_default().to_string_lossy().into_owned(),
+            name: pair[0].clone(),
         }),
         None => Ok(files),
     }
@@ -39,7 +66,11 @@ fn of_folder(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let file = entry.map_err(unreadable)?.path();
         let ending = file.extension().unwrap_or_default().to_string_lossy();
-        if ENDINGS.contains(&ending.to_lowercase().as_str()) {
+        let name = file.file_name().unwrap_or_default().as_encoded_bytes();
+        if ENDINGS.contains(&ending.to_lowercase().as_str())
+            && !name.ends_with(PICTURE.as_bytes())
+            && !file.is_dir()
+        {
             found.push(file);
         }
     }
@@ -73,5 +104,41 @@ mod tests {
         let twice = [path("other/c.png"), other];
         let refused = image_files(&twice).unwrap_err();
         assert!(matches!(refused, Error::SameName { name } if name == "c.png"));
+    }
+
+    #[test]
+    fn pictures_of_wakes_and_folders_are_no_images_of_a_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::create_dir(path("b.png")).unwrap();
+        std::fs::write(path("a.png"), "").unwrap();
+        let picture = folder.path().join(picture_name(&path("a.png")));
+        std::fs::write(&picture, "").unwrap();
+        let found = image_files(&[folder.path().to_owned()]).unwrap();
+        assert_eq!(found, [path("a.png")]);
+        // Who names it means it.
+        assert_eq!(
+            image_files(std::slice::from_ref(&picture)).unwrap(),
+            [picture]
+        );
+        assert_ne!(picture_name(&path("a.png")), picture_name(&path("a.tif")));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_that_are_no_utf8_are_told_apart() {
+        use std::ffi::OsStr;
+        use std::os::unix::ffi::OsStrExt;
+        let file = |name: &[u8]| PathBuf::from(OsStr::from_bytes(name));
+        let [one, other] = [b"a\xFF.png", b"a\xFE.png"].map(|name| file(name));
+        assert_eq!(image_name(&one), r"a\xFF.png");
+        assert_ne!(image_name(&one), image_name(&other));
+        assert_ne!(picture_name(&one), picture_name(&other));
+        assert!(image_files(&[one.clone(), other]).is_ok());
+        let spelt = PathBuf::from(r"a\xFF.png");
+        assert!(matches!(
+            image_files(&[one, spelt]),
+            Err(Error::SameName { .. })
+        ));
     }
 }

@@ -1,12 +1,13 @@
 //! Grey images.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use crate::error::{Error, LONGEST_FILE, LONGEST_SIDE, MOST_MEMORY, Result};
+use crate::error::{Error, LONGEST_FILE, LONGEST_SIDE, MOST_MEMORY, MOST_NOTES, Result};
 
 /// Levels as the file has them: a large image takes no more memory than it must.
 #[derive(Debug, Clone)]
@@ -28,32 +29,11 @@ impl GreyImage {
     ///
     /// # Errors
     ///
-    /// [`Error::Unreadable`] for what is no image, [`Error::FileTooLong`], [`Error::TooLarge`] and [`Error::TooMuchMemory`] for one
-    /// that is too large; that is found out before the pixels are read.
+    /// [`Error::Unreadable`] for what is no image or no regular file, [`Error::FileTooLong`], [`Error::TooLarge`] and
+    /// [`Error::TooMuchMemory`] for one that is too large; that is found out before the pixels are read.
     pub fn read(path: &Path) -> Result<Self> {
-        let unreadable = |why: String| Error::Unreadable {
-            path: path.to_owned(),
-            why: why.replace('\n', " "),
-        };
-        let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
-        let bytes = file
-            .metadata()
-            .map_err(|error| unreadable(error.to_string()))?
-            .len();
-        if bytes > LONGEST_FILE {
-            return Err(Error::FileTooLong {
-                path: path.to_owned(),
-                bytes,
-            });
-        }
-        let wrong = |error: ImageError| unreadable(error.to_string());
-        let mut reader = ImageReader::new(BufReader::new(file))
-            .with_guessed_format()
-            .map_err(|error| unreadable(error.to_string()))?;
-        let mut limits = Limits::no_limits();
-        limits.max_alloc = Some(MOST_MEMORY);
-        reader.limits(limits);
-        let decoder = reader.into_decoder().map_err(wrong)?;
+        let mut decoder = decoder(path)?;
+        let wrong = |error: ImageError| unreadable(path, error);
         let (columns, rows) = decoder.dimensions();
         let allowed = 1..=LONGEST_SIDE as u32;
         if !allowed.contains(&columns) || !allowed.contains(&rows) {
@@ -63,13 +43,8 @@ impl GreyImage {
                 rows,
             });
         }
-        let bytes = decoder.total_bytes();
-        if bytes > MOST_MEMORY {
-            return Err(Error::TooMuchMemory {
-                path: path.to_owned(),
-                bytes,
-            });
-        }
+        check_memory(path, decoder.total_bytes())?;
+        decoder.set_limits(limits(MOST_MEMORY)).map_err(wrong)?;
         let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
         let levels = match image {
             DynamicImage::ImageLuma16(image) => Levels::Sixteen(image.into_raw()),
@@ -177,6 +152,62 @@ impl GreyImage {
     }
 }
 
+/// Opens a file and reads what lies before its pixels: a colour profile above [`MOST_NOTES`] is left out, longer text refused.
+fn decoder(path: &Path) -> Result<impl ImageDecoder> {
+    let io = |error: std::io::Error| unreadable(path, error);
+    // Opening a pipe would wait for somebody to write into it.
+    let found = std::fs::metadata(path).map_err(io)?;
+    if !found.is_file() {
+        return Err(unreadable(path, "no regular file"));
+    }
+    let bytes = found.len();
+    if bytes > LONGEST_FILE {
+        return Err(Error::FileTooLong {
+            path: path.to_owned(),
+            bytes,
+        });
+    }
+    let file = File::open(path).map_err(io)?;
+    let mut reader = ImageReader::new(BufReader::new(file))
+        .with_guessed_format()
+        .map_err(io)?;
+    if reader.format() == Some(ImageFormat::Jpeg) {
+        // It is read as a whole, and its notes are copied, then joined.
+        check_memory(path, 3 * bytes)?;
+    }
+    reader.limits(limits(MOST_NOTES));
+    reader.into_decoder().map_err(|error| match error {
+        ImageError::Limits(_) => unreadable(
+            path,
+            format!("its text is longer than {} MiB", MOST_NOTES >> 20),
+        ),
+        error => unreadable(path, error),
+    })
+}
+
+fn unreadable(path: &Path, why: impl Display) -> Error {
+    Error::Unreadable {
+        path: path.to_owned(),
+        why: why.to_string().replace('\n', " "),
+    }
+}
+
+fn check_memory(path: &Path, bytes: u64) -> Result<()> {
+    match bytes <= MOST_MEMORY {
+        true => Ok(()),
+        false => Err(Error::TooMuchMemory {
+            path: path.to_owned(),
+            bytes,
+        }),
+    }
+}
+
+fn limits(memory: u64) -> Limits {
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(memory);
+    limits
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,10 +251,7 @@ mod tests {
         };
         let mut good = Vec::new();
         image::GrayImage::new(40, 40)
-            .write_to(
-                &mut std::io::Cursor::new(&mut good),
-                image::ImageFormat::Png,
-            )
+            .write_to(&mut std::io::Cursor::new(&mut good), ImageFormat::Png)
             .expect("a PNG");
         for bytes in [
             &b""[..],
@@ -254,6 +282,92 @@ mod tests {
             .expect("a file");
         let sentence = GreyImage::read(&path).expect_err("too long").to_string();
         assert!(sentence.contains("2000000001 bytes"), "{sentence}");
+    }
+
+    /// A chunk of a PNG file.
+    fn chunk(kind: &[u8; 4], content: &[u8]) -> Vec<u8> {
+        let named = [kind, content].concat();
+        let length = (content.len() as u32).to_be_bytes();
+        [&length, &named[..], &crc(&named).to_be_bytes()].concat()
+    }
+
+    /// An image of 40 × 40 pixels with a chunk more behind its header.
+    fn with_chunk(chunk: &[u8]) -> Vec<u8> {
+        let mut good = std::io::Cursor::new(Vec::new());
+        image::GrayImage::new(40, 40)
+            .write_to(&mut good, ImageFormat::Png)
+            .expect("a PNG");
+        let good = good.into_inner();
+        // Mark and header take 33 bytes.
+        [&good[..33], chunk, &good[33..]].concat()
+    }
+
+    /// Zeros packed by zlib, 2,064 in 13 bytes: behind the first each is a copy of 258 from one place back.
+    fn packed_zeros(blocks: usize) -> Vec<u8> {
+        let mut bits: Vec<u8> = vec![1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0];
+        let copy = [1, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0];
+        bits.extend((0..8 * blocks).flat_map(|_| copy));
+        bits.extend([0; 7]);
+        let byte = |bits: &[u8]| bits.iter().rev().fold(0, |byte, bit| 2 * byte + bit);
+        let sum = (((1 + 2064 * blocks) % 65_521) << 16 | 1) as u32;
+        let packed: Vec<u8> = bits.chunks(8).map(byte).collect();
+        [&[0x78, 0x01], &packed[..], &sum.to_be_bytes()].concat()
+    }
+
+    /// A profile of 206 MB in 1.3 MB: the image is read without it. One of 206 kB is kept.
+    #[test]
+    fn a_long_colour_profile_is_not_unpacked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        for (blocks, kept) in [(100, true), (100_000, false)] {
+            let profile = chunk(b"iCCP", &[b"a\0\0", &packed_zeros(blocks)[..]].concat());
+            std::fs::write(&path, with_chunk(&profile)).expect("a file");
+            let read = decoder(&path).expect("an image").icc_profile();
+            let read = read
+                .expect("a profile or none")
+                .map(|profile| profile.len());
+            assert_eq!(read, kept.then_some(1 + 2064 * blocks));
+            assert_eq!(GreyImage::read(&path).expect("an image").rows, 40);
+        }
+    }
+
+    /// Text of a gigabyte in a PNG, segments of a gigabyte in a JPEG, without a byte on the disk: both are refused before.
+    #[test]
+    fn long_text_is_refused_before_it_is_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.png");
+        let refusal = |start: &[u8]| {
+            std::fs::write(&path, start).expect("a file");
+            let file = File::options().write(true).open(&path);
+            file.and_then(|file| file.set_len(1_000_000_000))
+                .expect("a file");
+            GreyImage::read(&path).expect_err("too long").to_string()
+        };
+        let text = with_chunk(&[&900_000_000_u32.to_be_bytes()[..], b"tEXta\0"].concat());
+        let sentence = refusal(&text[..33 + 10]);
+        assert!(
+            sentence.contains("text is longer than 64 MiB"),
+            "{sentence}"
+        );
+        let sentence = refusal(&[0xFF, 0xD8, 0xFF, 0xE1, 0xFF, 0xFF]);
+        assert!(sentence.contains("takes 3000000000 bytes"), "{sentence}");
+    }
+
+    /// Waiting for somebody who writes into a pipe would never end.
+    #[cfg(unix)]
+    #[test]
+    fn pipes_and_devices_are_refused_at_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join("a.png");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.expect("mkfifo").success());
+        for path in [pipe, "/dev/zero".into(), folder.path().to_owned()] {
+            let (sender, receiver) = std::sync::mpsc::channel();
+            std::thread::spawn(move || sender.send(GreyImage::read(&path).map(|_| ())));
+            let ended = receiver.recv_timeout(std::time::Duration::from_secs(20));
+            let sentence = ended.expect("an end").expect_err("no file").to_string();
+            assert!(sentence.contains("no regular file"), "{sentence}");
+        }
     }
 
     /// The cyclic redundancy check of PNG, bit by bit.

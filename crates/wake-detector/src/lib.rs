@@ -9,6 +9,7 @@ mod scaling;
 mod wake;
 
 pub mod network;
+pub mod self_check;
 
 mod maps;
 mod search;
@@ -24,7 +25,7 @@ mod finder;
 pub use burn;
 pub use detector::Detector;
 pub use error::{Error, Result};
-pub use files::image_files;
+pub use files::{image_files, image_name, picture_name};
 pub use finder::Finder;
 pub use image::GreyImage;
 pub use wake::{Detection, Wake, angle_of, direction};

@@ -78,8 +78,8 @@ impl Source for Sampled {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
-    use wake_dataset::{Loader, Recipe};
     use burn::tensor::Device;
+    use wake_dataset::{Loader, Recipe};
 
     fn sampled(changes: &[&str]) -> Result<Sampled> {
         let sampler = WakeSampler::pretrained(&Device::flex())?.with_steps(1)?;

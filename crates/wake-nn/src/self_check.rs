@@ -31,11 +31,7 @@ pub struct Stage {
 
 impl Stage {
     /// The results of one function on two devices.
-    pub fn new<const D: usize>(
-        name: &'static str,
-        reference: Tensor<D>,
-        found: Tensor<D>,
-    ) -> Self {
+    pub fn new<const D: usize>(name: &'static str, reference: Tensor<D>, found: Tensor<D>) -> Self {
         let numbers = |x: Tensor<D>| x.into_data().iter::<f32>().collect();
         Self {
             name,

@@ -10,10 +10,10 @@
 //! ```
 
 use crate::error::Result;
-use whole_files::write_atomically;
 use crate::raster::Field;
 use image::{ImageBuffer, Luma};
 use std::path::Path;
+use whole_files::write_atomically;
 
 /// What the header of a `NumPy` file is aligned to \[bytes\].
 const NPY_ALIGNMENT: usize = 64;

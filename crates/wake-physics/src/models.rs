@@ -11,7 +11,7 @@ use crate::sar::{AzimuthResolution, ImpulseResponse};
 use crate::scattering::breaking;
 use crate::scattering::hydrodynamic::{relaxation_rate, steepness};
 use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale, bragg};
-use crate::scene::{Radar, Scene, Term, TermRule, Terms};
+use crate::scene::{Radar, Scene, Term};
 use crate::slicks::{STRONGEST_WIND, Slicks};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
 use crate::swell::Swell;
@@ -22,9 +22,6 @@ use crate::window::Window;
 use num_complex::Complex64;
 use std::f64::consts::{PI, SQRT_2, TAU};
 
-/// Correlation of neighbouring pixels up to which each has speckle of its own: chosen.
-const INDEPENDENT: f64 = 0.05;
-
 /// The models of a valid scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Models {
@@ -34,7 +31,7 @@ pub(crate) struct Models {
     pub(crate) delivered: Raster,
     /// Spacing that the waves of a ship ask for \[m\], where what is computed is coarser.
     pub(crate) asked_spacing: Option<f64>,
-    /// Impulse response in range and azimuth, where pixels of their own do not suffice.
+    /// Impulse response in range and azimuth, if the scene asks for one.
     pub(crate) response: Option<ImpulseResponse>,
     /// Incidence angle \[rad\].
     pub(crate) incidence: f64,
@@ -87,7 +84,8 @@ impl Models {
             bragg_wavenumber(&scene.radar),
             spectrum.wind(),
         );
-        let wakes = Wake::of(scene, steepness);
+        let relaxation_rate = relaxation(scene);
+        let wakes = Wake::of(scene, steepness / relaxation_rate);
         let computed = Computed::new(&scene.grid, &delivered, response.as_ref(), &wakes);
         let image = computed.raster;
         let incidence = scene.radar.incidence.to_radians();
@@ -134,7 +132,7 @@ impl Models {
             transfer: Transfer {
                 depth: scene.sea.depth,
                 incidence,
-                relaxation_rate: relaxation(scene),
+                relaxation_rate,
                 steepness,
             },
             counts_unresolved,
@@ -275,24 +273,23 @@ fn bragg_wavenumber(radar: &Radar) -> f64 {
     bragg::wavenumber(k_e, radar.incidence.to_radians())
 }
 
-/// The response that a scene asks for, unless pixels of their own do as well.
+/// The response that a scene asks for, unless a list of terms leaves it out.
+///
+/// Rules never leave it out: without it the waves between the sources' spacing and the pixels', the sidelobes of a ship and
+/// the smear of all contrast are missing, which no tolerance covers.
 fn response(scene: &Scene) -> Option<ImpulseResponse> {
     let radar = &scene.radar;
-    let terms = &scene.model.terms;
     let resolution = radar
         .range_resolution
-        .filter(|_| terms.allow(Term::Response))?;
+        .filter(|_| scene.model.terms.allow(Term::Response))?;
     let window = radar.window.unwrap_or(Window::Uniform);
-    let response = ImpulseResponse {
+    Some(ImpulseResponse {
         range: Axis { resolution, window },
         azimuth: Axis {
             resolution: radar.resolution,
             window: radar.azimuth_window.unwrap_or(window),
         },
-    };
-    let needed = *terms != Terms::Rule(TermRule::Needed)
-        || response.pixel_correlation(scene.grid.spacing) > INDEPENDENT;
-    needed.then_some(response)
+    })
 }
 
 fn unresolved_band(image: &Raster, two_scale: &TwoScale) -> [f64; 2] {

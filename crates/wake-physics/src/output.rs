@@ -37,7 +37,10 @@ fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) 
 ///
 /// If there are not rows × columns pixels.
 pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
-    Ok(write_atomically(path, &encode_png(path, pixels, rows, columns)?)?)
+    Ok(write_atomically(
+        path,
+        &encode_png(path, pixels, rows, columns)?,
+    )?)
 }
 
 /// The bytes of an 8-bit grey PNG, as [`write_png`] writes them.
@@ -224,5 +227,4 @@ mod tests {
             assert_eq!(picture.into_rgb8().into_raw(), pixels);
         }
     }
-
 }

@@ -3,7 +3,7 @@
 use crate::constants::SPEED_OF_LIGHT;
 use crate::hull::Hull;
 use crate::kelvin::KelvinWake;
-use crate::scattering::{bragg, breaking};
+use crate::scattering::breaking;
 use crate::scene::{HullForm, Polarization, Radar, Scene, Ship};
 use crate::track::{Track, direction};
 use crate::turbulent::TurbulentWake;
@@ -30,8 +30,8 @@ pub(crate) struct Wake {
 impl Wake {
     /// The wakes of all ships, in their order.
     ///
-    /// - `steepness` `m_B` of the action spectrum of the Bragg waves \[1\]
-    pub(crate) fn of(scene: &Scene, steepness: f64) -> Vec<Self> {
+    /// - `bragg`: response of the Bragg waves to a divergence \[s\], their steepness over their relaxation rate, `m_B`/μ
+    pub(crate) fn of(scene: &Scene, bragg: f64) -> Vec<Self> {
         let one = |ship: &Ship| {
             let kelvin = kelvin(ship, scene.sea.depth, scene.sea.time);
             Self {
@@ -41,7 +41,7 @@ impl Wake {
                     length: kelvin.hull.length(),
                     beam: kelvin.hull.beam(),
                 },
-                edge: edge(scene, ship, kelvin.track, steepness),
+                edge: edge(scene, ship, kelvin.track, bragg),
                 kelvin,
             }
         };
@@ -72,7 +72,7 @@ fn kelvin(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
 }
 
 /// The current of the wake in the scene's wind; none behind a ship at rest or without wind.
-fn edge(scene: &Scene, ship: &Ship, track: Track, steepness: f64) -> Option<WakeEdge> {
+fn edge(scene: &Scene, ship: &Ship, track: Track, bragg: f64) -> Option<WakeEdge> {
     let wind = scene.sea.wind_speed;
     if !ship.edge || ship.speed <= 0.0 || wind <= 0.0 {
         return None;
@@ -87,21 +87,20 @@ fn edge(scene: &Scene, ship: &Ship, track: Track, steepness: f64) -> Option<Wake
         length: ship.length,
         response: match ship.edge_time {
             Some(time) => EdgeResponse::Given(time),
-            None => edge_response(&scene.radar, wind, steepness),
+            None => edge_response(&scene.radar, wind, bragg),
         },
     })
 }
 
 /// Response of σ⁰ to the convergence of a wake.
-fn edge_response(radar: &Radar, wind_speed: f64, steepness: f64) -> EdgeResponse {
+fn edge_response(radar: &Radar, wind_speed: f64, bragg: f64) -> EdgeResponse {
     let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
     let share = match radar.polarization {
         Polarization::VV => breaking::SHARE[0],
         Polarization::HH => breaking::SHARE[1],
     };
-    let bragg = bragg::wavenumber(k_e, radar.incidence.to_radians());
     EdgeResponse::Waves {
-        bragg: breaking::bragg_response(bragg, wind_speed, steepness),
+        bragg,
         breaking: [share, breaking::response_time(k_e, wind_speed)],
     }
 }
@@ -110,33 +109,50 @@ fn edge_response(radar: &Radar, wind_speed: f64, steepness: f64) -> EdgeResponse
 mod tests {
     use super::*;
     use crate::models::Models;
+    use crate::waves::Transfer;
 
-    /// The Bragg waves' part of an edge's response, in the sea and at the radar of a scene: steepness over rate of growth,
-    /// computed elsewhere for a fully developed sea at 5 m/s, 35°, to the digits printed (half a second of 61) and 4 % for a
-    /// density of air that is not stated. With a steepness of 4.5 it would be 9 % less at L, 10 and 15 % more at C and X band.
+    /// The Bragg waves' part of an edge's response is that of the hydrodynamic modulation: the steepness of their own
+    /// spectrum, 4.93, 4.11 and 3.90 at L, C and X band for 5 m/s, 35° and a developed sea, over 0.04 (u*/c)² ω with Wu's
+    /// u* = 0.16771 m/s, by hand 0.06041, 0.5020 and 1.0748 1/s.
     #[test]
-    fn edges_answer_with_the_steepness_of_their_own_short_waves() {
-        for (gigahertz, seconds, rounding) in
-            [(1.27, 61.0, 0.5), (5.405, 7.0, 0.05), (9.65, 3.4, 0.05)]
-        {
-            let frequency = format!("radar.frequency={}", gigahertz * 1e9);
+    fn edges_answer_at_the_relaxation_rate_of_the_modulation() {
+        for (gigahertz, steepness, rate) in [
+            (1.27, 4.93, 0.06041),
+            (5.405, 4.11, 0.5020),
+            (9.65, 3.90, 1.0748),
+        ] {
             let keys = [
                 "sea.wind_speed=5",
                 "radar.incidence=35",
                 "ship.edge=true",
-                &frequency,
+                &format!("radar.frequency={}", gigahertz * 1e9),
             ];
             let mut scene = Scene::default().with_assignments(&keys).unwrap();
-            scene.sea.fetch = 5e5;
-            let models = Models::new(&scene);
-            let edge = models.wakes[0].edge.unwrap();
-            let EdgeResponse::Waves { bragg, .. } = edge.response else {
-                panic!("{:?}", edge.response)
+            scene.sea.fetch = 1e7;
+            let bragg = |scene: &Scene| {
+                let models = Models::new(scene);
+                let EdgeResponse::Waves { bragg, .. } = models.wakes[0].edge.unwrap().response
+                else {
+                    panic!("a given response")
+                };
+                let Transfer {
+                    steepness,
+                    relaxation_rate,
+                    ..
+                } = models.transfer;
+                assert!((bragg * relaxation_rate / steepness - 1.0).abs() < 1e-12);
+                bragg
             };
+            // Half a unit of the last digit of steepness and rate.
+            let rounding = 0.005 / steepness + 1e-4;
+            let found = bragg(&scene);
             assert!(
-                (bragg - seconds).abs() < 0.04 * seconds + rounding,
-                "{gigahertz}: {bragg}"
+                (found * rate / steepness - 1.0).abs() < rounding,
+                "{gigahertz}: {found}"
             );
+            // The key of a scene is the rate of both.
+            scene.radar.relaxation_rate = Some(0.5);
+            assert!((bragg(&scene) * 0.5 / steepness - 1.0).abs() < rounding);
         }
     }
 }

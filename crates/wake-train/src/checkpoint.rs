@@ -283,10 +283,12 @@ fn write_part(
 }
 
 fn read_part(path: &Path, bytes: &[u8], tensors: &mut Tensors) -> Result<()> {
-    let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| Error::Value(wake_nn::Error::InvalidSafetensors {
-        path: path.to_owned(),
-        reason,
-    });
+    let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| {
+        Error::Value(wake_nn::Error::InvalidSafetensors {
+            path: path.to_owned(),
+            reason,
+        })
+    };
     let file = SafeTensors::deserialize(bytes).map_err(|error| invalid(error.into()))?;
     for (name, view) in file.tensors() {
         if view.dtype() != Dtype::F32 {

@@ -50,10 +50,12 @@ impl RunFolder {
         data: &Value,
         (stage, resume): (&str, bool),
     ) -> Result<Self> {
-        let encode = |source| Error::Value(wake_nn::Error::Json {
-            path: path.to_owned(),
-            source,
-        });
+        let encode = |source| {
+            Error::Value(wake_nn::Error::Json {
+                path: path.to_owned(),
+                source,
+            })
+        };
         let model = serde_json::to_value(model).map_err(encode)?;
         compare(path, &model, data)?;
         check_begin(path, &path.join(CHECKPOINTS).join(stage), stage, resume)?;
@@ -147,11 +149,13 @@ impl RunFolder {
 
 /// Whether a folder is free, or of this model and data.
 fn compare(path: &Path, model: &Value, data: &Value) -> Result<()> {
-    let refuse = |file: &str, (key, there, here): (String, String, String)| Error::Value(wake_nn::Error::InvalidOption {
-        option: path.join(file).display().to_string(),
-        value: format!("of a run with {key} = {there}"),
-        expected: format!("{here}; choose another folder, or what that run was begun with"),
-    });
+    let refuse = |file: &str, (key, there, here): (String, String, String)| {
+        Error::Value(wake_nn::Error::InvalidOption {
+            option: path.join(file).display().to_string(),
+            value: format!("of a run with {key} = {there}"),
+            expected: format!("{here}; choose another folder, or what that run was begun with"),
+        })
+    };
     if let Some(there) = read(&path.join("config.json"))?
         && let Some(found) = difference("", &Value::Object(there), model)
     {
@@ -201,10 +205,12 @@ fn read(path: &Path) -> Result<Option<Map<String, Value>>> {
         return Ok(None);
     }
     let text = whole_files::read_text(path)?;
-    let object = serde_json::from_str(&text).map_err(|source| Error::Value(wake_nn::Error::Json {
-        path: path.to_owned(),
-        source,
-    }))?;
+    let object = serde_json::from_str(&text).map_err(|source| {
+        Error::Value(wake_nn::Error::Json {
+            path: path.to_owned(),
+            source,
+        })
+    })?;
     Ok(Some(object))
 }
 

@@ -6,8 +6,8 @@ use half::f16;
 use rayon::prelude::*;
 use wake_physics::Scene;
 
-use wake_dataset::{Pair, Source};
 use crate::error::{Error, Result};
+use wake_dataset::{Pair, Source};
 use wake_ldm::network::{
     Foreseen, Known, PatchTransform, Prior, Shares, WakeModelConfig, expected_grey,
 };

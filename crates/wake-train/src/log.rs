@@ -28,11 +28,13 @@ impl Metrics {
     /// [`wake_nn::Error::Io`] when the file cannot be read or written, [`Error::Dataset`] with the number of a line that is none
     /// of a log.
     pub fn open(path: &Path, step: usize) -> Result<Self> {
-        let io = |source| Error::Value(wake_nn::Error::Io {
-            action: "write",
-            path: path.to_owned(),
-            source,
-        });
+        let io = |source| {
+            Error::Value(wake_nn::Error::Io {
+                action: "write",
+                path: path.to_owned(),
+                source,
+            })
+        };
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(io)?;
         }
@@ -68,11 +70,13 @@ impl Metrics {
         if let (Value::Object(line), Value::Object(more)) = (&mut line, more) {
             line.extend(more.clone());
         }
-        writeln!(self.file, "{line}").map_err(|source| Error::Value(wake_nn::Error::Io {
-            action: "write",
-            path: self.path.clone(),
-            source,
-        }))?;
+        writeln!(self.file, "{line}").map_err(|source| {
+            Error::Value(wake_nn::Error::Io {
+                action: "write",
+                path: self.path.clone(),
+                source,
+            })
+        })?;
         Ok(line)
     }
 }

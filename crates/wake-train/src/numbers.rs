@@ -99,8 +99,8 @@ proptest! {
 #[cfg(feature = "flex")]
 #[test]
 fn the_pixels_of_a_learnt_sea() {
-    use wake_nn::noise::NoiseSource;
     use wake_ldm::sea_texture::{SeaFlow, SeaStyle, SeaTexture};
+    use wake_nn::noise::NoiseSource;
     let (folder, device) = (tempfile::tempdir().unwrap(), burn::tensor::Device::flex());
     let path = folder.path().join("sea.safetensors");
     let random = NoiseSource::new(4);

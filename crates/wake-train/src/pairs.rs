@@ -5,9 +5,9 @@ use std::ops::Range;
 use serde_json::{Value, json};
 use wake_physics::Scene;
 
-use wake_ldm::conditioning::Vocabulary;
-use wake_dataset::{Folder, Manifest, Pair, Recipe, Simulated, Source};
 use crate::error::Result;
+use wake_dataset::{Folder, Manifest, Pair, Recipe, Simulated, Source};
+use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::network::{Domain, WakeModelConfig};
 
 /// So many pairs of a source, and what a run notes of them.

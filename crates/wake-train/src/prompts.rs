@@ -1,10 +1,10 @@
 //! Endless prompts, and what they state.
 
+use crate::error::Result;
+use crate::streams;
 use wake_dataset::Simulated;
 use wake_ldm::conditioning::Conditions;
-use crate::error::Result;
 use wake_nn::noise::NoiseSource;
-use crate::streams;
 use wake_text::{PartialScene, Wording};
 
 /// Draws of one prompt.
@@ -65,8 +65,8 @@ fn rearranged(text: &str, draw: impl Fn(u64) -> f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use wake_dataset::Recipe;
     use super::*;
+    use wake_dataset::Recipe;
 
     fn prompts() -> Prompts {
         Prompts::new(Simulated::new(Recipe::default(), 3).unwrap())

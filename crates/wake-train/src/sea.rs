@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::run::{Task, Terms, number};
 use super::tasks::{examples, noise_level, noise_of, on_the_way};
 use crate::streams::SEA_PLACES;
-use wake_nn::noise::NoiseSource;
 use wake_ldm::sea_texture::{PATCH, SeaFlow, SeaImage, SeaStyle};
+use wake_nn::noise::NoiseSource;
 
 /// Patches of an image for every one that fits into it beside the others, at most: more would show the same pixels.
 const OVERLAP: usize = 16;

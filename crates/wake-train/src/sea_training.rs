@@ -68,7 +68,8 @@ impl SeaTraining<'_> {
         let (options, shape) = (&self.options, SeaFlow::shape());
         let styles = self.patches.styles();
         // What cannot become a sea is refused before the first step.
-        SeaTexture::new(SeaFlow::new(&options.device()), &styles, self.spacing).map_err(Error::from)?;
+        SeaTexture::new(SeaFlow::new(&options.device()), &styles, self.spacing)
+            .map_err(Error::from)?;
         let begin = (STAGE, options.resume);
         let mut folder = RunFolder::open(out, &shape, &self.identity, begin)?;
         let constants = constants(options, self.identity.clone());
@@ -79,7 +80,8 @@ impl SeaTraining<'_> {
             seed: options.seed,
         };
         let show = |run: &Run<SeaFlow>| -> Result<(), E> {
-            let texture = SeaTexture::new(run.averaged(), &styles, self.spacing).map_err(Error::from)?;
+            let texture =
+                SeaTexture::new(run.averaged(), &styles, self.spacing).map_err(Error::from)?;
             texture.save(&out.join(WEIGHTS)).map_err(Error::from)?;
             draw(&texture, &out.join(SHEET))
         };

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use wake_physics::output;
 
-use wake_dataset::Pair;
 use crate::error::Result;
+use wake_dataset::Pair;
 
 /// Writes a PNG file with images of a set above, and below each one what the model makes of its scene or prompt.
 ///

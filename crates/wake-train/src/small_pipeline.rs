@@ -16,15 +16,15 @@ use super::stage_options::{StageOptions, Usual};
 use super::text_to_image::{
     AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
 };
-use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
-use wake_dataset::Pair;
 use crate::error::{Error, Result};
-use whole_files::fingerprint;
+use wake_dataset::Pair;
+use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
 use wake_ldm::pipeline::{Pipeline, PipelineParts, Request};
 use wake_ldm::scheduler::{NoiseSchedule, SchedulerConfig};
 use wake_ldm::text::ClipTextConfig;
 use wake_ldm::unet::UNetConfig;
 use wake_nn::weights::{Layout, Precision, save_folder};
+use whole_files::fingerprint;
 
 /// Names of the two stages, and what they take where nothing else is asked for.
 const AUTOENCODER: &str = "autoencoder-kl";
@@ -175,7 +175,13 @@ impl PipelineTraining<'_> {
         let show = |run: &Run<AutoencoderKl>| -> Result<()> {
             let (averaged, config) = (run.averaged(), &model["vae"]);
             let precision = Precision::F16;
-            Ok(save_folder(&averaged, Layout::Diffusers, config, &vae, precision)?)
+            Ok(save_folder(
+                &averaged,
+                Layout::Diffusers,
+                config,
+                &vae,
+                precision,
+            )?)
         };
         let steps = options.steps(&USUAL_AUTOENCODER);
         let stage = self.stage(AUTOENCODER, steps, &[VAE], folder);
@@ -231,13 +237,13 @@ fn unet() -> UNetConfig {
 }
 
 fn schedule(scheduler: &SchedulerConfig) -> Result<&NoiseSchedule> {
-    scheduler
-        .noise_schedule()
-        .ok_or_else(|| Error::Value(wake_nn::Error::Unsupported {
+    scheduler.noise_schedule().ok_or_else(|| {
+        Error::Value(wake_nn::Error::Unsupported {
             option: "scheduler".to_owned(),
             value: scheduler.class().to_owned(),
             supported: "those with a noise schedule".to_owned(),
-        }))
+        })
+    })
 }
 
 /// The model as it is now.

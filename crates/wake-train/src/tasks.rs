@@ -9,14 +9,14 @@ use wake_physics::Scene;
 
 use super::latents::LatentSet;
 use super::run::{Task, Terms, number};
-use wake_ldm::conditioning::{MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens};
 use crate::prompts::Prompts;
-use wake_dataset::{shuffled};
+use crate::streams;
+use wake_dataset::shuffled;
+use wake_ldm::conditioning::{MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens};
 use wake_ldm::network::{
     ChannelWindows, Flow, Known, PatchTransform, Prior, PromptParser, SeaFields, windows,
 };
 use wake_nn::noise::NoiseSource;
-use crate::streams;
 
 /// The noise level of the image at a position of a run.
 ///

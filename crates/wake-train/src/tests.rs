@@ -11,9 +11,9 @@ use serde_json::Value;
 
 use super::trainer::Trainer;
 use super::*;
-use wake_ldm::conditioning::Vocabulary;
 use crate::prompts::Prompts;
 use wake_dataset::{Recipe, Simulated};
+use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::network::{Flow, Foreseen, PatchTransform, WakeModelConfig};
 
 const SIZE: usize = 32;

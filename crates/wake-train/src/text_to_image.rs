@@ -10,16 +10,16 @@ use super::fine_tune::noised;
 use super::latents::batch;
 use super::run::{Task, Terms, number};
 use super::tasks::{examples, noise_of};
-use wake_ldm::autoencoder::AutoencoderKl;
-use wake_dataset::Pair;
 use crate::error::{Error, Result};
-use wake_nn::noise::{NoiseSource, normal_batch};
-use crate::streams::{FINE_TUNE_STREAM, self};
-use wake_ldm::streams::POSTERIOR_STREAM;
+use crate::streams::{self, FINE_TUNE_STREAM};
+use wake_dataset::Pair;
+use wake_ldm::autoencoder::AutoencoderKl;
 use wake_ldm::pipeline::token_ids;
 use wake_ldm::scheduler::{NoiseSchedule, Prediction};
+use wake_ldm::streams::POSTERIOR_STREAM;
 use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetInput};
+use wake_nn::noise::{NoiseSource, normal_batch};
 
 /// Rows and columns of the squares that the autoencoder learns from, unless images are smaller.
 const CROP: usize = 128;

@@ -70,7 +70,12 @@ impl TrainerOptions {
         check_range("weight_decay", weight_decay, 0.0, 1.0)?;
         check_range("largest_norm", self.largest_norm, 1e-6, 1e6)?;
         check_range("average_decay", self.average_decay, 0.0, 0.999999)?;
-        Ok(check_range("accumulation", self.accumulation as f64, 1.0, 65536.0)?)
+        Ok(check_range(
+            "accumulation",
+            self.accumulation as f64,
+            1.0,
+            65536.0,
+        )?)
     }
 
     /// What two runs must have in common for one to go on from the other; more steps may be asked of the second, and
@@ -331,11 +336,13 @@ impl<M: Module> Trainer<M> {
             let take = |(name, shape): &(String, Vec<usize>)| {
                 let name = format!("{group}.{name}");
                 let found = tensors.remove(&name).filter(|(found, _)| found == shape);
-                let (_, numbers) = found.ok_or_else(|| Error::Value(wake_nn::Error::InvalidOption {
-                    option: "checkpoint".to_owned(),
-                    value: format!("without {name} {shape:?}"),
-                    expected: "all tensors of the model".to_owned(),
-                }))?;
+                let (_, numbers) = found.ok_or_else(|| {
+                    Error::Value(wake_nn::Error::InvalidOption {
+                        option: "checkpoint".to_owned(),
+                        value: format!("without {name} {shape:?}"),
+                        expected: "all tensors of the model".to_owned(),
+                    })
+                })?;
                 let length = numbers.len();
                 Ok(Tensor::from_data(
                     TensorData::new(numbers, [length]),

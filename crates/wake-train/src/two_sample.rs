@@ -8,12 +8,12 @@ use wake_physics::Field;
 use super::optimizer::Rate;
 use super::trainer::{Trainer, TrainerOptions};
 use crate::error::{Error, Result};
+use crate::streams::PLACES;
 use wake_nn::check_range;
 use wake_nn::conv::{conv1x1, conv3x3, convolve};
+use wake_nn::noise::NoiseSource;
 use wake_nn::norm::GroupNorm;
 use wake_nn::resample::Downsample;
-use wake_nn::noise::NoiseSource;
-use crate::streams::PLACES;
 
 /// Channels after each halving of the patch.
 const WIDTHS: [usize; 3] = [16, 32, 64];

@@ -42,7 +42,11 @@ pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
         }),
         Err(TryLockError::WouldBlock) => {
             let message = "another process works there; wait for it, or choose another folder";
-            Err(failed("take the folder", folder, std::io::Error::other(message)))
+            Err(failed(
+                "take the folder",
+                folder,
+                std::io::Error::other(message),
+            ))
         }
         Err(TryLockError::Error(_)) => Ok(FolderLock { _folder: None }),
     }

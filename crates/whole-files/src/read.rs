@@ -15,10 +15,7 @@ const LONGEST_TEXT: u64 = 16 << 20;
 /// [`Error`](crate::Error) if it is longer, no regular file, no UTF-8, or cannot be read.
 pub fn read_text(path: &Path) -> Result<String> {
     let io = |source| failed("read", path, source);
-    // Opening a pipe would wait for somebody to write into it.
-    if !fs::metadata(path).map_err(io)?.is_file() {
-        return Err(io(std::io::Error::other("no regular file")));
-    }
+    check_regular(path)?;
     let mut text = String::new();
     let mut file = File::open(path).map_err(io)?.take(LONGEST_TEXT + 1);
     file.read_to_string(&mut text).map_err(io)?;
@@ -29,7 +26,26 @@ pub fn read_text(path: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// A short name of the content of a file: FNV-1a of 64 bits.
+/// The bytes of a file.
+///
+/// # Errors
+///
+/// [`Error`](crate::Error) if it is no regular file or cannot be read.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    check_regular(path)?;
+    fs::read(path).map_err(|source| failed("read", path, source))
+}
+
+/// Refuses what is no regular file: opening a pipe would wait for somebody to write into it.
+fn check_regular(path: &Path) -> Result<()> {
+    let io = |source| failed("read", path, source);
+    match fs::metadata(path).map_err(io)?.is_file() {
+        true => Ok(()),
+        false => Err(io(std::io::Error::other("no regular file"))),
+    }
+}
+
+/// A short name of the content of a file, which is read piece by piece: FNV-1a of 64 bits.
 ///
 /// # Errors
 ///
@@ -39,10 +55,20 @@ pub fn read_text(path: &Path) -> Result<String> {
 ///
 /// Fowler, Noll & Vo, "The FNV Non-Cryptographic Hash Algorithm".
 pub fn fingerprint(path: &Path) -> Result<String> {
-    let bytes = fs::read(path).map_err(|source| failed("read", path, source))?;
-    let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix);
-    Ok(format!("{hash:016x}"))
+    let io = |source| failed("read", path, source);
+    check_regular(path)?;
+    let mut file = File::open(path).map_err(io)?;
+    let mut piece = vec![0; 1 << 20];
+    let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
+    loop {
+        let length = file.read(&mut piece).map_err(io)?;
+        if length == 0 {
+            return Ok(format!("{hash:016x}"));
+        }
+        for &byte in &piece[..length] {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -53,8 +79,10 @@ mod tests {
     fn long_files_and_devices_are_refused() {
         let path = Path::new("/dev/zero");
         if path.exists() {
-            let refused = read_text(path).unwrap_err().to_string();
-            assert!(refused.contains("no regular file"), "{refused}");
+            for refused in [read_text(path).map(drop), fingerprint(path).map(drop)] {
+                let refused = refused.unwrap_err().to_string();
+                assert!(refused.contains("no regular file"), "{refused}");
+            }
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("config.json");

@@ -55,3 +55,38 @@ fn shortened(text: &str, longest: usize) -> String {
 fn is_invisible(character: char) -> bool {
     matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn foreign_text_is_short_and_harmless() {
+        assert_eq!(quoted("ship.speed=8"), "ship.speed=8");
+        assert_eq!(quoted("a\nb\u{7}\0"), "a b\\u{7}\\u{0}");
+        assert_eq!(quoted("\u{202e}gnp"), "\\u{202e}gnp");
+        for text in ["x".repeat(1 << 20), "\u{1b}".repeat(500), "é".repeat(81)] {
+            let short = quoted(&text);
+            assert!(
+                short.chars().count() <= 80 && short.ends_with('…'),
+                "{short}"
+            );
+        }
+        assert_eq!(quoted(&"é".repeat(80)), "é".repeat(80));
+    }
+
+    #[test]
+    fn a_sentence_keeps_its_ends() {
+        let long = format!(
+            "unknown variant `{}`, expected one of `a`, `b`",
+            "é".repeat(1 << 20)
+        );
+        let short = sentence(&long);
+        assert!(
+            short.starts_with("unknown variant `é") && short.ends_with("`a`, `b`"),
+            "{short}"
+        );
+        assert!(short.chars().count() <= 400, "{}", short.chars().count());
+        assert_eq!(sentence("as it\nwas "), "as it was");
+    }
+}

@@ -79,8 +79,7 @@ pub fn write_synced(
 ///
 /// [`Error`](crate::Error).
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let mut text =
-        serde_json::to_string_pretty(value).map_err(|e| failed("encode", path, e))?;
+    let mut text = serde_json::to_string_pretty(value).map_err(|e| failed("encode", path, e))?;
     text.push('\n');
     write_atomically(path, text.as_bytes())
 }
@@ -127,7 +126,10 @@ mod tests {
         });
         assert_eq!(failed.unwrap_err().action, "write");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
-        assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+        assert_eq!(
+            std::fs::read_dir(path.parent().unwrap()).unwrap().count(),
+            1
+        );
     }
 
     #[test]

@@ -7,6 +7,8 @@
 //! second part is the model: steps, batch size and weights against many steps from the same noise. The third is the loader:
 //! images a second that a training loop gets of the simulator and of the model, by threads.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod arguments;
 mod loader;
 mod model;

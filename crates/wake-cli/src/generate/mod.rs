@@ -1,5 +1,7 @@
 //! `wake generate`: a sentence (or a scene) becomes a radar image with the diffusion model.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod diffusers;
 mod wake_model;
 

@@ -51,7 +51,7 @@ pub(crate) fn figures(folder: &Path) -> Result<Vec<ImageFigures>> {
 }
 
 fn labels(path: &Path) -> Result<Labels> {
-    if !path.exists() {
+    if !path.is_file() {
         return Ok(Labels::default());
     }
     let text = std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))?;
@@ -67,7 +67,7 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("png"));
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        if is_png && !stem.ends_with("_mask") {
+        if is_png && !stem.ends_with("_mask") && path.is_file() {
             paths.push(path);
         }
     }

@@ -58,9 +58,6 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         bar.set_position(step as u64);
     })?;
     bar.finish_and_clear();
-    exit::say(&format!(
-        "{steps} steps, weights in {}",
-        options.out.display()
-    ))?;
-    Ok(())
+    let out = options.out.display();
+    Ok(exit::say(&format!("{steps} steps, weights in {out}"))?)
 }

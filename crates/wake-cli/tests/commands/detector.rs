@@ -1,11 +1,12 @@
 //! `detector`: what it refuses, what it prints, and a run that goes on.
 
 use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 
 use image::{GrayImage, ImageBuffer, Luma};
 use serde_json::Value;
 
-use super::{done, files, names, refused_by, text};
+use super::{done, example, files, names, refused_by, text};
 
 /// A dark line of 300 pixels toward the right on noise, begun by a bright spot, in grey from 0 to 1.
 fn wake(size: u32) -> impl Fn(u32, u32) -> f32 {
@@ -129,7 +130,7 @@ fn a_wake_is_found_and_told() {
         }
     }
     let drawn = names(&folder.path().join("out"));
-    assert_eq!(drawn, ["eight.wakes.png", "sixteen.wakes.png"]);
+    assert_eq!(drawn, ["eight.png.wakes.png", "sixteen.png.wakes.png"]);
 }
 
 /// Images with nothing in them are searched without a word of complaint, and nothing is found.
@@ -194,4 +195,206 @@ fn a_training_run_goes_on_where_it_was() {
     let image = eight_bits(&folder.path().join("a.png"), 100);
     let weights = out.join(weights);
     detections(folder.path(), &[text(&image), "--weights", text(&weights)]);
+}
+
+/// Runs `detector` in a folder, where `show` writes, with its standard output somewhere else.
+fn inside(folder: &Path, arguments: &[&str], stdout: Stdio) -> Output {
+    let child = Command::new(example("detector"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(stdout)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("an example that starts");
+    child.wait_with_output().expect("an end")
+}
+
+/// Every subcommand, and none, in a folder that holds `a.png`.
+const PRINTING: [&[&str]; 5] = [
+    &["detect", "a.png", "--out", "out"],
+    &["detect", "a.png", "--json", "--out", "out"],
+    &["evaluate", "--images", "1", "--out", "out"],
+    &[
+        "train", "--images", "16", "--recipe", "painted", "--out", "out",
+    ],
+    &[],
+];
+
+/// The reader of a pipe leaves: the work is done all the same, and ends well.
+#[test]
+fn a_closed_pipe_is_no_error_for_any_subcommand() {
+    let folder = tempfile::tempdir().expect("a folder");
+    eight_bits(&folder.path().join("a.png"), 64);
+    for arguments in PRINTING {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let output = inside(folder.path(), arguments, writer.into());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{arguments:?}: {message}");
+        assert_eq!(message, "", "{arguments:?}");
+    }
+    for written in [
+        "out/a.png.wakes.png",
+        "out/report.md",
+        "out/detector.safetensors",
+    ] {
+        assert!(folder.path().join(written).is_file(), "no {written}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_is_one_sentence_for_every_subcommand() {
+    let folder = tempfile::tempdir().expect("a folder");
+    eight_bits(&folder.path().join("a.png"), 64);
+    for arguments in PRINTING {
+        let full = std::fs::File::options()
+            .write(true)
+            .open("/dev/full")
+            .expect("a full device");
+        let output = inside(folder.path(), arguments, full.into());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {message}");
+        assert!(
+            message.contains("standard output") && message.lines().count() == 1,
+            "{arguments:?}: {message}"
+        );
+    }
+    // What was computed lies there all the same.
+    assert!(folder.path().join("out/report.md").is_file());
+}
+
+/// Names that differ in their ending alone, or only in bytes that are no UTF-8, each have results of their own.
+#[test]
+fn every_image_of_a_folder_has_its_own_picture_and_its_own_entry() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let images = folder.path().join("images");
+    std::fs::create_dir(&images).expect("a folder");
+    let first = eight_bits(&images.join("a.png"), 64);
+    for name in odd_names() {
+        std::fs::copy(&first, images.join(name)).expect("a copy");
+    }
+    let told = detections(folder.path(), &[text(&images)]);
+    let told: Vec<&String> = told["images"].as_object().expect("images").keys().collect();
+    let drawn = files(&folder.path().join("out"));
+    let count = 1 + odd_names().len();
+    assert_eq!(
+        (told.len(), drawn.len()),
+        (count, count),
+        "{told:?} {drawn:?}"
+    );
+    assert!(told.iter().any(|name| *name == "a.tif"), "{told:?}");
+    #[cfg(unix)]
+    assert!(told.iter().any(|name| *name == r"b\xFF.png"), "{told:?}");
+}
+
+#[cfg(unix)]
+fn odd_names() -> Vec<std::ffi::OsString> {
+    use std::os::unix::ffi::OsStringExt;
+    let names = [&b"a.tif"[..], b"b\xFF.png", b"b\xFE.png", b"b\xC3\x28.png"];
+    names
+        .map(|name| std::ffi::OsString::from_vec(name.to_vec()))
+        .into()
+}
+
+#[cfg(not(unix))]
+fn odd_names() -> Vec<std::ffi::OsString> {
+    vec!["a.tif".into()]
+}
+
+/// Files that cannot be read are named with their reasons; the others are searched.
+#[test]
+fn broken_images_of_a_folder_are_told_and_the_others_are_searched() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let images = folder.path().join("images");
+    std::fs::create_dir_all(images.join("folder.png")).expect("a folder");
+    for name in ["a.png", "c.png"] {
+        eight_bits(&images.join(name), 64);
+    }
+    std::fs::write(images.join("b.png"), "no image").expect("a file");
+    #[cfg(unix)]
+    {
+        let made = Command::new("mkfifo").arg(images.join("d.tif")).status();
+        assert!(made.expect("mkfifo").success());
+    }
+    let broken = if cfg!(unix) {
+        vec!["b.png", "d.tif"]
+    } else {
+        vec!["b.png"]
+    };
+    let output = inside(
+        folder.path(),
+        &["detect", "images", "--json", "--out", "out"],
+        Stdio::piped(),
+    );
+    let message = String::from_utf8(output.stderr).expect("Unicode");
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert_eq!(message.lines().count(), broken.len() + 1, "{message}");
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let keys =
+        |part: &str| -> Vec<&String> { told[part].as_object().expect("names").keys().collect() };
+    assert_eq!(keys("images"), ["a.png", "c.png"]);
+    assert_eq!(keys("unread"), broken);
+    for name in broken {
+        assert!(message.contains(name), "no {name} in {message}");
+    }
+    let drawn = names(&folder.path().join("out"));
+    assert_eq!(drawn, ["a.png.wakes.png", "c.png.wakes.png"]);
+    // Nothing that can be read: no results and no folder.
+    for name in ["a.png", "c.png"] {
+        std::fs::write(images.join(name), "").expect("a file");
+    }
+    let output = inside(
+        folder.path(),
+        &["detect", "images", "--out", "none"],
+        Stdio::piped(),
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stdout.is_empty() && !folder.path().join("none").exists());
+}
+
+/// With `--out` in the searched folder a second run searches what the first did.
+#[test]
+fn pictures_of_wakes_are_not_searched_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    eight_bits(&folder.path().join("a.png"), 64);
+    let run = || {
+        let output = inside(
+            folder.path(),
+            &["detect", ".", "--json", "--out", "."],
+            Stdio::piped(),
+        );
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{message}");
+        output.stdout
+    };
+    assert_eq!(run(), run());
+    assert_eq!(names(folder.path()), ["a.png", "a.png.wakes.png"]);
+}
+
+/// Weights of equal numbers find nothing in any image: they are refused instead of telling so.
+#[test]
+fn weights_that_find_nothing_anywhere_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let image = eight_bits(&folder.path().join("a.png"), 64);
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("crates/wake-detector/assets/detector.safetensors");
+    let bytes = std::fs::read(shipped).expect("weights");
+    let header = 8 + u64::from_le_bytes(bytes[..8].try_into().expect("a length")) as usize;
+    let weights = folder.path().join("weights.safetensors");
+    // 60,000, 0.01 and 0 in 16 bits.
+    for number in [0x7B53_u16, 0x211F, 0] {
+        let mut bytes = bytes.clone();
+        for value in bytes[header..].chunks_exact_mut(2) {
+            value.copy_from_slice(&number.to_le_bytes());
+        }
+        std::fs::write(&weights, bytes).expect("a file");
+        let words = ["weights.safetensors", "plain wake", "train"];
+        refused_by(
+            "detector",
+            &["detect", text(&image), "--weights", text(&weights)],
+            &words,
+        );
+        refused_by("detector", &["train", "--weights", text(&weights)], &words);
+    }
 }

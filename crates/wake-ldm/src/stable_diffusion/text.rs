@@ -9,11 +9,11 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Int, Tensor};
 use serde_json::{Value, json};
 
-use wake_nn::{Error, Result, check_range};
+use crate::options::Options;
 use wake_nn::activation::Activation;
 use wake_nn::attention::attention;
-use crate::options::Options;
 use wake_nn::weights::{Layout, load};
+use wake_nn::{Error, Result, check_range};
 
 /// Widths and options of a [`ClipText`]; the defaults are those of Stable Diffusion v1.4.
 #[derive(Config, Debug, PartialEq)]

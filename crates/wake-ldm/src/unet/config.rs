@@ -5,8 +5,8 @@ use std::path::Path;
 use burn::config::Config;
 use serde_json::{Value, json};
 
-use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
+use wake_nn::{Error, Result, check_range};
 
 /// Widths and options of a [`UNet`](super::UNet); the defaults are those of Stable Diffusion v1.4.
 ///

@@ -9,6 +9,7 @@ use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
 
+use blocks::{DownBlock, Levels, MidBlock, UpBlock};
 use wake_nn::Result;
 use wake_nn::activation::silu;
 use wake_nn::cast_to;
@@ -16,7 +17,6 @@ use wake_nn::conv::{conv3x3, convolve};
 use wake_nn::norm::GroupNorm;
 use wake_nn::timestep::{TimestepEmbedding, sinusoidal_embedding};
 use wake_nn::weights::{Layout, load};
-use blocks::{DownBlock, Levels, MidBlock, UpBlock};
 
 pub use config::UNetConfig;
 

@@ -46,11 +46,7 @@ pub(crate) type Moments = Vec<[f32; 2]>;
 /// - `x`: `[batch, channels, pixels]`
 /// - `parameters`: weight and bias, `[channels]` each
 /// - result: as `x`, and the moments `[batch · groups]`
-pub(crate) fn normalize(
-    x: &[f32],
-    parameters: [&[f32]; 2],
-    shape: &Shape,
-) -> (Vec<f32>, Moments) {
+pub(crate) fn normalize(x: &[f32], parameters: [&[f32]; 2], shape: &Shape) -> (Vec<f32>, Moments) {
     let mut y = vec![0.0; x.len()];
     let arch = Arch::new();
     let moments = y

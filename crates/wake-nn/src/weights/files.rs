@@ -13,8 +13,8 @@ use safetensors::tensor::{Metadata, TensorInfo};
 use super::header::{self, Header};
 use super::index::ShardIndex;
 use super::names::modern;
-use crate::error::{Error, Result};
 use crate::error::unreadable;
+use crate::error::{Error, Result};
 
 /// File names of models, the preferred ones first, each with the names of the index that it may have
 /// instead, in shards.

@@ -8,8 +8,8 @@ use std::path::Path;
 use safetensors::tensor::Metadata;
 use serde::de::{Deserializer as _, Error as _, IgnoredAny, MapAccess, Visitor};
 
-use crate::error::{Error, Result};
 use crate::error::unreadable;
+use crate::error::{Error, Result};
 
 /// The format's own limit on the length of a header.
 const LONGEST: u64 = 100_000_000;

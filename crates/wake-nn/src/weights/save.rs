@@ -73,7 +73,10 @@ pub fn save_folder<M: Module>(
     };
     save_as(model, layout, &folder.join(name), precision)?;
     let config = format!("{config:#}\n");
-    Ok(write_atomically(&folder.join("config.json"), config.as_bytes())?)
+    Ok(write_atomically(
+        &folder.join("config.json"),
+        config.as_bytes(),
+    )?)
 }
 
 /// The header, in the order in which the parameters are visited, padded to a multiple of 8 bytes.

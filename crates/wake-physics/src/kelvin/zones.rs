@@ -6,7 +6,6 @@
 
 use super::steady::SteadyWaves;
 use crate::quadrature::GaussLegendre;
-use std::f64::consts::PI;
 
 /// Samples of the curve between which a change of sign is looked for.
 const SAMPLES: usize = 400;
@@ -41,16 +40,10 @@ impl Piece {
             if width == 0.0 || distance >= width {
                 return 1.0;
             }
-            0.5 + 0.5 * error_function(sharpness * (2.0 * distance / width - 1.0))
+            0.5 + 0.5 * libm::erf(sharpness * (2.0 * distance / width - 1.0))
         };
         end(u - self.from, self.rise) * end(self.to - u, self.fall)
     }
-}
-
-/// erf x, by Gauss quadrature of its integral; |x| up to 6.
-fn error_function(x: f64) -> f64 {
-    let rule = GaussLegendre::new(32);
-    2.0 / PI.sqrt() * rule.integrate([0.0, x], |t| (-t * t).exp())
 }
 
 impl Reach {
@@ -228,6 +221,7 @@ fn smallest(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     /// One place (ξ, 0) of deep water sees α = ν cosh u alone: its phase turns by |ξ| ν sinh u, twice that and 6 more bound
     /// the integrand, with hull and decay their own.
@@ -247,6 +241,32 @@ mod tests {
             }
             assert!(reach.slowest(0.0) == 0.0 && (reach.fastest(0.0) - 6.0).abs() < 1e-12);
         }
+    }
+
+    /// ½ erfc(s(1 − 2x)) at the share x of a smooth end, by its continued fraction: the tail keeps its relative digits where
+    /// ½ + ½ erf leaves the rounding of 1.
+    #[test]
+    fn smooth_ends_are_error_functions() {
+        let piece = Piece {
+            from: 2.0,
+            to: 3.0,
+            rise: 0.2,
+            fall: 0.0,
+        };
+        for sharpness in [2.0f64, 4.0, 6.0] {
+            let z = 0.9 * sharpness;
+            // erfc z = e^{−z²}/√π · 1/(z + ½/(z + 1/(z + 3⁄2/(z + …)))).
+            let fraction = (1..400).rev().fold(z, |f, n| z + 0.5 * f64::from(n) / f);
+            let tail = 0.5 * (-z * z).exp() / (PI.sqrt() * fraction);
+            let found = [0.05, 0.95].map(|x| piece.window(2.0 + 0.2 * x, sharpness));
+            // Two roundings of numbers near 1, and u has its own.
+            assert!(
+                (found[0] - tail).abs() < 5e-16 + 1e-12 * tail,
+                "{sharpness}"
+            );
+            assert!((found[1] - (1.0 - tail)).abs() < 5e-16 + 1e-12 * tail);
+        }
+        assert!((piece.window(2.5, 6.0) - 1.0).abs() < f64::EPSILON);
     }
 
     #[test]

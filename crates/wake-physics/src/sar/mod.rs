@@ -1,7 +1,7 @@
 //! From σ⁰ and motion to a SAR image: velocity bunching, resolution, speckle and the ship's echo.
 //!
 //! ```text
-//! σ⁰, radial velocity, acceleration, elevation ─► Imaging ─► (+ Echo) ─► intensity ─► speckle ─► image
+//! σ⁰, radial velocity, acceleration, elevation ─► Imaging ─► (+ points) ─► intensity ─► speckle ─► image
 //! ```
 //!
 //! The radar looks toward +x (ground range) and flies toward +y (azimuth, row 0 at the largest y).
@@ -20,6 +20,5 @@ mod imaging;
 mod spread;
 
 pub use coherence::AzimuthResolution;
-pub use echo::Echo;
 pub use imaging::{Imaging, Sources};
 pub use impulse::ImpulseResponse;

@@ -10,6 +10,7 @@
 
 use crate::constants::{GRAVITY, VON_KARMAN};
 use crate::dispersion::angular_frequency;
+use crate::spectrum::elfouhaily::{DragLaw, friction_velocity};
 
 /// Mean square slope of breakers s² \[1\].
 const SLOPE: f64 = 0.19;
@@ -31,14 +32,6 @@ const STEEPNESS: f64 = 4.5;
 
 /// Share of σ⁰ that comes from breaking waves in VV and HH where the edges of a wake are concerned: chosen.
 pub(crate) const SHARE: [f64; 2] = [0.2, 0.4];
-
-/// Response of Bragg waves to a divergence \[s\]: `m_B/μ_B`.
-///
-/// - `bragg_wavenumber` [rad/m]; `wind_speed` [m/s], above 0
-/// - `steepness` `m_B` of their action spectrum \[1\], see [`steepness`](super::hydrodynamic::steepness)
-pub(crate) fn bragg_response(bragg_wavenumber: f64, wind_speed: f64, steepness: f64) -> f64 {
-    steepness / growth_rate(bragg_wavenumber, friction_velocity(wind_speed))
-}
 
 /// σ⁰ of breaking waves over the share q of the sea they cover \[1\].
 ///
@@ -83,11 +76,11 @@ pub fn response_time(radar_wavenumber: f64, wind_speed: f64) -> f64 {
         return f64::INFINITY;
     }
     let k = (0.1 * radar_wavenumber).min(std::f64::consts::TAU / 0.3);
-    let rate = growth_rate(k, friction_velocity(wind_speed));
+    let rate = growth_rate(k, friction_velocity(wind_speed, DragLaw::default()));
     0.5 * (BREAKING_POWER + 1.0) * STEEPNESS / rate
 }
 
-/// Rate of exchange of a wave's energy with the wind μ [1/s].
+/// Rate at which the waves that break take energy from the wind, μ [1/s].
 ///
 /// ```text
 /// μ = 2 C (u*/c)² ω,     C = 1.5 (ρ_a/ρ_w) [ln(π/(k z₀))/κ − c/u*],  at least 0
@@ -95,10 +88,16 @@ pub fn response_time(radar_wavenumber: f64, wind_speed: f64) -> f64 {
 ///
 /// - `wavenumber` k [rad/m]; `friction_velocity` u* [m/s]
 ///
+/// # Why it is not the relaxation rate of the Bragg waves
+///
+/// That rate, 0.04 (u*/c)² ω, was measured where u*/c is 0.1 to 3. The waves that break are 0.3 m long and longer, and run
+/// almost as fast as the wind over them: at L band u*/c is 0.05 to 0.09 in winds of 3 to 5 m/s. Their own speed reduces what
+/// they take from the wind, by the term −c/u*, which the other law does not have: it is 0.7 times this rate at 5 to 10 m/s
+/// and 1.8 times at 3 m/s (L band). The friction velocity is the same.
+///
 /// # References
 ///
-/// Kudryavtsev et al. (2005), J. Geophys. Res. 110, as others have coded it. Plant's (1982) 0.04 (u*/c)² ω is within 30 %
-/// of it.
+/// Kudryavtsev et al. (2005), J. Geophys. Res. 110, as others have coded it.
 #[must_use]
 pub fn growth_rate(wavenumber: f64, friction_velocity: f64) -> f64 {
     let omega = angular_frequency(wavenumber, f64::INFINITY);
@@ -113,14 +112,6 @@ pub fn growth_rate(wavenumber: f64, friction_velocity: f64) -> f64 {
 /// Roughness length `z₀` = 0.018 u*²/g + 0.1 ν/u* \[m\].
 fn roughness(friction_velocity: f64) -> f64 {
     0.018 * friction_velocity.powi(2) / GRAVITY + 0.1 * VISCOSITY_OF_AIR / friction_velocity
-}
-
-/// Friction velocity [m/s] of the logarithmic profile with that roughness: u* = κ U/ln(10 m/z₀).
-fn friction_velocity(wind_speed: f64) -> f64 {
-    // A contraction: the logarithm changes by less than a tenth of a change of ln u*.
-    (0..40).fold(0.04 * wind_speed, |u, _| {
-        VON_KARMAN * wind_speed / (10.0 / roughness(u)).ln()
-    })
 }
 
 #[cfg(test)]
@@ -173,7 +164,7 @@ mod tests {
             (232.0, [0.385, 1.16, 2.29, 4.55]),
         ] {
             for (wind, rate) in [3.0, 5.0, 7.0, 10.0].into_iter().zip(rates) {
-                let found = growth_rate(k, friction_velocity(wind));
+                let found = growth_rate(k, friction_velocity(wind, DragLaw::default()));
                 assert!(
                     (found - rate).abs() < 0.04 * rate + 5e-4,
                     "{k} {wind}: {found}"
@@ -193,20 +184,16 @@ mod tests {
             }
         }
         assert!(response_time(wavenumber(5.4e9), 0.0).is_infinite());
-        // Bragg waves alone, 5 m/s, with the steepness of their own spectrum there: 61, 7 and 3.4 s.
-        for (k, steepness, seconds) in [(30.5, 4.93, 61.0), (129.9, 4.11, 7.0), (232.0, 3.90, 3.4)]
-        {
-            let found = bragg_response(k, 5.0, steepness);
-            assert!((found / seconds - 1.0).abs() < 0.05, "{k}: {found}");
-        }
     }
 
+    /// The wind of the logarithmic profile over this roughness, u*/κ ln(10 m/z₀), is the one whose drag law gave u*: one
+    /// friction velocity does for both, within 1 % where the coverage was fitted.
     #[test]
-    fn the_friction_velocity_has_its_profile() {
-        for wind in [1.0, 5.0, 12.0, 30.0] {
-            let u = friction_velocity(wind);
+    fn the_friction_velocity_has_the_profile_of_the_roughness() {
+        for wind in [5.0, 7.0, 10.0] {
+            let u = friction_velocity(wind, DragLaw::default());
             let profile = u / VON_KARMAN * (10.0 / roughness(u)).ln();
-            assert!((profile / wind - 1.0).abs() < 1e-12, "{wind}");
+            assert!((profile / wind - 1.0).abs() < 0.01, "{wind}: {profile}");
         }
     }
 }

@@ -100,6 +100,27 @@ impl Ship {
         })
     }
 
+    /// What only an echo or the edges of the wake have is refused without them.
+    fn validate_needless(&self, name: &str) -> Result<()> {
+        let edge_time = self.edge_time.unwrap_or(0.0);
+        let needless = [
+            ("roll", self.roll, "m/s", "echo", self.echo),
+            ("edge_time", edge_time, "s", "edge", self.edge),
+            ("edge_outflow", self.edge_outflow, "m/s", "edge", self.edge),
+        ];
+        let ignored = |&(_, value, _, _, set): &(_, f64, _, _, bool)| value > 0.0 && !set;
+        match needless.into_iter().find(ignored) {
+            None => Ok(()),
+            Some((key, value, unit, of, _)) => Err(Error::Conflict {
+                name: format!("{name}.{key}"),
+                value: format!("{value} {unit}"),
+                requirement: format!(
+                    "but needs {name}.{of}: set {name}.{of} = true, or leave it out"
+                ),
+            }),
+        }
+    }
+
     /// - `name`: what errors call it
     fn validate(&self, name: &str) -> Result<()> {
         let range = |key: &str, value, [min, max]: [f64; 2], unit| {
@@ -138,6 +159,7 @@ impl Ship {
         )?;
         range("edge_outflow", self.edge_outflow, [0.0, 0.3], "m/s")?;
         range("roll", self.roll, [0.0, 2.0], "m/s")?;
+        self.validate_needless(name)?;
         match (self.hull, self.block_coefficient) {
             (HullForm::Wigley, Some(value)) => Err(Error::Conflict {
                 name: format!("{name}.block_coefficient"),
@@ -211,6 +233,12 @@ impl Radar {
         }
         if self.ambiguity.is_some() && self.pulse_rate.is_none() {
             return refuse("radar.ambiguity", "but needs radar.pulse_rate: set it too");
+        }
+        if self.pulse_rate.is_some() && self.ambiguity.is_none() {
+            return refuse(
+                "radar.pulse_rate",
+                "but places ambiguities only: set radar.ambiguity too, or leave it out",
+            );
         }
         Ok(())
     }
@@ -287,7 +315,9 @@ mod tests {
         };
         let mut scene = Scene::default();
         scene.radar.range_resolution = Some(10.0);
+        (scene.radar.ambiguity, scene.radar.pulse_rate) = (Some(-25.0), Some(1700.0));
         for ship in &mut scene.ships {
+            (ship.echo, ship.edge) = (true, true);
             // A hull on which every single value may take its extremes.
             (ship.length, ship.beam, ship.draft) = (300.0, 0.5, 0.5);
         }
@@ -361,6 +391,7 @@ mod tests {
         }
         let ghost = ["radar.range_resolution=10", "radar.ambiguity=-25"];
         assert!(refused(&ghost).contains("radar.pulse_rate"));
+        assert!(refused(&["radar.pulse_rate=1700"]).contains("radar.ambiguity"));
         for (key, good) in [
             ("radar.window={ hamming = 0.5 }", true),
             ("radar.window={ hamming = 1.0 }", true),
@@ -372,6 +403,24 @@ mod tests {
             let scene = Scene::default().with_assignments(&["radar.range_resolution=10", key]);
             assert_eq!(scene.is_ok(), good, "{key}: {scene:?}");
         }
+    }
+
+    /// A key of the ship that would be ignored is refused, and the error names the key that it needs.
+    #[test]
+    fn keys_without_effect_are_refused() {
+        for (key, of) in [
+            ("ship.roll=0.2", "ship.echo"),
+            ("ship.edge_time=400", "ship.edge"),
+            ("ship.edge_outflow=0.02", "ship.edge"),
+        ] {
+            let message = Scene::default().with_assignments(&[key]).unwrap_err();
+            let needed = format!("needs {of}: set {of} = true");
+            assert!(message.to_string().contains(&needed), "{message}");
+            let both = Scene::default().with_assignments(&[key, &format!("{of}=true")]);
+            assert!(both.is_ok(), "{both:?}");
+        }
+        let zero = ["ship.roll=0", "ship.edge_outflow=0"];
+        assert!(Scene::default().with_assignments(&zero).is_ok());
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use super::Scene;
 use super::keys::SET_BY_SENSOR;
 use crate::error::{Error, Result};
-use whole_files::{quoted, sentence};
 use std::io::Read;
 use std::path::Path;
+use whole_files::{quoted, sentence};
 
 /// No scene file is longer than this \[bytes\].
 const LONGEST: u64 = 1 << 20;

@@ -207,12 +207,14 @@ pub struct Ship {
     pub filter_depth: f64,
     /// Whether the turbulent wake has a current and bright edges. See [`crate::turbulent::current`].
     pub edge: bool,
-    /// Response of σ⁰ to the convergence of that current \[s\], 0 to 1000; from wind and radar where absent.
+    /// Response of σ⁰ to the convergence of that current \[s\], 0 to 1000; from wind and radar where absent; only with
+    /// [`Self::edge`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub edge_time: Option<f64>,
-    /// Outflow from the wake's middle at the stern [m/s], 0 to 0.3.
+    /// Outflow from the wake's middle at the stern [m/s], 0 to 0.3; only with [`Self::edge`].
     pub edge_outflow: f64,
-    /// Standard deviation of the line-of-sight velocity of points on the ship by roll and pitch [m/s], 0 to 2.
+    /// Standard deviation of the line-of-sight velocity of points on the ship by roll and pitch [m/s], 0 to 2; only with
+    /// [`Self::echo`].
     pub roll: f64,
 }
 
@@ -301,11 +303,11 @@ pub struct Radar {
     /// Level of the ship's azimuth ambiguities over its echo \[dB\], −60 to 0; none where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ambiguity: Option<f64>,
-    /// Pulse repetition frequency \[Hz\], 100 to 20,000: places the ambiguities.
+    /// Pulse repetition frequency \[Hz\], 100 to 20,000: places the ambiguities; only with them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pulse_rate: Option<f64>,
-    /// Relaxation rate of the hydrodynamic modulation [1/s], 0.01 to 100; from the Bragg wave and the
-    /// wind where absent.
+    /// Relaxation rate of the Bragg waves [1/s], 0.01 to 100, in the hydrodynamic modulation and at the edges of wakes; from
+    /// the Bragg wave and the wind where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relaxation_rate: Option<f64>,
 }

@@ -2,12 +2,13 @@
 
 use super::accuracy::{Accuracy, Reached};
 use super::simulation::Method;
-use super::speckling::hull_echoes;
+use super::speckling::points;
 use super::stages::{Backdrop, Stages};
 use super::surface_fields::SurfaceFields;
 use crate::plan::SHARES;
 use crate::raster::Field;
 use crate::sar::direct::DirectImage;
+use crate::sar::echo::add_points;
 use crate::sar::{Imaging, Sources};
 use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
 use crate::scene::Term;
@@ -154,9 +155,8 @@ impl Stages<'_> {
     pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
         if self.models.response.is_none() {
             let resolution = self.models.resolution_at_rest().nominal;
-            for echo in hull_echoes(self.scene, self.models) {
-                echo.add_to(intensity, &self.image, resolution);
-            }
+            let points = points(self.scene, self.models);
+            add_points(intensity, &self.image, &points, resolution);
         }
         if self.plan.uses(Term::Noise) {
             let noise = self.models.noise as f32;

@@ -1,16 +1,13 @@
 //! From the mean intensity to the image with speckle.
 
-use crate::constants::SEA_WATER_DENSITY;
 use crate::error::Result;
-use crate::labels::echo_displacement;
 use crate::models::Models;
 use crate::raster::{Field, Raster};
-use crate::sar::echo::ship_cross_section;
+use crate::sar::ImpulseResponse;
 use crate::sar::geometry::ship_radial_velocity;
 use crate::sar::impulse::{Looks, PointTarget, Reflectivity};
 use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::speckle::speckle;
-use crate::sar::{Echo, ImpulseResponse};
 use crate::scene::sensor::ambiguity_distance;
 use crate::scene::{Scene, Ship};
 use crate::wakes::Wake;
@@ -42,7 +39,7 @@ impl Exposure {
             response,
             sources: models.image,
             intensity,
-            points: points(scene, models),
+            points: points_inside(scene, models),
             image: models.delivered,
         }
     }
@@ -61,8 +58,8 @@ impl Exposure {
     }
 }
 
-/// The ships as points with their ghosts, for an image with an impulse response.
-fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
+/// The ships whose echo is drawn as points, with their ghosts: the same whether or not an impulse response images them.
+pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     let view = Viewing {
         incidence: models.incidence,
         range_to_velocity: models.range_to_velocity,
@@ -87,7 +84,13 @@ fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
         let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
         points.extend(ambiguities(&points, distance, 10f64.powf(0.1 * level)));
     }
+    points
+}
+
+/// Those points that lie among the sources: an impulse response would bring others around.
+fn points_inside(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     let [rows, columns] = [models.image.rows as f64, models.image.columns as f64];
+    let mut points = points(scene, models);
     points.retain(|point| {
         let [column, row] = models.image.pixel(point.position[0], point.position[1]);
         (0.0..rows).contains(&row) && (0.0..columns).contains(&column)
@@ -175,20 +178,4 @@ pub fn unit_speckle(scene: &Scene) -> Result<Field> {
     let mut image = Field::constant(&models.delivered, 1.0);
     Speckling::of(&open, &models, exposure).apply(&mut image);
     Ok(image)
-}
-
-/// The ships' own echoes where no impulse response images them, as far as they are asked for.
-pub(super) fn hull_echoes(scene: &Scene, models: &Models) -> impl Iterator<Item = Echo> {
-    let ships = scene.ships.iter().zip(&models.wakes);
-    ships.filter(|(ship, _)| ship.echo).map(|(ship, wake)| {
-        let displacement = SEA_WATER_DENSITY * wake.kelvin.hull.volume();
-        Echo {
-            position: wake.kelvin.track.position,
-            heading: ship.heading_at(scene.sea.time),
-            length: ship.length,
-            beam: ship.beam,
-            cross_section: ship_cross_section(scene.radar.frequency, displacement),
-            displacement: echo_displacement(scene, ship),
-        }
-    })
 }

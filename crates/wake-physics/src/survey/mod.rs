@@ -25,6 +25,9 @@ const DEVIATIONS: f64 = 4.5;
 /// Headings that stand for all of a ship that turns: chosen.
 const HEADINGS: usize = 8;
 
+/// Computed pixels along a side of one of the image above which an impulse response costs more than it shows: chosen.
+const COARSE_PIXEL: f64 = 8.0;
+
 /// Mean square of the wake where it is over that in the whole image: the wedge covers about a quarter of it.
 const WEDGE: f64 = 4.0;
 
@@ -238,6 +241,15 @@ impl Survey {
                 models.image.spacing
             ));
         }
+        let spacing = models.delivered.spacing;
+        let divisions = (spacing / models.image.spacing).round();
+        if let Some(response) = models.response.filter(|_| divisions > COARSE_PIXEL) {
+            let [range, azimuth] = [response.range, response.azimuth].map(|axis| axis.resolution);
+            notes.push(format!(
+                "a pixel of {spacing} m takes {divisions} x {divisions} computed ones, for the radar resolves {range:.1} x {azimuth:.1} m: for an image \
+                 averaged to such pixels set radar.range_resolution and radar.resolution to what that image resolves"
+            ));
+        }
         let count = models.wakes.len();
         for (n, wake) in models.wakes.iter().enumerate() {
             let wavelength = wake.kelvin.transverse_wavelength();
@@ -284,8 +296,7 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
     let response = match (&models.response, scene.radar.range_resolution) {
         (Some(_), _) => None,
         (None, None) => Some("not asked for"),
-        (None, Some(_)) if !scene.model.terms.allow(Term::Response) => Some("not in model.terms"),
-        (None, Some(_)) => Some("pixels correlate too little to tell"),
+        (None, Some(_)) => Some("not in model.terms"),
     };
     [
         (Term::Swell, swell),

@@ -3,10 +3,10 @@
 use super::draw::Draw;
 use super::sample::{Sample, pixel_snr};
 use super::sea::{Echoes, Speckle, border, clutter, mottle, quick_look};
-use wake_detector::{Wake, direction};
 use rayon::prelude::*;
 use std::ops::Range;
 use wake_dataset::{Grey, Pair, Source};
+use wake_detector::{Wake, direction};
 use wake_physics::Scene;
 use wake_physics::labels::{LabelledShip, Labels, ShipLabel, Visibility, WakeLabel};
 
@@ -382,11 +382,9 @@ mod tests {
         };
         let (mut sure, mut kept, mut scores) = (0, 0.0, 0.0);
         for index in 0..60 {
-            let image = wake_detector::GreyImage::from_levels(384, 384, &source.sample(index).pixels);
-            let (upright, turned) = (
-                model.find(&image),
-                model.find(&image.turned()),
-            );
+            let image =
+                wake_detector::GreyImage::from_levels(384, 384, &source.sample(index).pixels);
+            let (upright, turned) = (model.find(&image), model.find(&image.turned()));
             for one in upright.iter().filter(|one| one.score > 0.3) {
                 let [x, y] = one.wake.tip;
                 let again = turned.iter().find(|other| {

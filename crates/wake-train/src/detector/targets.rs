@@ -4,9 +4,9 @@ use burn::tensor::activation::{log_sigmoid, sigmoid};
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::sample::Sample;
+use wake_detector::Wake;
 use wake_detector::network::{ANGLE_UNIT, INPUTS, LENGTH_UNIT, Map, STRIDE};
 use wake_detector::normalize;
-use wake_detector::Wake;
 
 /// Wakes above this signal-to-noise are to be found; those below neither are, nor are they mistakes.
 pub const FOUND: f32 = 5.5;

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::{AdamOptions, Checkpoint, Metrics, Rate, Trainer, TrainerOptions};
 use burn::tensor::Device;
 use rayon::prelude::*;
 use serde_json::json;
 use wake_dataset::{Batches, Loader, Source};
 use wake_nn::device_named;
-use crate::{AdamOptions, Checkpoint, Metrics, Rate, Trainer, TrainerOptions};
 use wake_nn::weights::{Layout, Precision, load, save_as};
 
 use super::draw::Draw;
@@ -18,6 +18,7 @@ use super::sample::Sample;
 use super::targets::{Batch, Prepared};
 use crate::error::{Error, Result};
 use wake_detector::network::Network;
+use wake_detector::self_check::self_check;
 
 /// Images of a step.
 const BATCH: usize = 16;
@@ -92,7 +93,7 @@ impl Training {
 /// # Errors
 ///
 /// [`Error::Model`] for numbers out of range, a folder that cannot be written, checkpoints of another run, and gradients that
-/// stay infinite.
+/// stay infinite; [`Error::WrongMaps`] for first weights as [`Detector::load`](crate::Detector::load).
 pub fn train(
     training: &Training,
     device: &Device,
@@ -105,7 +106,11 @@ pub fn train(
     device.seed(training.seed);
     let steps = training.steps();
     let network = match &training.weights {
-        Some(file) => load(Network::new(&device), Layout::Diffusers, file)?,
+        Some(file) => {
+            let network = load(Network::new(&device), Layout::Diffusers, file)?;
+            self_check(&network, file, &device)?;
+            network
+        }
         None => Network::new(&device),
     };
     let mut trainer = Trainer::new(network, options, vec![device]);

@@ -10,9 +10,9 @@ use wake_physics::{Field, Scene};
 use super::judge::told_apart;
 use super::pixels::grey;
 use super::source::{ImageSource, Told, draw_all};
+use crate::TwoSample;
 use crate::error::Result;
 use wake_ldm::sampler::speckled;
-use crate::TwoSample;
 
 /// One kind of image against simulated ones of the same scenes.
 #[derive(Debug, Clone, Serialize)]

@@ -10,8 +10,8 @@ use super::judge::told_apart;
 use super::pixels::grey;
 use super::source::{ImageSource, Told, draw_all, other_sea};
 use super::statistics::mean;
-use crate::error::Result;
 use crate::TwoSample;
+use crate::error::Result;
 
 /// Side of the squares of pixels that the wake model draws by.
 const SQUARE: usize = 8;

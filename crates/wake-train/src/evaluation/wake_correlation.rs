@@ -72,11 +72,13 @@ fn greys(source: &dyn ImageSource, scenes: &[Scene]) -> Result<Vec<Field>> {
 }
 
 fn wedge(scene: &Scene) -> Result<Vec<bool>> {
-    let ship = scene.ships.first().ok_or_else(|| Error::Value(wake_nn::Error::InvalidOption {
-        option: "scene".to_owned(),
-        value: "without a ship".to_owned(),
-        expected: "one whose wake can be correlated".to_owned(),
-    }))?;
+    let ship = scene.ships.first().ok_or_else(|| {
+        Error::Value(wake_nn::Error::InvalidOption {
+            option: "scene".to_owned(),
+            value: "without a ship".to_owned(),
+            expected: "one whose wake can be correlated".to_owned(),
+        })
+    })?;
     let place = place(ship, scene);
     Ok(kelvin_wedge(
         &raster(scene),

@@ -2,11 +2,11 @@
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 
-use wake_dataset::{Folder, Pair};
 use crate::error::Result;
-use wake_nn::noise::NoiseSource;
 use crate::streams;
+use wake_dataset::{Folder, Pair};
 use wake_ldm::pipeline::{PipelineParts, token_ids};
+use wake_nn::noise::NoiseSource;
 
 /// Part of the pairs whose prompt is left out, for guidance.
 const WITHOUT_PROMPT: f64 = 0.1;

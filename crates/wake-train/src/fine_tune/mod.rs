@@ -11,15 +11,15 @@ use serde_json::{Value, json};
 
 use super::checkpoint::Checkpoint;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
-use wake_ldm::autoencoder::AutoencoderKl;
 use crate::error::{Error, Result};
+use crate::streams::{self, FINE_TUNE_STREAM};
+use wake_ldm::autoencoder::AutoencoderKl;
 use wake_ldm::lora::LowRank;
-use wake_nn::noise::{NoiseSource, normal_batch};
-use crate::streams::{FINE_TUNE_STREAM, self};
-use wake_ldm::streams::POSTERIOR_STREAM;
 use wake_ldm::scheduler::{NoiseLevel, NoiseSchedule, Prediction};
+use wake_ldm::streams::POSTERIOR_STREAM;
 use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetInput};
+use wake_nn::noise::{NoiseSource, normal_batch};
 use wake_nn::weights::Layout;
 
 pub use batches::PromptedBatches;

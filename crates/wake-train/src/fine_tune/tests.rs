@@ -6,11 +6,11 @@ use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 
 use super::*;
+use crate::tensors::values;
+use crate::{Rate, TrainerOptions};
 use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::scheduler::{BetaCurve, NoiseSchedule, Prediction, TerminalSnr};
 use wake_ldm::text::ClipTextConfig;
-use crate::tensors::values;
-use crate::{Rate, TrainerOptions};
 use wake_ldm::unet::{UNet, UNetConfig};
 
 const BATCH: usize = 4;

@@ -13,13 +13,13 @@ use super::super::progress::Progress;
 use super::super::stage_options::{StageOptions, Usual};
 use super::super::trainer::TrainerOptions;
 use super::{FineTune, FineTuneOptions, Frozen, PromptedBatches};
-use wake_dataset::Folder;
 use crate::error::{Error, Result};
-use whole_files::read_text;
-use whole_files::fingerprint;
+use wake_dataset::Folder;
 use wake_ldm::pipeline::{Pipeline, PipelineParts};
 use wake_ldm::scheduler::Prediction;
 use wake_nn::weights::Precision;
+use whole_files::fingerprint;
+use whole_files::read_text;
 
 /// The paper's recipe: batch 16, rate 1e-5.
 const USUAL: Usual = Usual {
@@ -117,11 +117,13 @@ impl FineTuning<'_> {
     fn begin(&self, parts: &PipelineParts) -> Result<FineTune> {
         let scheduler = &parts.scheduler;
         let schedule = scheduler.noise_schedule().cloned();
-        let schedule = schedule.ok_or_else(|| Error::Value(wake_nn::Error::Unsupported {
-            option: "scheduler of a fine-tuned model".to_owned(),
-            value: scheduler.class().to_owned(),
-            supported: "those with a noise schedule to train with".to_owned(),
-        }))?;
+        let schedule = schedule.ok_or_else(|| {
+            Error::Value(wake_nn::Error::Unsupported {
+                option: "scheduler of a fine-tuned model".to_owned(),
+                value: scheduler.class().to_owned(),
+                supported: "those with a noise schedule to train with".to_owned(),
+            })
+        })?;
         let prediction = match scheduler.to_json()["prediction_type"].as_str() {
             Some("v_prediction") => Prediction::Velocity,
             Some("sample") => Prediction::Sample,

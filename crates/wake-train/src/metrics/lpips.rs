@@ -292,15 +292,13 @@ fn read(
     path: &Path,
     wanted: impl Fn(&SafeTensors<'_>) -> Vec<(String, Vec<usize>)>,
 ) -> Result<Vec<(String, TensorData)>> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Value(wake_nn::Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    }))?;
-    let file = SafeTensors::deserialize(&bytes).map_err(|error| Error::Value(wake_nn::Error::InvalidSafetensors {
-        path: path.to_owned(),
-        reason: error.into(),
-    }))?;
+    let bytes = whole_files::read_bytes(path)?;
+    let file = SafeTensors::deserialize(&bytes).map_err(|error| {
+        Error::Value(wake_nn::Error::InvalidSafetensors {
+            path: path.to_owned(),
+            reason: error.into(),
+        })
+    })?;
     let (mut found, mut mismatch) = (Vec::new(), Mismatch::default());
     for (name, shape) in wanted(&file) {
         match file.tensor(&name) {

@@ -6,10 +6,10 @@ use burn::tensor::Device;
 use serde_json::Value;
 
 use super::*;
+use crate::{Rate, Run, RunOptions, TrainerOptions};
 use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::scheduler::{BetaCurve, TerminalSnr};
 use wake_ldm::text::ClipTextConfig;
-use crate::{Rate, Run, RunOptions, TrainerOptions};
 use wake_ldm::unet::UNetConfig;
 
 fn options(batch: usize, peak: f64, steps: usize) -> RunOptions {

@@ -10,8 +10,8 @@ use super::super::sheet::write_sheet;
 use super::super::stage_options::StageOptions;
 use super::super::tasks::PriorTask;
 use super::{ACROSS, PATCHES, PRIOR, SHEET, WakeStage, WakeTraining, keep};
-use wake_dataset::Pair;
 use crate::error::Result;
+use wake_dataset::Pair;
 use wake_ldm::network::{Foreseen, PatchTransform, Prior, WakeModelConfig};
 
 impl WakeTraining<'_> {

@@ -19,9 +19,9 @@ use super::progress::{Progress, counted};
 use super::stage::Stage;
 use super::stage_options::{StageOptions, Usual};
 use crate::error::{Error, Result};
-use whole_files::fingerprint;
 use wake_ldm::network::{PatchTransform, WakeModelConfig};
 use wake_nn::weights::{Layout, Precision, load, save_as};
+use whole_files::fingerprint;
 
 /// Names of what the stages write.
 const PATCHES: &str = "patches.safetensors";
@@ -151,11 +151,13 @@ impl<'a> WakeTraining<'a> {
     }
 
     fn pairs(&self) -> Result<&TrainingPairs> {
-        self.pairs.as_ref().ok_or_else(|| Error::Value(wake_nn::Error::InvalidOption {
-            option: "pairs".to_owned(),
-            value: "none".to_owned(),
-            expected: "pairs to learn from: only words need none".to_owned(),
-        }))
+        self.pairs.as_ref().ok_or_else(|| {
+            Error::Value(wake_nn::Error::InvalidOption {
+                option: "pairs".to_owned(),
+                value: "none".to_owned(),
+                expected: "pairs to learn from: only words need none".to_owned(),
+            })
+        })
     }
 
     fn out(&self, name: &str) -> PathBuf {

@@ -7,10 +7,10 @@ use super::super::run::Run;
 use super::super::stage_options::StageOptions;
 use super::super::tasks::WordsTask;
 use super::{PARSER, WakeStage, WakeTraining, keep};
-use wake_ldm::conditioning::Vocabulary;
+use crate::error::Result;
 use crate::prompts::Prompts;
 use wake_dataset::{Recipe, Simulated};
-use crate::error::Result;
+use wake_ldm::conditioning::Vocabulary;
 use wake_ldm::network::{PromptParser, WakeModelConfig};
 
 /// Ranges that prompts to read are drawn from, beyond those of images.

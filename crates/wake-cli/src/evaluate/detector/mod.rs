@@ -14,7 +14,7 @@ use wake_train::detector::judging::{Searched, compared};
 use wake_train::detector::Recipe;
 
 use crate::exit::{self, Outcome};
-use crate::{named, progress};
+use crate::{named, picture, progress};
 use recall::{by_scene, by_visibility};
 use report::Report;
 
@@ -44,10 +44,12 @@ pub(crate) struct Options {
 /// A name and a file.
 fn rung(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
-        Some((name, file)) if !name.is_empty() && !file.is_empty() => {
+        Some((name, file))
+            if !name.is_empty() && !name.contains(['/', '\\']) && !file.is_empty() =>
+        {
             Ok((name.to_owned(), PathBuf::from(file)))
         }
-        _ => Err("expected NAME=FILE".to_owned()),
+        _ => Err("expected NAME=FILE, with a name that can be part of a file's".to_owned()),
     }
 }
 
@@ -73,6 +75,13 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         ("Radon", Finder::Radon),
     ];
     for (name, file) in &options.rung {
+        // Pictures bear these names, in small letters.
+        if finders
+            .iter()
+            .any(|(other, _)| other.eq_ignore_ascii_case(name))
+        {
+            return Err(format!("--rung {name} has the name of another finder; rename it").into());
+        }
         finders.push((name, network(Some(file))?));
     }
     let (tiles, sea) = match &options.real {
@@ -88,8 +97,9 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         rungs: options.rung.iter().map(|(name, _)| name.clone()).collect(),
         ..Report::default()
     };
+    let mut speeds = String::new();
     for recipe in [Recipe::Detector, Recipe::Painted] {
-        simulated(&finders, recipe, options, &mut report)?;
+        speeds.push_str(&simulated(&finders, recipe, options, &mut report)?);
     }
     for (name, finder) in &finders {
         if !tiles.is_empty() {
@@ -100,15 +110,16 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         report.sea = real_sea::told_apart(&sea)?;
     }
     report.write(&options.out)?;
-    Ok(exit::say(&report.text())?)
+    Ok(exit::say(&format!("{speeds}{}", report.text()))?)
 }
 
+/// Adds the rows of a recipe, and draws its first images; gives a line with the speed of the search.
 fn simulated(
     finders: &[(&str, Finder)],
     recipe: Recipe,
     options: &Options,
     report: &mut Report,
-) -> Outcome<()> {
+) -> Outcome<String> {
     let source = recipe.source(HELD_OUT, SIZE)?;
     let count = u64::from(options.images);
     let bar = progress::bar(count, recipe.name());
@@ -135,11 +146,11 @@ fn simulated(
         report.scenes = by_scene(recipe, &names, &searched);
     }
     let megapixels = (SIZE * SIZE) as f64 * 1e-6;
-    exit::say(&format!(
-        "{}: {:.2} megapixels a second",
-        recipe.name(),
-        megapixels / searched.seconds
-    ))?;
     let path = options.out.join(format!("{}.png", recipe.name()));
-    Ok(sheet(&pictures, 4).save(path)?)
+    picture::write(&sheet(&pictures, 4), &path)?;
+    let speed = megapixels / searched.seconds;
+    Ok(format!(
+        "{}: {speed:.2} megapixels a second\n",
+        recipe.name()
+    ))
 }

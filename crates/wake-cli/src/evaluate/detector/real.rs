@@ -8,6 +8,7 @@ use wake_detector::{Detection, Finder};
 
 use super::report::Report;
 use crate::exit::Outcome;
+use crate::picture;
 
 /// The tiles of a folder with their labels.
 pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
@@ -39,7 +40,10 @@ pub(crate) fn judge(
     report.add("real, clear and probable wakes", name, &both);
     for (i, (tile, found)) in searched().enumerate() {
         let file = format!("real-{}-{:02}.png", name.to_lowercase(), i + 1);
-        compared(&tile.image, &tile.wakes(), found).save(out.join(file))?;
+        picture::write(
+            &compared(&tile.image, &tile.wakes(), found),
+            &out.join(file),
+        )?;
     }
     Ok(())
 }

@@ -25,7 +25,8 @@ const OF_A_HALF: usize = 4;
 pub(crate) fn windows(folder: &Path, tiles: &[Tile]) -> Outcome<Vec<Field>> {
     let mut windows = Vec::new();
     for tile in tiles {
-        let mask = folder.join(tile.name.replace(".png", "_mask.png"));
+        let stem = Path::new(&tile.name).with_extension("");
+        let mask = folder.join(format!("{}_mask.png", stem.display()));
         let mask = mask.is_file().then(|| GreyImage::read(&mask)).transpose()?;
         let found = paired_windows(&tile.image, mask.as_ref(), WINDOW, OF_A_HALF);
         windows.extend(found.into_iter().map(field));

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use wake_detector::score::{Curve, Judged, Rule};
+use whole_files::write_atomically;
 
 use super::real_sea;
 
@@ -41,12 +42,10 @@ impl Report {
     }
 
     /// Writes `report.json` and `report.md` into a folder.
-    pub(crate) fn write(&self, folder: &Path) -> Result<(), String> {
+    pub(crate) fn write(&self, folder: &Path) -> whole_files::Result<()> {
         let rows = format!("{:#}\n", json!({"rows": self.rows, "sea": self.sea}));
         for (name, text) in [("report.json", rows), ("report.md", self.text())] {
-            let path = folder.join(name);
-            let failed = |error| format!("cannot write {}: {error}", path.display());
-            std::fs::write(&path, text).map_err(failed)?;
+            write_atomically(&folder.join(name), text.as_bytes())?;
         }
         Ok(())
     }

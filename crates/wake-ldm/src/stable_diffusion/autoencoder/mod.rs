@@ -11,12 +11,12 @@ use burn::module::Module;
 use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
 
+use blocks::{Decoder, Encoder};
 use wake_nn::Result;
 use wake_nn::cast_to;
 use wake_nn::conv::{conv1x1, convolve};
 use wake_nn::patch::{depth_to_space, space_to_depth};
 use wake_nn::weights::{Layout, load};
-use blocks::{Decoder, Encoder};
 
 pub use config::AutoencoderKlConfig;
 pub use gaussian::GaussianPosterior;

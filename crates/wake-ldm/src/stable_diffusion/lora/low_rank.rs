@@ -8,11 +8,11 @@ use burn::module::{Initializer, Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{DType, Tensor};
 use safetensors::tensor::{Dtype, TensorView};
 
-use wake_nn::{Result, check_range};
-use whole_files::write_synced;
 use wake_nn::cast_to;
 use wake_nn::weights::Layout;
 use wake_nn::weights::names::ModulePath;
+use wake_nn::{Result, check_range};
+use whole_files::write_synced;
 
 /// Low-rank changes of some linear layers of a model.
 ///
@@ -194,8 +194,8 @@ mod tests {
     use burn::tensor::Device;
 
     use super::*;
-    use wake_nn::attention::CrossAttention;
     use crate::stable_diffusion::lora::merge_lora;
+    use wake_nn::attention::CrossAttention;
 
     #[derive(Module, Debug)]
     struct Block {

@@ -9,12 +9,12 @@ use std::path::Path;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
-use wake_nn::{Error, Mismatch, Misshapen, Result};
+use strength::{NOTE, Strength};
 use wake_nn::cast_to;
 use wake_nn::weights::files::{Stored, WeightFiles};
 use wake_nn::weights::names::ModulePath;
 use wake_nn::weights::{Layout, shapes};
-use strength::{NOTE, Strength};
+use wake_nn::{Error, Mismatch, Misshapen, Result};
 
 pub use low_rank::LowRank;
 

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
+use wake_nn::{Error, Result, check_range};
 
 /// Entry of a file's header in which diffusers writes how an adaptation was trained.
 pub(super) const NOTE: &str = "lora_adapter_metadata";

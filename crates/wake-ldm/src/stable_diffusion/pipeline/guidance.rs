@@ -41,8 +41,8 @@ fn deviation(x: Tensor<4>) -> Tensor<4> {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
-    use wake_nn::noise::{NoiseSource, normal_batch};
     use burn::tensor::Device;
+    use wake_nn::noise::{NoiseSource, normal_batch};
 
     fn batch(seeds: [u64; 2]) -> Tensor<4> {
         normal_batch(&seeds.map(NoiseSource::new), 0, [2, 3, 5], &Device::flex())

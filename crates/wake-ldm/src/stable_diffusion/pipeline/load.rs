@@ -8,12 +8,12 @@ use wake_text::{TOKENS, Tokenizer};
 
 use super::{Pipeline, PipelineParts};
 use crate::error::{Error, Result};
-use wake_nn::check_range;
-use whole_files::read_text;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
 use crate::stable_diffusion::text::ClipText;
 use crate::unet::UNet;
+use wake_nn::check_range;
+use whole_files::read_text;
 
 /// CLIP's vocabulary: the largest id that its tokenizer gives, and one.
 const CLIP_VOCABULARY: usize = 49408;
@@ -82,10 +82,12 @@ fn check_index(path: &Path) -> Result<()> {
     if !path.exists() {
         return Ok(());
     }
-    let index: Value = serde_json::from_str(&read_text(path)?).map_err(|source| Error::Model(wake_nn::Error::Json {
-        path: path.to_owned(),
-        source,
-    }))?;
+    let index: Value = serde_json::from_str(&read_text(path)?).map_err(|source| {
+        Error::Model(wake_nn::Error::Json {
+            path: path.to_owned(),
+            source,
+        })
+    })?;
     let class = &index["_class_name"];
     if class.as_str().is_some_and(|class| CLASSES.contains(&class)) {
         return Ok(());

@@ -19,7 +19,6 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use wake_text::Tokenizer;
 
 use crate::error::Result;
-use wake_nn::check_range;
 #[cfg(feature = "flex")]
 use crate::self_check::check_once;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;
@@ -27,6 +26,7 @@ use crate::stable_diffusion::lora::merge_lora;
 use crate::stable_diffusion::scheduler::SchedulerConfig;
 use crate::stable_diffusion::text::ClipText;
 use crate::unet::UNet;
+use wake_nn::check_range;
 use wake_nn::weights::{self, Layout};
 
 use request::invalid;

@@ -3,9 +3,9 @@
 use burn::tensor::Tensor;
 
 use crate::error::{Error, Result};
+use crate::stable_diffusion::scheduler::SchedulerConfig;
 use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
-use crate::stable_diffusion::scheduler::SchedulerConfig;
 
 /// Words, or what the text encoder made of them.
 #[derive(Debug, Clone)]

@@ -8,11 +8,11 @@ use super::Pipeline;
 use super::guidance::Guidance;
 use super::request::{Request, StartImage, invalid};
 use crate::error::Result;
+use crate::stable_diffusion::scheduler::{Scheduler, StepInput};
+use crate::streams::{INITIAL_STREAM, POSTERIOR_STREAM, STEP_STREAM};
+use crate::unet::UNetInput;
 use wake_nn::check_finite;
 use wake_nn::noise::{NoiseSource, normal_batch};
-use crate::streams::{INITIAL_STREAM, POSTERIOR_STREAM, STEP_STREAM};
-use crate::stable_diffusion::scheduler::{Scheduler, StepInput};
-use crate::unet::UNetInput;
 
 /// How far a run is, and what it has so far.
 #[derive(Debug)]

@@ -7,8 +7,8 @@ use wake_text::Tokenizer;
 
 use super::Pipeline;
 use crate::error::Result;
-use whole_files::write_atomically;
 use wake_nn::weights::{Layout, Precision, save_folder};
+use whole_files::write_atomically;
 
 impl Pipeline {
     /// Writes a folder that [`load`](Self::load) and diffusers' `StableDiffusionPipeline` read:

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use wake_nn::{Result, check_range};
 use crate::options::Options;
+use wake_nn::{Result, check_range};
 
 /// The shape of the noise added per training step, βₜ.
 #[derive(Debug, Clone, PartialEq)]

@@ -19,8 +19,8 @@ use super::pndm::PndmConfig;
 use super::sigma_sampler::SigmaConfig;
 use super::unipc::UniPcConfig;
 use super::{Method, NoiseSchedule, Scheduler, SchedulerOption};
-use wake_nn::{Error, Result};
 use crate::options::Options;
+use wake_nn::{Error, Result};
 
 /// A method by its short name and its class name in diffusers, and how its options are read.
 struct Class {

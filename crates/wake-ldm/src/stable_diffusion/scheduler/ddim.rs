@@ -8,8 +8,8 @@ use super::whole_path::WholePath;
 use super::{
     Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
 };
-use wake_nn::{Result, check_range};
 use crate::options::Options;
+use wake_nn::{Result, check_range};
 
 /// Options of [`Ddim`].
 #[derive(Debug, Clone)]

@@ -10,8 +10,8 @@ use super::whole_path::WholePath;
 use super::{
     Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
 };
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// How much fresh noise a step adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

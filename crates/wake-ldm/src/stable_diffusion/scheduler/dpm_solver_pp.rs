@@ -8,8 +8,8 @@ use super::log_snr_path::{LogSnrPath, PathOptions};
 use super::sigmas::{SigmaOptions, Spread, take_final_zero};
 use super::spacing::{Spacing, Steps};
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// Runs shorter than this end at lower order.
 const SHORT_RUN: usize = 15;

@@ -7,8 +7,8 @@ use super::betas::DEFAULTS;
 use super::prediction::Prediction;
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use super::sigmas::{SigmaOptions, SigmaPath, Spread, round, take_final_zero};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// Follows dx/dσ = (x − x₀)/σ by straight lines.
 ///

@@ -6,8 +6,8 @@ use super::betas::DEFAULTS;
 use super::prediction::Prediction;
 use super::required;
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// Steps further down than the next level, and adds noise to come back up to it.
 ///

@@ -4,8 +4,8 @@ use super::prediction::{Clipping, Prediction};
 use super::sigmas::{SigmaOptions, Spread, check_positive, round};
 use super::spacing::linspace;
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, required};
-use wake_nn::{Result, check_range};
 use crate::options::Options;
+use wake_nn::{Result, check_range};
 
 /// Options of [`FlowMatchEuler`].
 #[derive(Debug, Clone)]

@@ -6,8 +6,8 @@ use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::{Clipping, Prediction};
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use super::sigmas::{SigmaOptions, SigmaPath, Spread};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// A trial step to the next level, then the same step with the mean of both slopes.
 ///

@@ -5,8 +5,8 @@ use burn::tensor::Tensor;
 use super::prediction::{Clipping, Prediction};
 use super::sigmas::Spread;
 use super::{NoiseLevel, StepInput};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// Options of every exponential integrator.
 #[derive(Debug, Clone)]

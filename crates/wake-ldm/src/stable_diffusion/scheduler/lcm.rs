@@ -6,8 +6,8 @@ use super::whole_path::WholePath;
 use super::{
     Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput, TerminalSnr, required,
 };
-use wake_nn::{Result, check_range};
 use crate::options::Options;
+use wake_nn::{Result, check_range};
 
 /// The standard deviation of the data that the boundary condition assumes.
 const SIGMA_DATA: f64 = 0.5;

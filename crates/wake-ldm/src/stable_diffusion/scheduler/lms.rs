@@ -6,8 +6,8 @@ use super::betas::{DEFAULTS, ScheduleDefaults};
 use super::prediction::Prediction;
 use super::sigma_sampler::{Call, SigmaConfig, SigmaMethod};
 use super::sigmas::{SigmaOptions, Spread};
-use wake_nn::{Result, check_range};
 use crate::options::Options;
+use wake_nn::{Result, check_range};
 
 /// A polynomial through the slopes of the last four levels, integrated to the next.
 ///

@@ -38,8 +38,8 @@ mod whole_path;
 
 use burn::tensor::Tensor;
 
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 pub use betas::{BetaCurve, TerminalSnr};
 pub use config::SchedulerConfig;

@@ -7,8 +7,8 @@ use super::prediction::Prediction;
 use super::spacing::{Steps, steps_out_of_range};
 use super::whole_path::WholePath;
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// Steps that the Runge-Kutta start needs.
 const ORDER: usize = 4;

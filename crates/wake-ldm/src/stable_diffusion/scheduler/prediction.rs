@@ -2,8 +2,8 @@
 
 use burn::tensor::Tensor;
 
-use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
+use wake_nn::{Error, Result, check_range};
 
 /// How much of the clean image and how much noise a noisy image holds.
 ///

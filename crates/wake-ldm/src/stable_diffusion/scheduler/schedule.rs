@@ -2,8 +2,8 @@
 
 use super::betas::{BetaCurve, ScheduleDefaults, TerminalSnr};
 use super::prediction::NoiseLevel;
-use wake_nn::{Result, check_range};
 use crate::options::Options;
+use wake_nn::{Result, check_range};
 
 /// The signal that is left after each training step.
 ///

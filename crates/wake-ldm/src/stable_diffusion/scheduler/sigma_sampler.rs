@@ -7,8 +7,8 @@ use super::prediction::{Clipping, Prediction};
 use super::sigmas::{SigmaOptions, SigmaPath};
 use super::spacing::Steps;
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// One way to move along the slope.
 pub(super) trait SigmaMethod: std::fmt::Debug + Clone + Send + Sync + 'static {

@@ -2,8 +2,8 @@
 
 use super::spacing::{Spacing, Steps, linspace};
 use super::{NoiseLevel, NoiseSchedule};
-use wake_nn::{Error, Result};
 use crate::options::Options;
+use wake_nn::{Error, Result};
 
 /// How noise levels are spread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Which training steps a sampler visits.
 
-use wake_nn::{Error, Result, check_range};
 use crate::options::Options;
+use wake_nn::{Error, Result, check_range};
 
 /// How the visited steps are spread over the training steps.
 ///

@@ -11,8 +11,8 @@ use super::sigmas::{SigmaOptions, Spread, take_final_zero};
 use super::spacing::Steps;
 use super::unipc_weights::{moments, solve};
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
-use wake_nn::Result;
 use crate::options::Options;
+use wake_nn::Result;
 
 /// Options of [`UniPc`].
 #[derive(Debug, Clone)]

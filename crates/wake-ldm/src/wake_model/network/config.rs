@@ -8,9 +8,9 @@ use wake_physics::grey::GreyScale;
 
 use super::domain::Domain;
 use crate::error::{Error, Result};
-use wake_nn::check_range;
 use crate::unet::UNetConfig;
 use crate::wake_model::conditioning::{FEATURES, Vocabulary};
+use wake_nn::check_range;
 
 /// Widths of a [`WakeModel`](super::WakeModel), its image, and the tokens it knows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -77,10 +77,12 @@ impl WakeModelConfig {
     /// [`wake_nn::Error::Json`] with `path` for text that is no such configuration, and what
     /// [`validate`](Self::validate) finds.
     pub fn from_json(text: &str, path: &Path) -> Result<Self> {
-        let config: Self = serde_json::from_str(text).map_err(|source| Error::Model(wake_nn::Error::Json {
-            path: path.to_owned(),
-            source,
-        }))?;
+        let config: Self = serde_json::from_str(text).map_err(|source| {
+            Error::Model(wake_nn::Error::Json {
+                path: path.to_owned(),
+                source,
+            })
+        })?;
         config.validate()?;
         Ok(config)
     }

@@ -129,10 +129,12 @@ impl std::fmt::Display for Seen {
 
 /// All values of a scene by their keys; those of every ship under the same ones. An infinite depth is a word.
 fn leaves(scene: &Scene) -> Result<Vec<(String, Value)>> {
-    let json = |source| Error::Model(wake_nn::Error::Json {
-        path: "scene".into(),
-        source,
-    });
+    let json = |source| {
+        Error::Model(wake_nn::Error::Json {
+            path: "scene".into(),
+            source,
+        })
+    };
     let mut shared = scene.clone();
     let ships = std::mem::take(&mut shared.ships);
     let mut found = vec![(SHIPS.to_owned(), Value::from(ships.len()))];

@@ -6,12 +6,12 @@ use burn::tensor::{DType, Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::known::Known;
+use crate::unet::{UNet, UNetInput};
+use crate::wake_model::conditioning::PLACES;
 use wake_nn::activation::silu;
 use wake_nn::cast_to;
 use wake_nn::conv::{conv3x3, convolve};
 use wake_nn::patch::{depth_to_space, space_to_depth};
-use crate::unet::{UNet, UNetInput};
-use crate::wake_model::conditioning::PLACES;
 
 /// The steps that σ = 1 stands for in the embedding of the step.
 const STEPS: f64 = 1000.0;

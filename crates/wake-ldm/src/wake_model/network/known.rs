@@ -145,11 +145,7 @@ pub fn expected_greys(scenes: &[Scene], scale: &GreyScale) -> Result<Vec<Vec<f32
 }
 
 /// An image of each scene, all of one size, `[scenes, 1, rows, columns]` on the device of `patches`.
-pub fn images_of(
-    scenes: &[Scene],
-    images: &[Vec<f32>],
-    patches: &PatchTransform,
-) -> Tensor<4> {
+pub fn images_of(scenes: &[Scene], images: &[Vec<f32>], patches: &PatchTransform) -> Tensor<4> {
     let [rows, columns] = scenes
         .first()
         .map_or([0, 0], |scene| [scene.grid.rows, scene.grid.columns]);

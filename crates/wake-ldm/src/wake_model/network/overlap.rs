@@ -4,9 +4,9 @@ use std::f64::consts::{PI, SQRT_2};
 
 use burn::tensor::{Tensor, TensorData};
 
+use crate::wake_model::conditioning::PATCH;
 use wake_nn::cast_to;
 use wake_nn::patch::{depth_to_space, space_to_depth};
-use crate::wake_model::conditioning::PATCH;
 
 /// Pixels on each side of a border that are filtered.
 pub(super) const REACH: usize = PATCH / 2;
@@ -103,8 +103,8 @@ fn across_a_border() -> [[f64; PATCH]; PATCH] {
 #[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
-    use wake_nn::noise::NoiseSource;
     use burn::tensor::Device;
+    use wake_nn::noise::NoiseSource;
 
     fn image(rows: usize, columns: usize) -> Tensor<4> {
         let values = NoiseSource::new(5).normal(0, rows * columns);

@@ -4,8 +4,8 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::overlap::{self, PIXELS, REACH};
-use wake_nn::patch::{depth_to_space, space_to_depth};
 use crate::wake_model::conditioning::PATCH;
+use wake_nn::patch::{depth_to_space, space_to_depth};
 
 /// Rows and columns of pixels that one square of latents reaches.
 pub(super) const WINDOW: usize = PATCH + 2 * REACH;

@@ -7,10 +7,10 @@ use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::known::Known;
+use crate::wake_model::conditioning::{FEATURES, PLACES};
 use wake_nn::activation::silu;
 use wake_nn::cast_to;
 use wake_nn::conv::{conv1x1, convolve};
-use crate::wake_model::conditioning::{FEATURES, PLACES};
 
 /// Largest |c|.
 const LARGEST_LOG_SPREAD: f64 = 3.0;

@@ -6,9 +6,9 @@ use burn::tensor::activation::gelu;
 use burn::tensor::{DType, Device, Int, Tensor, TensorData};
 
 use super::config::WakeModelConfig;
+use crate::wake_model::conditioning::{QUANTITIES, Vocabulary};
 use wake_nn::attention::CrossAttention;
 use wake_nn::cast_to;
-use crate::wake_model::conditioning::{QUANTITIES, Vocabulary};
 
 /// Tokens on each side that a token sees at once.
 const REACH: usize = 6;

@@ -8,8 +8,8 @@ use super::known::{images_of, runs_of_equals};
 use super::patches::PatchTransform;
 use super::windows::ChannelWindows;
 use crate::error::Result;
-use wake_nn::noise::{NoiseSource, normal_batch};
 use crate::streams::{INITIAL_STREAM, WHITE_STREAM};
+use wake_nn::noise::{NoiseSource, normal_batch};
 
 /// Share of the noise that is white in every channel: what the image has beyond the first order needs some to start from.
 const WHITE: f64 = 0.05;

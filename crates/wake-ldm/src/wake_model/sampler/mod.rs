@@ -15,9 +15,6 @@ use wake_physics::{Field, Scene, labels_of};
 use wake_text::{Reading, Unread, Wording};
 
 use crate::error::{Error, Result};
-use wake_nn::check_range;
-use wake_nn::check_finite;
-use wake_nn::noise::NoiseSource;
 #[cfg(feature = "flex")]
 use crate::self_check::check_once;
 use crate::wake_model::conditioning::{Conditions, Vocabulary};
@@ -28,6 +25,9 @@ use crate::wake_model::network::{
 use crate::wake_model::sea_texture::SeaTexture;
 pub use image::speckled;
 pub use image::{SampleSeconds, WakeImage};
+use wake_nn::check_finite;
+use wake_nn::check_range;
+use wake_nn::noise::NoiseSource;
 
 /// Steps from noise to image, unless others are asked for.
 const STEPS: usize = 3;

@@ -323,7 +323,10 @@ fn a_model_with_a_number_that_is_none_says_so() {
     let sampler = WakeSampler::new(model, good.config).unwrap();
     let refused = sampler.sample(PROMPT, 0);
     assert!(
-        matches!(&refused, Err(Error::Model(wake_nn::Error::NotFinite { .. }))),
+        matches!(
+            &refused,
+            Err(Error::Model(wake_nn::Error::NotFinite { .. }))
+        ),
         "{refused:?}"
     );
 }

@@ -101,12 +101,7 @@ impl SeaFlow {
     /// # Shapes
     ///
     /// `x` and result: `[batch, 1, rows, columns]`, multiples of 8; `sigma`: 0 to 1, `[batch]`.
-    pub fn velocity(
-        &self,
-        x: Tensor<4>,
-        sigma: Tensor<1>,
-        features: Tensor<2>,
-    ) -> Tensor<4> {
+    pub fn velocity(&self, x: Tensor<4>, sigma: Tensor<1>, features: Tensor<2>) -> Tensor<4> {
         let dtype = self.dtype();
         let waves = sinusoidal_embedding(sigma * STEPS, WIDTHS[0], true, 0.0);
         let told =

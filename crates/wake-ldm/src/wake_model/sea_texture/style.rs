@@ -5,9 +5,9 @@ use wake_physics::correlated::{CorrelatedNoise, Correlation};
 use wake_physics::measure::{Texture, texture};
 
 use crate::error::{Error, Result};
+use crate::streams::SEA_TEXTURE_STREAM;
 use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
-use crate::streams::SEA_TEXTURE_STREAM;
 
 /// Largest distance of pixels whose correlation a style keeps.
 pub(super) const LAGS: usize = 32;

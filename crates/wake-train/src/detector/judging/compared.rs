@@ -2,10 +2,10 @@
 
 use image::RgbImage;
 
-use wake_detector::Detector;
-use wake_detector::drawing::Drawing;
-use wake_detector::GreyImage;
 use crate::detector::FOUND;
+use wake_detector::Detector;
+use wake_detector::GreyImage;
+use wake_detector::drawing::Drawing;
 use wake_detector::{Detection, Wake};
 
 /// The colour of wakes that are known.

@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use wake_dataset::Source;
 use wake_physics::Scene;
 
+use crate::detector::{FOUND, Sample};
 use crate::error::Result;
 use wake_detector::Finder;
 use wake_detector::GreyImage;
 use wake_detector::score::{Judged, Label, Ray};
-use crate::detector::{FOUND, Sample};
 use wake_detector::{Detection, Wake};
 
 /// Images searched at a time.

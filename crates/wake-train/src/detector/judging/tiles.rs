@@ -8,8 +8,8 @@ use whole_files::read_text;
 
 use crate::error::{Error, Result};
 use wake_detector::GreyImage;
-use wake_detector::score::{Judged, Label, Point, Ray};
 use wake_detector::Wake;
+use wake_detector::score::{Judged, Label, Point, Ray};
 
 /// A tile and what is known of it.
 #[derive(Debug, Clone)]

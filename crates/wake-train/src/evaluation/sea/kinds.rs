@@ -6,11 +6,11 @@ use wake_physics::sar::speckle::speckle;
 use wake_physics::{Field, Scene, Simulator, expected_intensity};
 
 use super::pair::{SeaPair, window};
-use wake_dataset::{Grey, Recipe, Simulated};
 use crate::error::Result;
 use crate::evaluation::baseline::gaussian_sea;
-use wake_nn::noise::NoiseSource;
+use wake_dataset::{Grey, Recipe, Simulated};
 use wake_ldm::sea_texture::{PATCH, SeaStyle, SeaTexture, median};
+use wake_nn::noise::NoiseSource;
 
 /// The open sea of the recipe detector.
 const OPEN_SEA: [&str; 4] = [

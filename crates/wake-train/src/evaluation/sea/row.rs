@@ -4,8 +4,8 @@ use serde::Serialize;
 use wake_physics::Field;
 use wake_physics::measure::{Binning, Texture, radial_spectrum, texture};
 
-use wake_ldm::sea_texture::PATCH;
 use crate::TwoSample;
+use wake_ldm::sea_texture::PATCH;
 
 /// Figures of one kind of sea, means over its windows.
 #[derive(Debug, Clone, Serialize)]

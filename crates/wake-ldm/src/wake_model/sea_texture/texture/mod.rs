@@ -10,9 +10,9 @@ use wake_physics::{Field, Scene, available_memory, expected_intensity};
 use super::flow::{MULTIPLE, SeaFlow};
 use super::style::{LAGS, NUMBERS, SeaStyle};
 use crate::error::{Error, Result};
+use crate::streams;
 use wake_nn::check_range;
 use wake_nn::noise::NoiseSource;
-use crate::streams;
 use wake_nn::weights::files::WeightFiles;
 use wake_nn::weights::{Layout, Precision, load, save_noted};
 
@@ -104,11 +104,13 @@ impl SeaTexture {
         let correlations: Vec<f32> = correlations.iter::<f32>().collect();
         let rows = numbers.chunks(NUMBERS);
         let rows = rows.zip(correlations.chunks((LAGS + 1) * (2 * LAGS + 1)));
-        let broken = |what: String| Error::Model(wake_nn::Error::InvalidOption {
-            option: path.display().to_string(),
-            value: format!("no learnt sea: {what}"),
-            expected: "a file that `train -- sea` wrote".to_owned(),
-        });
+        let broken = |what: String| {
+            Error::Model(wake_nn::Error::InvalidOption {
+                option: path.display().to_string(),
+                value: format!("no learnt sea: {what}"),
+                expected: "a file that `train -- sea` wrote".to_owned(),
+            })
+        };
         let style = |(n, (numbers, correlation)): (usize, (&[f32], &[f32]))| {
             SeaStyle::of_rows(numbers, correlation).map_err(|e| broken(format!("style {n}: {e}")))
         };
@@ -139,7 +141,13 @@ impl SeaTexture {
         let spacing = self.spacing.map(|spacing| spacing.to_string());
         let note = spacing.as_ref().map(|spacing| (SPACING, spacing.as_str()));
         let precision = Precision::F16;
-        Ok(save_noted(&stored, Layout::Diffusers, path, precision, note)?)
+        Ok(save_noted(
+            &stored,
+            Layout::Diffusers,
+            path,
+            precision,
+            note,
+        )?)
     }
 
     /// Side of the pixels that were learnt \[m\], where it is known.
@@ -259,7 +267,9 @@ impl SeaTexture {
         self.check_spacing(scene.grid.spacing)?;
         let all = expected_intensity(scene)?;
         let mut silent = scene.clone();
-        silent.ships.iter_mut().for_each(|ship| ship.echo = false);
+        for ship in &mut silent.ships {
+            (ship.echo, ship.roll) = (false, 0.0);
+        }
         let sea = match silent == *scene {
             true => all.clone(),
             false => expected_intensity(&silent)?,

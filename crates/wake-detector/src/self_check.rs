@@ -1,0 +1,155 @@
+//! Can these weights find a wake at all? One fixed image tells.
+
+use std::path::Path;
+
+use burn::tensor::{Device, Tensor, TensorData};
+
+use crate::error::{Error, Result};
+use crate::network::{INPUTS, Network, OUTPUTS};
+use crate::normalize;
+
+/// Rows and columns of the image \[pixels\].
+const SIZE: usize = 256;
+/// Products that are summed for a number of a map: 3 × 3 cells of 24 channels.
+const PRODUCTS: f32 = 9.0 * 24.0;
+
+/// Runs a network on a fixed image with one plain wake, and refuses maps that no training leads to.
+///
+/// Every number must be finite. Logits and log-lengths go through the exponential function, so at least half of the numbers of
+/// each map must lie where it neither overflows nor vanishes, |x| ≤ ln(largest f32) = 88.7. Each map must vary by more than rounding,
+/// and no two may be equal. How well the wake is found is not asked: a network that has seen a few images passes.
+///
+/// # Errors
+///
+/// [`Error::WrongMaps`] with the file, and what is wrong.
+pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<()> {
+    let contrast = normalize::contrast(&plain_wake(), SIZE, SIZE);
+    let seen: Vec<[f32; INPUTS]> = contrast.into_iter().map(normalize::inputs).collect();
+    let inputs: Vec<f32> = (0..INPUTS)
+        .flat_map(|k| seen.iter().map(move |x| x[k]))
+        .collect();
+    let inputs = TensorData::new(inputs, [1, INPUTS, SIZE, SIZE]);
+    let maps = network.forward(Tensor::from_data(inputs, device));
+    let values: Vec<f32> = maps.into_data().iter::<f32>().collect();
+    match fault(&values) {
+        None => Ok(()),
+        Some(why) => Err(Error::WrongMaps {
+            path: weights.to_owned(),
+            device: format!("{device:?}"),
+            why,
+        }),
+    }
+}
+
+/// What is wrong with the maps, `[OUTPUTS, rows, columns]`.
+fn fault(values: &[f32]) -> Option<&'static str> {
+    if !values.iter().all(|x| x.is_finite()) {
+        return Some("not finite");
+    }
+    let maps: Vec<&[f32]> = values.chunks_exact(values.len() / OUTPUTS).collect();
+    let largest = f32::MAX.ln();
+    let saturated = |map: &&[f32]| {
+        let outside = map.iter().filter(|x| x.abs() > largest).count();
+        2 * outside > map.len()
+    };
+    if maps.iter().any(saturated) {
+        return Some("saturated");
+    }
+    let rounding = |map: &[f32]| {
+        let largest = map.iter().fold(0.0f32, |largest, x| largest.max(x.abs()));
+        PRODUCTS * f32::EPSILON * largest
+    };
+    let same = |map: &[f32], other: &[f32]| {
+        let allowed = rounding(map).max(rounding(other));
+        map.iter().zip(other).all(|(a, b)| (a - b).abs() <= allowed)
+    };
+    if maps.iter().any(|map| same(map, &vec![map[0]; map.len()])) {
+        return Some("constant");
+    }
+    let equal = |(k, map): (usize, &&[f32])| maps[..k].iter().any(|other| same(map, other));
+    maps.iter()
+        .enumerate()
+        .any(equal)
+        .then_some("equal to each other")
+}
+
+/// Grey levels of a dark line from (77, 128) toward the right behind a bright ship, on noise: row by row.
+fn plain_wake() -> Vec<f32> {
+    let level = |i: usize| {
+        let (right, down) = ((i % SIZE) as f32 - 77.0, (i / SIZE) as f32 - 128.0);
+        let dark = match right > 0.0 {
+            true => -0.4 * (-0.5 * (down / 4.0).powi(2) - right / 250.0).exp(),
+            false => 0.0,
+        };
+        let ship = (-0.5 * ((right + 14.0).powi(2) / 20.0 + down.powi(2) / 6.0)).exp();
+        (76.0 * (1.0 + 0.2 * normal(i as u64) + dark) + 500.0 * ship)
+            .round()
+            .clamp(0.0, 255.0)
+    };
+    (0..SIZE * SIZE).map(level).collect()
+}
+
+/// A number of mean 0 and variance 1 that follows from its place: the sum of twelve uniform ones.
+fn normal(place: u64) -> f32 {
+    let mut state = place.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut uniform = || {
+        state = (state ^ (state >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        state ^= state >> 31;
+        (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    (0..12).map(|_| uniform()).sum::<f32>() - 6.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Detector, GreyImage};
+
+    /// Numbers that maps may have: each varies, no two are equal.
+    fn good() -> Vec<f32> {
+        let cell = |i: usize| (i * 7 % 11) as f32 - 5.0;
+        (0..OUTPUTS * 16)
+            .map(|i| cell(i % 16) + (i / 16) as f32)
+            .collect()
+    }
+
+    #[test]
+    fn maps_without_a_number_without_contrast_or_alike_are_wrong() {
+        assert_eq!(fault(&good()), None);
+        let changed = |places: std::ops::Range<usize>, value: &dyn Fn(usize) -> f32| {
+            let mut maps = good();
+            for i in places {
+                maps[i] = value(i);
+            }
+            fault(&maps)
+        };
+        assert_eq!(changed(5..6, &|_| f32::NAN), Some("not finite"));
+        assert_eq!(changed(5..6, &|_| f32::INFINITY), Some("not finite"));
+        // Above ln(f32::MAX) in more than half of a map of 16.
+        assert_eq!(changed(16..25, &|i| 89.0 + i as f32), Some("saturated"));
+        assert_eq!(changed(16..24, &|i| 89.0 + i as f32), None);
+        assert_eq!(changed(16..32, &|_| -3.9), Some("constant"));
+        assert_eq!(
+            changed(16..32, &|i| good()[i - 16]),
+            Some("equal to each other")
+        );
+    }
+
+    /// The shipped network finds the wake where it is; random first weights pass as they must, whatever their seed.
+    #[test]
+    fn the_wake_is_plain_and_first_weights_pass() {
+        let device = Device::flex();
+        let levels = plain_wake().into_iter().map(|x| x as u8).collect();
+        let image = GreyImage::eight_bits(SIZE, SIZE, levels).expect("an image");
+        let found = Detector::pretrained(&device).expect("weights").find(&image);
+        let first = found.first().expect("a wake");
+        // As the ray rule has it.
+        assert!((first.wake.axis_deg - 90.0).abs() < 10.0, "{first:?}");
+        let [x, y] = first.wake.tip;
+        assert!((x - 77.0).hypot(y - 128.0) < 60.0, "{first:?}");
+        for seed in 0..8 {
+            device.seed(seed);
+            self_check(&Network::new(&device), Path::new("first"), &device).expect("sane maps");
+        }
+    }
+}
