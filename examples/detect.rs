@@ -14,7 +14,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let found = detector.find(&image);
     for one in &found {
         let ([column, row], axis) = (one.wake.tip, one.wake.axis_deg);
-        println!("score {:.2}: from ({column:.0}, {row:.0}) toward {axis:.0} degrees", one.score);
+        println!(
+            "score {:.2}: from ({column:.0}, {row:.0}) toward {axis:.0} degrees",
+            one.score
+        );
     }
     let mut drawing = Drawing::new(&image);
     drawing.found(found.iter());

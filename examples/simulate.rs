@@ -19,6 +19,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let out = Path::new("out/simulate");
     simulation.write_in(out, &simulation.quick_look())?;
-    println!("image.png, labels.json, fields.safetensors and report.json in {}", out.display());
+    println!(
+        "image.png, labels.json, fields.safetensors and report.json in {}",
+        out.display()
+    );
     Ok(())
 }

@@ -42,7 +42,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // The adaptations are a file of their own: any scale of them is added to the weights.
     let adaptations = tuned.join("pytorch_lora_weights.safetensors");
     let pipeline = pipeline.with_lora(&adaptations, 0.8)?;
-    let request = Request::new("a ship and its wake, radar image").with_steps(10).with_seed(7);
+    let request = Request::new("a ship and its wake, radar image")
+        .with_steps(10)
+        .with_seed(7);
     let bytes = to_bytes(pipeline.generate(&request)?).remove(0);
     let file = out.join("image.png");
     let [rows, columns] = [rows as u32, columns as u32];

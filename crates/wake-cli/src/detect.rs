@@ -131,12 +131,7 @@ fn search(
     Ok(())
 }
 
-fn draw(
-    image: &GreyImage,
-    found: &[Detection],
-    arguments: &Arguments,
-    file: &Path,
-) -> Outcome<()> {
+fn draw(image: &GreyImage, found: &[Detection], arguments: &Arguments, file: &Path) -> Outcome<()> {
     let mut drawing = Drawing::new(image);
     // Radon's score has no upper end; all that it tells is above its threshold.
     let sure = |one: &&Detection| {

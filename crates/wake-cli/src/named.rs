@@ -42,11 +42,7 @@ fn bounded(text: &str, low: f32, high: f32, unit: &str) -> Result<f32, String> {
 }
 
 /// The network of a file, or the one that ships, which tells wakes from a score on.
-pub(crate) fn network(
-    weights: Option<&Path>,
-    device: &str,
-    least_score: f32,
-) -> Outcome<Detector> {
+pub(crate) fn network(weights: Option<&Path>, device: &str, least_score: f32) -> Outcome<Detector> {
     let device = device_named(device)?;
     let detector = match weights {
         Some(file) => Detector::load(file, &device)?,

@@ -10,9 +10,7 @@ use crate::exit::{self, Outcome};
 
 /// Turn a scene into a prompt and its CLIP tokens, or read a prompt back.
 #[derive(Args)]
-#[command(
-    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
-)]
+#[command(after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md")]
 pub(crate) struct Arguments {
     /// Scene file (TOML); without it and without --text, the default scene.
     #[arg(long, value_name = "FILE", conflicts_with = "text")]
@@ -66,12 +64,7 @@ fn read_scene(arguments: &Arguments) -> wake_physics::Result<Scene> {
 }
 
 /// `scene` holds the stated values on top of `base`; it is null if nothing is stated.
-fn as_json(
-    prompt: &str,
-    tokens: &Tokens,
-    reading: &Reading,
-    base: &Scene,
-) -> Outcome<Value> {
+fn as_json(prompt: &str, tokens: &Tokens, reading: &Reading, base: &Scene) -> Outcome<Value> {
     let scene = (!reading.states_nothing()).then(|| reading.scene.onto(base));
     let scene = scene.transpose()?;
     Ok(json!({

@@ -8,7 +8,9 @@ use crate::exit::{self, Outcome};
 
 /// Print the completions of a shell.
 #[derive(Args)]
-#[command(after_help = "For bash: wake completions bash > ~/.local/share/bash-completion/completions/wake")]
+#[command(
+    after_help = "For bash: wake completions bash > ~/.local/share/bash-completion/completions/wake"
+)]
 pub(crate) struct Completions {
     #[arg(value_name = "SHELL")]
     shell: Shell,
@@ -39,6 +41,10 @@ pub(crate) fn man(arguments: &Man) -> Outcome<()> {
     whole_files::make_folder(out)?;
     clap_mangen::generate_to(crate::Program::command(), out)
         .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
-    exit::say(&format!("manual pages in {}; man -l {}/wake.1", out.display(), out.display()))?;
+    exit::say(&format!(
+        "manual pages in {}; man -l {}/wake.1",
+        out.display(),
+        out.display()
+    ))?;
     Ok(())
 }

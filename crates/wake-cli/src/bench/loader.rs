@@ -3,8 +3,9 @@
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
-use wake_dataset::{Loader, Recipe, Sampled, Simulated, Source};
-use wake_ldm::{WakeSampler, device_named};
+use wake_dataset::{Loader, Recipe, Simulated, Source};
+use wake_ldm::{Sampled, WakeSampler};
+use wake_nn::device_named;
 
 use crate::exit::Outcome;
 
@@ -69,11 +70,7 @@ pub(crate) fn measure(device: &str, done: impl Fn()) -> Outcome<Vec<LoaderRow>> 
 }
 
 /// Images a second of a loop that does nothing with them.
-fn images_per_second(
-    source: Arc<dyn Source>,
-    threads: usize,
-    device: &str,
-) -> Outcome<f64> {
+fn images_per_second(source: Arc<dyn Source>, threads: usize, device: &str) -> Outcome<f64> {
     let loader = Loader::new(source).batch(BATCH).threads(threads);
     let mut batches = loader.on(&device_named(device)?)?;
     for batch in batches.by_ref().take(threads) {

@@ -4,8 +4,8 @@ use super::model_row::ModelRow;
 use super::reference::Reference;
 use super::rounding::{Rounding, rounded};
 use super::row::seconds;
-use wake_nn::burn::tensor::Device;
 use wake_ldm::WakeSampler;
+use wake_nn::burn::tensor::Device;
 use wake_physics::{Field, Scene};
 
 use crate::exit::Outcome;

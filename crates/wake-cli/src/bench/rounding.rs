@@ -1,10 +1,10 @@
 //! The model in the crate with its weights rounded further.
 
-use wake_nn::burn::tensor::{Device, bf16, f16};
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use std::path::Path;
 use wake_ldm::WakeSampler;
+use wake_nn::burn::tensor::{Device, bf16, f16};
 
 use crate::exit::Outcome;
 

@@ -1,8 +1,8 @@
 //! The simulator's stages over sizes and tolerances.
 
+use super::plot;
 use super::row::{Row, instruction_set};
 use super::stages::{self, Memo, STAGES, has_tolerance};
-use super::plot;
 use crate::progress;
 use std::cmp::Ordering;
 

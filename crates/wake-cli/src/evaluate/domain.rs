@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use wake_dataset::{Recipe, Simulated};
 use wake_nn::device_named;
-use wake_train::evaluation::{Baseline, ImageSource, Views, other_sea};
 use wake_physics::Scene;
+use wake_train::evaluation::{Baseline, ImageSource, Views, other_sea};
 
 use super::domain_report::{Report, markdown, sheet};
 use super::model;
@@ -48,7 +48,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     let recipe = Recipe::named_or_read(&options.recipe)?;
     let set = Simulated::new(recipe, SEED)?;
     let scenes = (0..u64::from(options.count)).map(|index| set.scene(index));
-    let scenes: Vec<Scene> = scenes.collect::<wake_ldm::Result<_>>()?;
+    let scenes: Vec<Scene> = scenes.collect::<wake_dataset::Result<_>>()?;
     scenes
         .iter()
         .try_for_each(|scene| sampler.check_scene(scene))?;

@@ -1,9 +1,9 @@
 //! The report over a recipe: text, and a sheet of images.
 
 use serde::Serialize;
-use wake_train::evaluation::{DomainRow, Views};
-use wake_train::TwoSample;
 use wake_physics::picture::Picture;
+use wake_train::TwoSample;
+use wake_train::evaluation::{DomainRow, Views};
 
 /// Scenes that are shown, each simulated and drawn by the model.
 const PICTURED: usize = 6;

@@ -1,18 +1,18 @@
 //! The order of the figures: what is drawn, and what is counted on it.
 
-use crate::exit::Outcome;
 use super::report::{ConditionRow, PAPER, Report, Speckle};
 use super::rungs::kinds;
 use super::scenes::held_out;
 use super::timing::timings;
-use wake_nn::burn::tensor::Device;
+use crate::exit::Outcome;
 use indicatif::ProgressBar;
+use wake_nn::burn::tensor::Device;
+use wake_physics::Scene;
 use wake_train::evaluation::{
     BATCH, Comparison, ImageSource, MeasurementRow, Quantity, Reading, SwapRow, Told, rungs, swaps,
     wake_correlation,
 };
 use wake_train::metrics::Lpips;
-use wake_physics::Scene;
 
 /// First index of the scenes whose values are changed: apart from those of the other figures.
 const FIRST_SWAPPED: u64 = 1 << 20;

@@ -1,9 +1,9 @@
 //! The wake model that is judged.
 
 use crate::exit::Outcome;
-use wake_nn::burn::tensor::Device;
 use std::path::Path;
 use wake_ldm::WakeSampler;
+use wake_nn::burn::tensor::Device;
 
 /// The model of a folder, or the one in the crate; with its own number of steps, unless another is asked for.
 pub(crate) fn load(

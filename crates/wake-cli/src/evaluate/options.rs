@@ -2,9 +2,9 @@
 
 use super::{detector, domain, sea};
 use crate::exit::Outcome;
-use wake_nn::burn::tensor::Device;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
+use wake_nn::burn::tensor::Device;
 use wake_train::metrics::{Lpips, LpipsNetwork};
 
 /// Evaluate the models against the simulator.

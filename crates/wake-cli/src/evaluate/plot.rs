@@ -1,7 +1,7 @@
 //! The plots: radial spectra against the simulator's, and wake correlation scene by scene.
 
-use crate::exit::Outcome;
 use super::report::Report;
+use crate::exit::Outcome;
 use plotters::prelude::*;
 use std::path::Path;
 

@@ -1,10 +1,10 @@
 //! The rungs, from the dumbest image to the simulator's, and a picture of one scene on all of them.
 
-use crate::exit::Outcome;
 use super::judge::Judged;
-use wake_train::evaluation::{Baseline, ImageSource, Told, grey};
+use crate::exit::Outcome;
 use wake_physics::picture::Picture;
 use wake_physics::{Field, Scene};
+use wake_train::evaluation::{Baseline, ImageSource, Told, grey};
 
 /// Panels of the picture in a row.
 const ACROSS: usize = 3;

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
-use wake_nn::device_named;
-use wake_train::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
 use wake_ldm::sea_texture::{PATCH, SeaTexture};
-use wake_train::{TwoSampleOptions, two_sample};
-use wake_physics::picture::Picture;
+use wake_nn::device_named;
 use wake_physics::Field;
+use wake_physics::picture::Picture;
+use wake_train::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
+use wake_train::{TwoSampleOptions, two_sample};
 
 use super::sea_report;
 use crate::exit::{self, Outcome};

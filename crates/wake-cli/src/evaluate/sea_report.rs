@@ -1,8 +1,8 @@
 //! The report of seas as text.
 
 use super::sea::SeaReport;
-use wake_train::evaluation::sea::SeaRow;
 use wake_train::TwoSample;
+use wake_train::evaluation::sea::SeaRow;
 
 /// The report in Markdown.
 pub(crate) fn markdown(report: &SeaReport) -> String {

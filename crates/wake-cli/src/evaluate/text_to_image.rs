@@ -1,14 +1,14 @@
 //! A model of images and prompts alone as a source of images: the paper's own way.
 
-use crate::exit::Outcome;
 use super::scenes::SIZE;
-use wake_nn::burn::tensor::Device;
+use crate::exit::Outcome;
 use std::path::Path;
-use wake_train::evaluation::{ImageSource, Told};
 use wake_ldm::pipeline::{Pipeline, Request};
+use wake_nn::burn::tensor::Device;
 use wake_physics::grey::GreyScale;
 use wake_physics::{Field, Scene};
 use wake_text::Wording;
+use wake_train::evaluation::{ImageSource, Told};
 
 /// Steps from noise to image, as the paper has them.
 const STEPS: usize = 50;
@@ -34,7 +34,7 @@ impl TextToImage {
 }
 
 impl ImageSource for TextToImage {
-    fn draw(&self, scenes: &[Scene], _: Told) -> wake_ldm::Result<Vec<Field>> {
+    fn draw(&self, scenes: &[Scene], _: Told) -> wake_train::Result<Vec<Field>> {
         let prompts = scenes.iter().map(|scene| Wording::Paper.prompt(scene));
         let prompts: Vec<String> = prompts.collect::<wake_text::Result<_>>()?;
         let seeds: Vec<u64> = scenes.iter().map(|scene| scene.seed).collect();

@@ -1,12 +1,11 @@
 //! Seconds per image: the model, the simulator's fast methods, and its harmonic sum.
 
-use crate::exit::Outcome;
 use super::scenes::{SIZE, held_out, ship};
+use crate::exit::Outcome;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 use std::time::Instant;
-use wake_train::evaluation::{ImageSource, Told};
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::KelvinWake;
 use wake_physics::scene::{SpectrumModel, SpreadingModel};
@@ -14,6 +13,7 @@ use wake_physics::surface::Surface;
 use wake_physics::waves::{Quantity, Transfer, harmonic_sum};
 use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
 use wake_physics::{Raster, Scene, Track, simulate};
+use wake_train::evaluation::{ImageSource, Told};
 
 /// Pixels along a side.
 const SIZES: [usize; 3] = [128, 256, 512];

@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::time::Instant;
 
-use wake_nn::burn::tensor::Tensor;
 use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
 use serde_json::{Value, json};
 use wake_ldm::pipeline::{Pipeline, Request, to_bytes};
 use wake_ldm::scheduler::{SchedulerConfig, SchedulerOption};
+use wake_nn::burn::tensor::Tensor;
 use wake_nn::device_named;
 use wake_physics::Scene;
 
@@ -60,9 +60,9 @@ fn scheduler(arguments: &Arguments, pipeline: &Pipeline) -> wake_ldm::Result<Sch
     match &arguments.scheduler {
         None => Ok(own),
         // A model's file may leave clipping to the default, which latents must not have.
-        Some(name) => own
+        Some(name) => Ok(own
             .with(SchedulerOption::ClipSample(false))?
-            .with_class(name),
+            .with_class(name)?),
     }
 }
 

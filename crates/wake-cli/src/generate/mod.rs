@@ -15,9 +15,7 @@ use crate::exit::{self, Outcome};
 
 /// Generate an image from a prompt with a latent diffusion model.
 #[derive(Args)]
-#[command(
-    after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md"
-)]
+#[command(after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md")]
 pub(crate) struct Arguments {
     /// What the image shows; without it and without --scene, the default scene in words.
     #[arg(long, value_name = "TEXT", conflicts_with = "scene")]

@@ -8,10 +8,10 @@ mod results;
 
 pub(crate) use arguments::Arguments;
 
-use arguments::MethodName;
-use serde_json::Value;
 use crate::exit::{self, Outcome};
 use crate::progress;
+use arguments::MethodName;
+use serde_json::Value;
 use wake_physics::measure::ImageFigures;
 use wake_physics::picture::Picture;
 use wake_physics::{Method, Plan, Scene, Simulation, simulate_with};

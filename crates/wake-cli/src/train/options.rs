@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use wake_nn::burn::tensor::Device;
 use clap::{Arg, Args};
+use wake_nn::burn::tensor::Device;
 use wake_nn::device_named;
 use wake_train::{Result, StageOptions};
 

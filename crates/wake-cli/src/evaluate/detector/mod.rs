@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use image::RgbImage;
 use wake_detector::Finder;
 use wake_detector::drawing::sheet;
-use wake_train::detector::judging::{Searched, compared};
 use wake_train::detector::Recipe;
+use wake_train::detector::judging::{Searched, compared};
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};

@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
-use wake_detector::GreyImage;
-use wake_train::detector::judging::{Tile, paired_windows};
-use wake_train::detector::Recipe;
 use wake_dataset::Source;
+use wake_detector::GreyImage;
 use wake_nn::device_named;
-use wake_train::{TwoSampleOptions, two_sample};
 use wake_physics::Field;
+use wake_train::detector::Recipe;
+use wake_train::detector::judging::{Tile, paired_windows};
+use wake_train::{TwoSampleOptions, two_sample};
 
 use super::HELD_OUT;
 use crate::exit::Outcome;

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 
 use wake_detector::Wake;
-use wake_train::detector::judging::Searched;
 use wake_detector::score::{Rule, found_by};
-use wake_train::detector::Recipe;
 use wake_physics::Scene;
 use wake_physics::scene::Sensor;
+use wake_train::detector::Recipe;
+use wake_train::detector::judging::Searched;
 
 use super::report::FALSE_ALARMS;
 
