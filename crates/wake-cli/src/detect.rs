@@ -9,6 +9,7 @@ use wake_detector::drawing::Drawing;
 use wake_detector::{
     Detection, Detector, Finder, GreyImage, image_files, image_name, picture_name,
 };
+use whole_files::make_folder;
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};
@@ -51,8 +52,8 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
-/// Draws each image with its wakes into `--out`, and prints every wake by tip, axis, half-angle, visible length and score. Files
-/// of a folder that cannot be read are named, and the others are searched.
+/// Prints every wake by tip, axis, half-angle, visible length and score, and draws the wakes of `NAME` into `NAME.wakes.png`
+/// in `--out`. Files of a folder that cannot be read are named, and the others are searched.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let files = image_files(&arguments.images)?;
     let finder = finder(arguments)?;
@@ -60,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let mut told = Told::default();
     let searched = search(&files, &finder, arguments, &mut told, &bar);
     bar.finish_and_clear();
-    // Also when the search ended early: the results until then are printed.
+    // Also when the search ended early: what was found until then is told.
     if arguments.json && !told.images.is_empty() {
         let told = json!({ "images": told.images, "unread": told.unread });
         exit::say(&format!("{told:#}"))?;
@@ -117,7 +118,7 @@ fn search(
         };
         // What cannot be read leaves no folder behind.
         if told.images.is_empty() {
-            whole_files::make_folder(&arguments.out)?;
+            make_folder(&arguments.out)?;
         }
         let found = finder.find(&image);
         draw(&image, &found, arguments, file)?;

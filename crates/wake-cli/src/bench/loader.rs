@@ -3,8 +3,9 @@
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
-use wake_dataset::{Loader, Recipe, Sampled, Simulated, Source};
-use wake_ldm::{WakeSampler, device_named};
+use wake_dataset::{Loader, Recipe, Simulated, Source};
+use wake_ldm::{Sampled, WakeSampler};
+use wake_nn::device_named;
 
 use crate::exit::Outcome;
 

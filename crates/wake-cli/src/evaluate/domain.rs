@@ -48,7 +48,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     let recipe = Recipe::named_or_read(&options.recipe)?;
     let set = Simulated::new(recipe, SEED)?;
     let scenes = (0..u64::from(options.count)).map(|index| set.scene(index));
-    let scenes: Vec<Scene> = scenes.collect::<wake_ldm::Result<_>>()?;
+    let scenes: Vec<Scene> = scenes.collect::<wake_dataset::Result<_>>()?;
     scenes
         .iter()
         .try_for_each(|scene| sampler.check_scene(scene))?;

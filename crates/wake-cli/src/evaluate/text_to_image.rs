@@ -34,7 +34,7 @@ impl TextToImage {
 }
 
 impl ImageSource for TextToImage {
-    fn draw(&self, scenes: &[Scene], _: Told) -> wake_ldm::Result<Vec<Field>> {
+    fn draw(&self, scenes: &[Scene], _: Told) -> wake_train::Result<Vec<Field>> {
         let prompts = scenes.iter().map(|scene| Wording::Paper.prompt(scene));
         let prompts: Vec<String> = prompts.collect::<wake_text::Result<_>>()?;
         let seeds: Vec<u64> = scenes.iter().map(|scene| scene.seed).collect();

@@ -60,9 +60,9 @@ fn scheduler(arguments: &Arguments, pipeline: &Pipeline) -> wake_ldm::Result<Sch
     match &arguments.scheduler {
         None => Ok(own),
         // A model's file may leave clipping to the default, which latents must not have.
-        Some(name) => own
+        Some(name) => Ok(own
             .with(SchedulerOption::ClipSample(false))?
-            .with_class(name),
+            .with_class(name)?),
     }
 }
 

@@ -6,14 +6,15 @@ use rayon::prelude::*;
 use wake_detector::{Detection, Finder};
 use wake_train::detector::judging::{Tile, compared};
 
-use super::picture;
 use super::report::Report;
 use crate::exit::Outcome;
+use crate::picture;
 
 /// The tiles of a folder with their labels.
 pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
     Tile::read_all(folder).map_err(|error| match error {
-        wake_detector::Error::Io { .. } => {
+        wake_train::Error::Detector(wake_detector::Error::Io { .. })
+        | wake_train::Error::Value(wake_nn::Error::Io { .. }) => {
             format!("{error}; --real names the folder of tiles and labels.json").into()
         }
         error => error.into(),

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use wake_detector::score::{Curve, Judged, Rule};
-use wake_physics::output::write_atomically;
+use whole_files::write_atomically;
 
 use super::real_sea;
 
@@ -42,7 +42,7 @@ impl Report {
     }
 
     /// Writes `report.json` and `report.md` into a folder.
-    pub(crate) fn write(&self, folder: &Path) -> wake_physics::Result<()> {
+    pub(crate) fn write(&self, folder: &Path) -> whole_files::Result<()> {
         let rows = format!("{:#}\n", json!({"rows": self.rows, "sea": self.sea}));
         for (name, text) in [("report.json", rows), ("report.md", self.text())] {
             write_atomically(&folder.join(name), text.as_bytes())?;

@@ -3,7 +3,7 @@
 mod images;
 mod values;
 
-use super::super::timing::TimingRow;
+use super::timing::TimingRow;
 use serde::Serialize;
 use wake_train::evaluation::{MeasurementRow, PixelRow, RungRow, SwapRow, WakeCorrelation};
 
