@@ -263,8 +263,8 @@ fn requests_that_make_no_sense_are_refused_by_name() {
     ] {
         let error = pipeline.sample(&request).expect_err(name);
         let named = match &error {
-            Error::OutOfRange { name, .. } => name,
-            Error::InvalidOption { option, .. } => option,
+            wake_ldm::Error::Model(Error::OutOfRange { name, .. }) => name,
+            wake_ldm::Error::Model(Error::InvalidOption { option, .. }) => option,
             other => panic!("{name}: {other}"),
         };
         assert_eq!(named, name, "{error}");

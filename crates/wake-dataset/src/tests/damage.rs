@@ -57,7 +57,7 @@ fn another_image_over_one_of_the_set_is_refused() {
 #[test]
 fn one_bit_is_enough() {
     let whole = whole();
-    let random = wake_nn::noise::NoiseSource::new(3);
+    let random = NoiseSource::new(3);
     let places = ["images/000002.png", "metadata.jsonl", "dataset.json"];
     for (stream, name) in places.into_iter().enumerate() {
         let length = whole[Path::new(name)].len();

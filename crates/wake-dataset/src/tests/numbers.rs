@@ -69,7 +69,7 @@ proptest! {
         let text = manifest.text().unwrap();
         fs::write(folder.path().join("dataset.json"), &text).unwrap();
         let read = Manifest::read(folder.path()).unwrap().unwrap();
-        prop_assert_eq!(read.text().unwrap(), text.clone());
+        prop_assert_eq!(&read.text().unwrap(), &text);
         let recipe = toml::to_string(&manifest.recipe).unwrap();
         let recipe = toml::from_str(&recipe).unwrap();
         prop_assert_eq!(Manifest { recipe, ..manifest }.text().unwrap(), text);

@@ -95,6 +95,10 @@ pub struct WeightFiles {
 
 impl WeightFiles {
     /// Opens a file, or the files of a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::MissingFile`], [`Error::Io`] or [`Error::InvalidSafetensors`] for files that are not there or are damaged.
     pub fn open(path: &Path) -> Result<Self> {
         if !path.is_dir() {
             return Self::whole(path);
@@ -149,6 +153,10 @@ impl WeightFiles {
     }
 
     /// All tensors under their present names.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidSafetensors`] for a name that two files hold.
     pub fn tensors(&self) -> Result<BTreeMap<String, Stored<'_>>> {
         let mut tensors = BTreeMap::new();
         for file in &self.files {
@@ -235,6 +243,10 @@ impl Stored<'_> {
     }
 
     /// Reads the numbers, as f32; all must be finite.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if the file cannot be read, [`Error::InvalidWeight`] for a number that is not finite.
     pub fn read(&self) -> Result<Vec<f32>> {
         let numbers = match self.dtype() {
             Dtype::F16 => self.converted(|b: [u8; 2]| f16::from_le_bytes(b).to_f32()),

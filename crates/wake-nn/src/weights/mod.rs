@@ -97,6 +97,10 @@ fn load_files<M: Module>(
 }
 
 /// Whether a file has tensors below a prefix.
+///
+/// # Errors
+///
+/// As [`load_as`], for files that are not there or are damaged.
 pub fn has_prefix(path: &Path, prefix: &str) -> Result<bool> {
     let files = WeightFiles::open(path)?;
     Ok(files

@@ -31,6 +31,10 @@ pub fn save_as<M: Module>(
 }
 
 /// [`save_as`] with an entry in the free text of the header, its key and its value.
+///
+/// # Errors
+///
+/// As [`save_as`].
 pub fn save_noted<M: Module>(
     model: &M,
     layout: Layout,

@@ -41,6 +41,10 @@ pub struct WakeImage {
 }
 
 /// An intensity times the speckle of its scene's radar.
+///
+/// # Errors
+///
+/// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid.
 pub fn speckled(intensity: &Field, scene: &Scene) -> Result<Field> {
     let mut speckled = unit_speckle(scene)?;
     let pixels = speckled.values.iter_mut().zip(&intensity.values);

@@ -17,8 +17,8 @@ const BRIGHTEST: f32 = 4.0;
 const MOST_SKEWED: f64 = 1.0;
 /// Means of blocks of 32 pixels of a sea vary by less: chosen, above the gusts of real images and below most coasts.
 const MOST_VARIED: f64 = 0.2;
-/// Numbers that the flow is told of a style.
-pub const FEATURES: usize = 8;
+/// Numbers of a style that condition the flow.
+pub(super) const FEATURES: usize = 8;
 /// Numbers of a style in a file: those and the mean.
 pub(super) const NUMBERS: usize = FEATURES + 1;
 /// Names and ranges of the numbers of a style in a file.
