@@ -4,7 +4,7 @@
 use wake_dataset::{Batch, Loader, Recipe, Simulated};
 use wake_ldm::{Sampled, WakeSampler};
 use wake_nn::burn::nn::conv::{Conv2d, Conv2dConfig};
-use wake_nn::burn::optim::{AdamWConfig, GradientsParams, Optimizer};
+use wake_nn::burn::optim::{AdamWConfig, GradientsParams};
 use wake_nn::burn::tensor::{Device, Tensor, TensorData};
 
 /// Rows and columns of the images.

@@ -8,11 +8,11 @@
 #SBATCH --ntasks=1
 #SBATCH --requeue
 set -euo pipefail
-program=${PROGRAM:-target/release/examples/make_dataset}
+program=${PROGRAM:-target/release/wake}
 out=${OUT:-out/make_dataset}
 if [ "${1:-}" = merge ]; then
-  exec "$program" --merge --out "$out"
+  exec "$program" dataset --merge --out "$out"
 fi
 # A task that was killed continues where it stopped.
-exec "$program" --grid "${GRID:-ranges}" --count "${COUNT:-1000000}" --seed "${SEED:-7}" \
+exec "$program" dataset --grid "${GRID:-ranges}" --count "${COUNT:-1000000}" --seed "${SEED:-7}" \
   --jobs "${SLURM_CPUS_ON_NODE:-1}" --shard "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT" --out "$out"

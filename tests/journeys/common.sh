@@ -3,7 +3,7 @@ set -euo pipefail
 tree=$(cd "$(dirname "$0")/../.." && pwd)
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-# How examples are built; CARGO_FLAGS="--workspace --features ndarray,train" takes what the tests have built.
+# How the program is built; CARGO_FLAGS="--workspace --features ndarray,train" takes what the tests have built.
 read -ra flags <<<"${CARGO_FLAGS:---release}"
 
 # The tracked files of the tree, in $scratch/clone.
@@ -20,9 +20,9 @@ made() {
   done
 }
 
-# Builds examples, and sets `programs` to where they are.
-examples() {
-  cargo build --quiet "${flags[@]}" "${@/#/--example=}"
+# Builds the program, and sets `wake` to where it is.
+program() {
+  cargo build --quiet "${flags[@]}" --package wake-cli
   case " ${flags[*]} " in *" --release "*) profile=release ;; *) profile=debug ;; esac
-  programs=${CARGO_TARGET_DIR:-$PWD/target}/$profile/examples
+  wake=${CARGO_TARGET_DIR:-$PWD/target}/$profile/wake
 }

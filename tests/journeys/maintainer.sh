@@ -73,8 +73,8 @@ sed -i 's/^use super::unipc::UniPcConfig;/use super::toy::ToyConfig;\n&/' $rooms
 count=$(sed -n 's/^static CLASSES: \[Class; \([0-9]*\)\].*/\1/p' $rooms/config.rs)
 sed -i "s/^static CLASSES: \[Class; $count\]/static CLASSES: [Class; $((count + 1))]/" $rooms/config.rs
 sed -i 's/^    Class::of::<DdpmConfig>/    Class::of::<ToyConfig>("toy", "ToyScheduler"),\n&/' $rooms/config.rs
-examples generate
-"$programs/generate" --weights tests/fixtures/pipeline_a --scheduler toy --steps 1 --prompt "a ship" \
+program
+"$wake" generate --weights tests/fixtures/pipeline_a --scheduler toy --steps 1 --prompt "a ship" \
   --out "$scratch/out"
 made "$scratch"/out/{image.png,report.json}
 echo "maintainer: a scheduler in one file"

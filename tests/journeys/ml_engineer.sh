@@ -2,12 +2,12 @@
 # An engineer of machine learning: a labelled data set in two shards, joined, and ten steps of training on it.
 . "$(dirname "$0")/common.sh"
 clone
-examples make_dataset train
+program
 for shard in 0 1; do
-  "$programs/make_dataset" --count 24 --shard "$shard/2" --out "$scratch/set"
+  "$wake" dataset --count 24 --shard "$shard/2" --out "$scratch/set"
 done
-"$programs/make_dataset" --merge --out "$scratch/set"
+"$wake" dataset --merge --out "$scratch/set"
 made "$scratch"/set/{metadata.jsonl,coco.json,data.yaml,dataset.json,images/000023.png,labels/000023.txt}
-"$programs/train" mean --data "$scratch/set" --steps 10 --batch 4 --out "$scratch/model"
+"$wake" train wake-model mean --data "$scratch/set" --steps 10 --batch 4 --out "$scratch/model"
 made "$scratch"/model/{config.json,prior.safetensors,mean.jsonl}
 echo "ml_engineer: a data set and ten steps"

@@ -4,7 +4,7 @@
 . "$(dirname "$0")/common.sh"
 clone
 begin=$SECONDS
-cargo run --quiet --release --package wake --no-default-features --example simulate -- \
+cargo run --release -p wake-cli --no-default-features --features simulate -- simulate \
   --overlay --set sea.wind_speed=3 --out "$scratch/out"
 made "$scratch"/out/{image.png,overlay.png,fields.safetensors,labels.json,report.json}
 echo "newcomer: a labelled wake $((SECONDS - begin)) s after the clone"

@@ -99,13 +99,6 @@ impl Crate {
         named.then_some(at)
     }
 
-    /// Whether a file names another crate.
-    pub(crate) fn names_crate(&self, module: &Names, name: &str) -> bool {
-        let file = &self.files[module];
-        let mut all = file.paths.iter().chain(file.names.values());
-        all.any(|path| path[0] == name)
-    }
-
     /// Whether a file names an item of this crate by the path `crate::…` that ends so.
     pub(crate) fn names_item(&self, module: &Names, item: &[&str]) -> bool {
         let file = &self.files[module];

@@ -1,10 +1,10 @@
-//! `make_dataset`: what it refuses, and that shards, jobs and kills change no byte.
+//! `wake dataset`: what it refuses, and that shards, jobs and kills change no byte.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Duration;
 
-use super::{cannot_write, done, example, files, names, refused_by, refused_into, text};
+use super::{cannot_write, done, files, names, program, refused_by, refused_into, text};
 
 /// A quick recipe.
 const SMALL: [&str; 4] = [
@@ -15,7 +15,7 @@ const SMALL: [&str; 4] = [
 ];
 
 fn make(arguments: &[&str], out: &Path) -> String {
-    done("make_dataset", &[&SMALL, arguments].concat(), out)
+    done("dataset", &[&SMALL, arguments].concat(), out)
 }
 
 #[test]
@@ -45,21 +45,21 @@ fn wrong_recipes_shares_and_numbers_are_named() {
         (["--count", "0"], ["--count", "'0'", "1..="]),
         (["--jobs", "0"], ["--jobs", "'0'", "1..="]),
     ] {
-        refused_by("make_dataset", &arguments, &words);
+        refused_by("dataset", &arguments, &words);
     }
     refused_by(
-        "make_dataset",
+        "dataset",
         &["--merge"],
         &["shard-0", "missing", "--shard 0/n"],
     );
-    cannot_write("make_dataset", &["--count", "1"]);
+    cannot_write("dataset", &["--count", "1"]);
 }
 
 #[test]
 fn a_file_does_not_hide_a_recipe_of_its_name() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("detector"), [0xff, 0xfe]).expect("a file");
-    let made = Command::new(example("make_dataset"))
+    let made = program("dataset")
         .args(["--grid", "detector", "--count", "1", "--out", "set"])
         .args(SMALL)
         .current_dir(folder.path())
@@ -77,14 +77,9 @@ fn shards_made_on_other_threads_merge_to_the_same_bytes() {
     make(&["--count", "4", "--jobs", "1"], &whole);
     make(&["--count", "4", "--jobs", "3", "--shard", "1/2"], &joined);
     // A share is missing: nothing is merged, nothing is lost.
-    refused_into(
-        "make_dataset",
-        &["--merge"],
-        &["shard-0", "missing"],
-        &joined,
-    );
+    refused_into("dataset", &["--merge"], &["shard-0", "missing"], &joined);
     make(&["--count", "4", "--shard", "0/2"], &joined);
-    done("make_dataset", &["--merge"], &joined);
+    done("dataset", &["--merge"], &joined);
     assert!(files(&joined) == files(&whole));
     let images = names(&whole)
         .into_iter()
@@ -97,13 +92,13 @@ fn a_killed_run_goes_on_and_ends_with_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let [whole, killed] = ["whole", "killed"].map(|name| folder.path().join(name));
     let arguments = [&SMALL[..], &["--count", "150", "--jobs", "1"]].concat();
-    let mut child = Command::new(example("make_dataset"))
+    let mut child = program("dataset")
         .args(&arguments)
         .args(["--out", text(&killed)])
         .stderr(Stdio::null())
         .stdout(Stdio::null())
         .spawn()
-        .expect("an example that starts");
+        .expect("a program that starts");
     let lines = || {
         let metadata = std::fs::read(killed.join("metadata.jsonl")).unwrap_or_default();
         metadata.iter().filter(|&&byte| byte == b'\n').count()
@@ -115,10 +110,10 @@ fn a_killed_run_goes_on_and_ends_with_the_same_bytes() {
     child.wait().expect("an end");
     let made = lines();
     assert!((5..150).contains(&made), "killed after {made} images");
-    let printed = done("make_dataset", &arguments, &killed);
+    let printed = done("dataset", &arguments, &killed);
     assert!(printed.starts_with("150 images"), "{printed}");
     assert!(!printed.contains("150 of them"), "began anew: {printed}");
-    done("make_dataset", &arguments, &whole);
+    done("dataset", &arguments, &whole);
     assert!(files(&killed) == files(&whole));
 }
 
@@ -130,7 +125,7 @@ fn a_broken_line_or_another_set_is_named_and_left_alone() {
     let same = [&SMALL[..], &["--count", "3"]].concat();
     let other = [&SMALL[..], &["--count", "4"]].concat();
     refused_into(
-        "make_dataset",
+        "dataset",
         &other,
         &["dataset.json", "another recipe, seed, count"],
         &out,
@@ -139,9 +134,9 @@ fn a_broken_line_or_another_set_is_named_and_left_alone() {
     let good = std::fs::read_to_string(&metadata).expect("lines");
     let second = good.lines().nth(1).expect("a second line");
     std::fs::write(&metadata, good.replace(second, r#"{"file_name": 3}"#)).expect("a file");
-    refused_into("make_dataset", &same, &["metadata.jsonl, line 2"], &out);
+    refused_into("dataset", &same, &["metadata.jsonl, line 2"], &out);
     let data = ["autoencoder", "--data", text(&out)];
-    refused_by("train", &data, &["metadata.jsonl, line 2"]);
+    refused_by("train wake-model", &data, &["metadata.jsonl, line 2"]);
 }
 
 /// A second process on the same folder is refused by name, and takes nothing from the first.
@@ -150,19 +145,19 @@ fn two_processes_do_not_share_a_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     let [whole, shared] = ["whole", "shared"].map(|name| folder.path().join(name));
     let arguments = [&SMALL[..], &["--count", "60", "--jobs", "1"]].concat();
-    let mut first = Command::new(example("make_dataset"))
+    let mut first = program("dataset")
         .args(&arguments)
         .args(["--out", text(&shared)])
         .stderr(Stdio::null())
         .stdout(Stdio::null())
         .spawn()
-        .expect("an example that starts");
+        .expect("a program that starts");
     while !shared.join("metadata.jsonl").exists() {
         assert!(first.try_wait().expect("a child").is_none(), "ended early");
         std::thread::sleep(Duration::from_millis(1));
     }
     let output = super::run(
-        "make_dataset",
+        "dataset",
         &[&arguments[..], &["--out", text(&shared)]].concat(),
     );
     let message = String::from_utf8(output.stderr).expect("Unicode");
@@ -171,20 +166,20 @@ fn two_processes_do_not_share_a_folder() {
         assert!(message.contains("another process"), "{message}");
     }
     assert!(first.wait().expect("an end").success());
-    done("make_dataset", &arguments, &whole);
+    done("dataset", &arguments, &whole);
     assert!(files(&shared) == files(&whole));
 }
 
-/// Starts `make_dataset` again and again into a folder, and kills it after 2 to 62 ms and `longer` \[ms\].
+/// Starts `wake dataset` again and again into a folder, and kills it after 2 to 62 ms and `longer` \[ms\].
 pub(super) fn killed_often(arguments: &[&str], folder: &Path, kills: u64, longer: u64) {
     for k in 0..kills {
-        let mut child = Command::new(example("make_dataset"))
+        let mut child = program("dataset")
             .args(arguments)
             .args(["--out", text(folder)])
             .stderr(Stdio::null())
             .stdout(Stdio::null())
             .spawn()
-            .expect("an example that starts");
+            .expect("a program that starts");
         std::thread::sleep(Duration::from_millis(longer + 2 + k * 7919 % 60));
         // It may have ended.
         let _ = child.kill();
@@ -209,10 +204,10 @@ fn many_kills_change_no_byte() {
         let count = ["--grid", grid, "--count", "40", "--jobs", "2"];
         let arguments = [&SMALL[..], &count, more].concat();
         killed_often(&arguments, &killed, 12, 0);
-        done("make_dataset", &arguments, &killed);
-        let printed = done("make_dataset", &arguments, &killed);
+        done("dataset", &arguments, &killed);
+        let printed = done("dataset", &arguments, &killed);
         assert!(printed.contains(", 0 of them made"), "{grid}: {printed}");
-        done("make_dataset", &arguments, &whole);
+        done("dataset", &arguments, &whole);
         assert!(files(&killed) == files(&whole), "{grid} {more:?}");
     }
 }
@@ -223,7 +218,7 @@ fn damage_is_named_and_left_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("set");
     let arguments = [&SMALL[..], &["--grid", "detector", "--count", "4"]].concat();
-    done("make_dataset", &arguments, &out);
+    done("dataset", &arguments, &out);
     let (image, lines) = (out.join("images/000002.png"), out.join("metadata.jsonl"));
     let (whole, text_of_lines) = (files(&out), std::fs::read(&lines).expect("lines"));
     std::fs::copy(out.join("images/000001.png"), &image).expect("a copy");
@@ -232,15 +227,15 @@ fn damage_is_named_and_left_alone() {
         "line 3 of metadata.jsonl",
         "remove the file",
     ];
-    refused_into("make_dataset", &arguments, &words, &out);
+    refused_into("dataset", &arguments, &words, &out);
     let data = ["autoencoder", "--data", text(&out)];
     std::fs::remove_file(&image).expect("an image");
-    done("make_dataset", &arguments, &out);
+    done("dataset", &arguments, &out);
     assert!(files(&out) == whole);
     let mut changed = text_of_lines.clone();
     let at = changed.len() / 2;
     changed[at] ^= 1;
     std::fs::write(&lines, changed).expect("a file");
-    refused_into("make_dataset", &arguments, &["metadata.jsonl, line "], &out);
-    refused_by("train", &data, &["metadata.jsonl, line "]);
+    refused_into("dataset", &arguments, &["metadata.jsonl, line "], &out);
+    refused_by("train wake-model", &data, &["metadata.jsonl, line "]);
 }

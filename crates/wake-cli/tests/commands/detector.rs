@@ -1,4 +1,4 @@
-//! `detector`: what it refuses, what it prints, and a run that goes on.
+//! `wake detect`, `wake train detector` and `wake evaluate detector`: what it refuses, what it prints, and a run that goes on.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use image::{GrayImage, ImageBuffer, Luma};
 use serde_json::Value;
 
-use super::{done, example, files, names, refused_by, text};
+use super::{done, files, names, program, refused_by, text};
 
 /// A dark line of 300 pixels toward the right on noise, begun by a bright spot, in grey from 0 to 1.
 fn wake(size: u32) -> impl Fn(u32, u32) -> f32 {
@@ -43,8 +43,8 @@ fn eight_bits(path: &Path, size: u32) -> PathBuf {
 
 fn detections(folder: &Path, arguments: &[&str]) -> Value {
     let printed = done(
-        "detector",
-        &[&["detect", "--json"], arguments].concat(),
+        "detect",
+        &[&["--json"], arguments].concat(),
         &folder.join("out"),
     );
     serde_json::from_str(&printed).expect("JSON and nothing else")
@@ -54,44 +54,40 @@ fn detections(folder: &Path, arguments: &[&str]) -> Value {
 fn bad_images_and_options_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
     refused_by(
-        "detector",
-        &["detect", "no/such/image.png"],
+        "detect",
+        &["no/such/image.png"],
         &["no/such/image.png", "PNG"],
     );
     let corrupt = folder.path().join("corrupt.png");
     std::fs::write(&corrupt, b"\x89PNG\r\n\x1a\n and then nothing").expect("a file");
-    refused_by(
-        "detector",
-        &["detect", text(&corrupt)],
-        &["corrupt.png", "PNG"],
-    );
+    refused_by("detect", &[text(&corrupt)], &["corrupt.png", "PNG"]);
     let long = folder.path().join("long.png");
     std::fs::File::create(&long)
         .and_then(|file| file.set_len(2_100_000_000))
         .expect("a file");
     refused_by(
-        "detector",
-        &["detect", text(&long)],
+        "detect",
+        &[text(&long)],
         &["long.png", "2100000000 bytes", "cut"],
     );
     std::fs::remove_file(&long).expect("the file");
     let empty = folder.path().join("empty");
     std::fs::create_dir(&empty).expect("a folder");
-    refused_by("detector", &["detect", text(&empty)], &["empty", "PNG"]);
+    refused_by("detect", &[text(&empty)], &["empty", "PNG"]);
     let image = eight_bits(&folder.path().join("a.png"), 64);
     refused_by(
-        "detector",
-        &["detect", text(&image), "--spacing", "0.1"],
+        "detect",
+        &[text(&image), "--spacing", "0.1"],
         &["spacing", "0.1", "0.5 to 100 m"],
     );
     refused_by(
-        "detector",
-        &["detect", text(&image), "--weights", "no/weights"],
+        "detect",
+        &[text(&image), "--weights", "no/weights"],
         &["no/weights"],
     );
     refused_by(
-        "detector",
-        &["evaluate", "--real", "no/tiles"],
+        "evaluate",
+        &["detector", "--real", "no/tiles"],
         &["no/tiles", "labels.json"],
     );
 }
@@ -178,14 +174,14 @@ fn a_training_run_goes_on_where_it_was() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("run");
     let train = [
-        "train", "--images", "32", "--recipe", "painted", "--every", "1",
+        "detector", "--images", "32", "--recipe", "painted", "--every", "1",
     ];
-    done("detector", &train, &out);
+    done("train", &train, &out);
     let whole = files(&out);
     // As if the run had been killed after its first step.
     std::fs::remove_dir_all(out.join("checkpoints/step-00000002")).expect("the last checkpoint");
     std::fs::remove_file(out.join("detector.safetensors")).expect("weights");
-    done("detector", &train, &out);
+    done("train", &train, &out);
     let again = files(&out);
     let weights = Path::new("detector.safetensors");
     assert!(whole[weights].is_some() && whole[weights] == again[weights]);
@@ -197,27 +193,26 @@ fn a_training_run_goes_on_where_it_was() {
     detections(folder.path(), &[text(&image), "--weights", text(&weights)]);
 }
 
-/// Runs `detector` in a folder, where `show` writes, with its standard output somewhere else.
+/// Runs the program in a folder, with its standard output somewhere else.
 fn inside(folder: &Path, arguments: &[&str], stdout: Stdio) -> Output {
-    let child = Command::new(example("detector"))
+    let child = program("")
         .args(arguments)
         .current_dir(folder)
         .stdout(stdout)
         .stderr(Stdio::piped())
         .spawn()
-        .expect("an example that starts");
+        .expect("a program that starts");
     child.wait_with_output().expect("an end")
 }
 
-/// Every subcommand, and none, in a folder that holds `a.png`.
-const PRINTING: [&[&str]; 5] = [
+/// Every subcommand of the detector, in a folder that holds `a.png`.
+const PRINTING: [&[&str]; 4] = [
     &["detect", "a.png", "--out", "out"],
     &["detect", "a.png", "--json", "--out", "out"],
-    &["evaluate", "--images", "1", "--out", "out"],
+    &["evaluate", "detector", "--images", "1", "--out", "out"],
     &[
-        "train", "--images", "16", "--recipe", "painted", "--out", "out",
+        "train", "detector", "--images", "16", "--recipe", "painted", "--out", "out",
     ],
-    &[],
 ];
 
 /// The reader of a pipe leaves: the work is done all the same, and ends well.
@@ -377,8 +372,8 @@ fn pictures_of_wakes_are_not_searched_again() {
 fn weights_that_find_nothing_anywhere_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let image = eight_bits(&folder.path().join("a.png"), 64);
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("crates/wake-detector/assets/detector.safetensors");
+    let shipped =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../wake-detector/assets/detector.safetensors");
     let bytes = std::fs::read(shipped).expect("weights");
     let header = 8 + u64::from_le_bytes(bytes[..8].try_into().expect("a length")) as usize;
     let weights = folder.path().join("weights.safetensors");
@@ -391,10 +386,10 @@ fn weights_that_find_nothing_anywhere_are_refused() {
         std::fs::write(&weights, bytes).expect("a file");
         let words = ["weights.safetensors", "plain wake", "train"];
         refused_by(
-            "detector",
-            &["detect", text(&image), "--weights", text(&weights)],
+            "detect",
+            &[text(&image), "--weights", text(&weights)],
             &words,
         );
-        refused_by("detector", &["train", "--weights", text(&weights)], &words);
+        refused_by("train", &["detector", "--weights", text(&weights)], &words);
     }
 }

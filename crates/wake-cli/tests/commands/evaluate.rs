@@ -1,4 +1,4 @@
-//! `evaluate`: what it refuses.
+//! `wake evaluate`: what it refuses.
 
 use super::{cannot_write, refused_by};
 

@@ -4,27 +4,27 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-use super::{done, example, files, refused_into, text};
+use super::{done, files, program, refused_into, text};
 
 /// A scene that takes a moment.
 const TINY: [&str; 4] = ["--set", "grid.rows=8", "--set", "grid.columns=8"];
 
-/// An example with its standard output somewhere else: exit code and standard error.
+/// The program with its standard output somewhere else: exit code and standard error.
 fn into(name: &str, arguments: &[&str], stdout: Stdio) -> (Option<i32>, String) {
-    let child = Command::new(example(name))
+    let child = program(name)
         .args(arguments)
         .stdout(stdout)
         .stderr(Stdio::piped())
         .spawn()
-        .expect("an example that starts");
+        .expect("a program that starts");
     let output = child.wait_with_output().expect("an end");
     let message = String::from_utf8(output.stderr).expect("Unicode");
     (output.status.code(), message)
 }
 
-/// Every example that prints without --out, and one that writes first.
+/// Every subcommand that prints without --out, and one that writes first.
 fn printing(out: &Path) -> Vec<(&'static str, Vec<String>)> {
     let simulate = [&["--json", "--out", text(out)][..], &TINY].concat();
     let simulate = simulate.iter().map(ToString::to_string).collect();
@@ -68,11 +68,11 @@ fn a_full_disk_is_an_error_of_one_sentence() {
 #[test]
 fn nobody_to_hear_an_error_changes_nothing_else() {
     for stderr in [closed(), Stdio::null()] {
-        let status = Command::new(example("simulate"))
+        let status = program("simulate")
             .args(["--set", "grid.rows=0"])
             .stderr(stderr)
             .status()
-            .expect("an example that starts");
+            .expect("a program that starts");
         assert_eq!(status.code(), Some(2));
     }
 }
@@ -87,12 +87,12 @@ fn closed() -> Stdio {
 #[test]
 fn no_home_and_no_variables_are_needed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = Command::new(example("simulate"))
+    let output = program("simulate")
         .args(TINY)
         .args(["--out", text(&folder.path().join("out"))])
         .env_clear()
         .output()
-        .expect("an example that starts");
+        .expect("a program that starts");
     assert!(
         output.status.success(),
         "{}",
@@ -102,10 +102,10 @@ fn no_home_and_no_variables_are_needed() {
 
 #[test]
 fn threads_that_no_machine_has_are_refused() {
-    let output = Command::new(example("prompt"))
+    let output = program("prompt")
         .env("RAYON_NUM_THREADS", "100000")
         .output()
-        .expect("an example that starts");
+        .expect("a program that starts");
     let message = String::from_utf8(output.stderr).expect("Unicode");
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(
@@ -202,13 +202,13 @@ fn killed_simulations_leave_whole_files_and_the_next_run_sweeps() {
     let size = ["--set", "grid.rows=96", "--set", "grid.columns=96"];
     done("simulate", &size, &whole);
     for k in 0..20 {
-        let mut child = Command::new(example("simulate"))
+        let mut child = program("simulate")
             .args(size)
             .args(["--out", text(&killed)])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
-            .expect("an example that starts");
+            .expect("a program that starts");
         std::thread::sleep(std::time::Duration::from_millis(k * 5));
         // It may have ended.
         let _ = child.kill();

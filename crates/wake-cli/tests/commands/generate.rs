@@ -1,4 +1,4 @@
-//! `generate`: what it refuses, and what it writes with the model in the crate.
+//! `wake generate`: what it refuses, and what it writes with the model in the crate.
 
 use std::path::Path;
 
@@ -68,7 +68,7 @@ fn a_prompt_that_contradicts_itself_is_refused() {
 
 /// A copy of the model in the crate, with another content of its largest file.
 fn with_weights(folder: &Path, change: impl FnOnce(Vec<u8>) -> Vec<u8>) -> String {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/wake-ldm/assets");
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../wake-ldm/assets");
     let mut largest = (0, String::new());
     for entry in std::fs::read_dir(assets).expect("the model") {
         let from = entry.expect("an entry").path();

@@ -1,8 +1,8 @@
-//! `train -- sea`, and `generate`, `make_dataset` and `evaluate` on what it learnt.
+//! `wake train sea`, and `wake generate`, `wake dataset` and `wake evaluate` on what it learnt.
 
 use std::path::{Path, PathBuf};
 
-use super::{done, files, make_dataset, refused_by, refused_into, text};
+use super::{dataset, done, files, refused_by, refused_into, text};
 
 /// Two images of 8 and 16 bits, 200 pixels wide, of a rough sea with a bright target and a mask.
 fn images(folder: &Path) -> PathBuf {
@@ -70,27 +70,27 @@ fn a_sea_is_learnt_resumed_and_drawn_on() {
         "--set",
         "scene.grid.columns=48",
     ];
-    done("make_dataset", &size, &out("set"));
-    done("make_dataset", &[&sea[..], &size].concat(), &out("sea"));
+    done("dataset", &size, &out("set"));
+    done("dataset", &[&sea[..], &size].concat(), &out("sea"));
     assert!(file("set/coco.json") == file("sea/coco.json"));
     assert!(file("set/images/000001.png") != file("sea/images/000001.png"));
     // Killed and continued, and run again when it is complete.
     let killed = out("killed-sea");
     let arguments = [&sea[..], &size].concat();
-    make_dataset::killed_often(&arguments, &killed, 6, 150);
+    dataset::killed_often(&arguments, &killed, 6, 150);
     for _ in 0..2 {
-        done("make_dataset", &arguments, &killed);
+        done("dataset", &arguments, &killed);
         assert!(files(&killed) == files(&out("sea")));
     }
     // A set of one sea is no set of another.
     refused_into(
-        "make_dataset",
+        "dataset",
         &size,
         &["dataset.json", "another recipe"],
         &out("sea"),
     );
     let coarse = [&sea[..], &size, &["--set", "scene.grid.spacing=10"]].concat();
-    refused_by("make_dataset", &coarse, &["grid.spacing", "10 m", "4 m"]);
+    refused_by("dataset", &coarse, &["grid.spacing", "10 m", "4 m"]);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn what_is_no_sea_is_named() {
         ("no/sea", ["no/sea", "cannot read"]),
     ] {
         refused_by("generate", &["--sea", name], &words);
-        refused_by("make_dataset", &["--sea", name, "--count", "1"], &words);
+        refused_by("dataset", &["--sea", name, "--count", "1"], &words);
         refused_by(
             "evaluate",
             &["sea", "--real", images, "--weights", name],
@@ -132,7 +132,10 @@ fn what_is_no_sea_is_named() {
         &["--sea", reader, "--steps", "2"],
         &["--sea", "--steps"],
     );
-    let other = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/pipeline_a");
+    let other = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/fixtures/pipeline_a"
+    );
     let layout = ["--weights", other, "--sea", reader];
     refused_by("generate", &layout, &["--sea", "wake model"]);
     assert_eq!(files(folder.path()).len(), 4);

@@ -1,4 +1,4 @@
-//! `train -- text-to-image`, and what reads the model that it writes.
+//! `wake train text-to-image`, and what reads the model that it writes.
 
 use super::{done, files, refused_by, refused_into, text};
 
@@ -22,7 +22,7 @@ fn a_model_is_learnt_resumed_and_drawn_with() {
     let size = ["scene.grid.rows=64", "scene.grid.columns=64"];
     let mut arguments = vec!["--count", "3"];
     arguments.extend(size.iter().flat_map(|change| ["--set", *change]));
-    done("make_dataset", &arguments, &set);
+    done("dataset", &arguments, &set);
     let common = [&["text-to-image", "--data", text(&set)], &SHORT[..]].concat();
     done("train", &common, &out("whole"));
 
@@ -70,7 +70,7 @@ fn what_no_model_can_be_made_of_is_named() {
     let size = ["scene.grid.rows=96", "scene.grid.columns=64"];
     let mut arguments = vec!["--count", "2"];
     arguments.extend(size.iter().flat_map(|change| ["--set", *change]));
-    done("make_dataset", &arguments, &set);
+    done("dataset", &arguments, &set);
     let data = ["text-to-image", "--data", text(&set)];
     refused_by("train", &data, &["96 x 64 pixels", "multiple of 64"]);
     refused_by(

@@ -1,15 +1,15 @@
-//! `train`: what it refuses, and every stage on toys, through to a generated image.
+//! `wake train`: what it refuses, and every stage on toys, through to a generated image.
 
 use std::path::Path;
 
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Duration;
 
-use wake_ldm::dataset::{Recipe, Simulated};
+use wake_dataset::{Recipe, Simulated};
 use wake_ldm::network::{Domain, WakeModelConfig};
 use wake_physics::Scene;
 
-use super::{done, example, files, refused_by, refused_into, text};
+use super::{done, files, program, refused_by, refused_into, text};
 
 /// Data of 64 × 64 pixels, and a model that fits it, in a folder.
 fn toys(folder: &Path) {
@@ -20,11 +20,7 @@ fn toys(folder: &Path) {
         "--set",
         "scene.grid.columns=64",
     ];
-    done(
-        "make_dataset",
-        &[&size[..], &["--count", "10"]].concat(),
-        &set,
-    );
+    done("dataset", &[&size[..], &["--count", "10"]].concat(), &set);
     let vocabulary: Vec<u32> = (0..40).collect();
     let config = serde_json::json!({
         "image_size": 64, "spacing": 4.0, "latent_channels": 4, "fold": 2, "widths": [16, 32],
@@ -37,12 +33,16 @@ fn toys(folder: &Path) {
 #[test]
 fn wrong_data_devices_and_folders_are_named() {
     let data = ["autoencoder", "--data", "no/such/folder"];
-    refused_by("train", &data, &["no/such/folder", "make_dataset"]);
+    refused_by(
+        "train wake-model",
+        &data,
+        &["no/such/folder", "wake dataset"],
+    );
     let device = ["autoencoder", "--device", "tpu"];
-    refused_by("train", &device, &["tpu", "flex"]);
+    refused_by("train wake-model", &device, &["tpu", "flex"]);
     for stage in ["words", "mean", "diffusion"] {
         refused_by(
-            "train",
+            "train wake-model",
             &[stage, "--resume"],
             &["--resume", "no checkpoint"],
         );
@@ -72,7 +72,7 @@ fn the_stages_make_a_model_that_generates_and_a_stopped_run_goes_on() {
             "--batch",
             "2",
         ];
-        done("train", &[arguments, &common].concat(), &out)
+        done("train wake-model", &[arguments, &common].concat(), &out)
     };
     train(&["words", "--steps", "2"]);
     train(&["mean", "--steps", "2"]);
@@ -93,7 +93,10 @@ fn the_stages_make_a_model_that_generates_and_a_stopped_run_goes_on() {
 fn a_model_in_diffusers_layout_is_fine_tuned_whole_and_by_low_rank_changes() {
     let folder = tempfile::tempdir().expect("a folder");
     toys(folder.path());
-    let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/pipeline_a");
+    let weights = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/fixtures/pipeline_a"
+    );
     let set = folder.path().join("set");
     for (name, rank) in [("whole", None), ("changes", Some("2"))] {
         let out = folder.path().join(name);
@@ -165,13 +168,13 @@ impl Toys {
     fn train(&self, stage: &[&str]) -> String {
         let arguments = self.arguments(stage);
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        done("train", &arguments, &self.path("run"))
+        done("train wake-model", &arguments, &self.path("run"))
     }
 
     fn refused(&self, stage: &[&str], words: &[&str]) {
         let arguments = self.arguments(stage);
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        refused_into("train", &arguments, words, &self.path("run"));
+        refused_into("train wake-model", &arguments, words, &self.path("run"));
     }
 }
 
@@ -202,7 +205,7 @@ fn a_folder_belongs_to_one_run() {
         "scene.grid.columns=64",
     ];
     done(
-        "make_dataset",
+        "dataset",
         &[&size[..], &["--count", "4", "--seed", "9"]].concat(),
         &other,
     );
@@ -216,7 +219,7 @@ fn a_folder_belongs_to_one_run() {
         text(&config),
     ];
     refused_into(
-        "train",
+        "train wake-model",
         &arguments,
         &["data.set.count = 10", "expected 4"],
         &out,
@@ -263,7 +266,7 @@ fn many_kills_change_no_weight() {
     let rate = "--rate=0.0012345678901234567";
     let arguments = toys.arguments(&["words", "--steps", "30", "--every", "2", rate]);
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    done("train", &arguments, &whole);
+    done("train wake-model", &arguments, &whole);
     let resumed = [&arguments[..], &["--resume"]].concat();
     let has_begun = || {
         let checkpoints = std::fs::read_dir(killed.join("checkpoints/words"));
@@ -276,20 +279,20 @@ fn many_kills_change_no_weight() {
     };
     for k in 0..12_u64 {
         let arguments = if has_begun() { &resumed } else { &arguments };
-        let mut child = Command::new(example("train"))
+        let mut child = program("train wake-model")
             .args(arguments)
             .args(["--out", text(&killed)])
             .stderr(Stdio::null())
             .stdout(Stdio::null())
             .spawn()
-            .expect("an example that starts");
+            .expect("a program that starts");
         std::thread::sleep(Duration::from_millis(50 + k * 7919 % 400));
         // It may have ended.
         let _ = child.kill();
         child.wait().expect("an end");
     }
     let last = if has_begun() { &resumed } else { &arguments };
-    done("train", last, &killed);
+    done("train wake-model", last, &killed);
     let file = |folder: &Path, name: &str| std::fs::read(folder.join(name)).expect("a file");
     let name = "reader.safetensors";
     assert!(file(&whole, name) == file(&killed, name));
@@ -340,14 +343,14 @@ fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
             format!("scene.grid.columns={columns}"),
         );
         done(
-            "make_dataset",
+            "dataset",
             &["--set", &rows_set, "--set", &columns_set, "--count", "1"],
             &set,
         );
         let pixels = format!("{rows} × {columns} pixels");
         for stage in ["autoencoder", "mean", "diffusion"] {
             let arguments = [stage, "--data", text(&set), "--config", text(&config)];
-            refused_by("train", &arguments, &[&pixels, "64 × 64"]);
+            refused_by("train wake-model", &arguments, &[&pixels, "64 × 64"]);
         }
     }
     // Grey in another mapping than the model's.
@@ -359,17 +362,21 @@ fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
     ];
     let mut arguments = vec!["--count", "1"];
     arguments.extend(changes.iter().flat_map(|change| ["--set", *change]));
-    done("make_dataset", &arguments, &set);
+    done("dataset", &arguments, &set);
     let arguments = ["mean", "--data", text(&set), "--config", text(&config)];
-    refused_by("train", &arguments, &["grey", "Amplitude", "Decibel"]);
+    refused_by(
+        "train wake-model",
+        &arguments,
+        &["grey", "Amplitude", "Decibel"],
+    );
     for rate in ["nan", "inf", "1e300", "0", "-1"] {
         let rate = format!("--rate={rate}");
         for stage in ["words", "mean", "diffusion"] {
-            refused_by("train", &[stage, &rate], &["rate is", "outside"]);
+            refused_by("train wake-model", &[stage, &rate], &["rate is", "outside"]);
         }
     }
     let count = ["mean", "--count", "18446744073709551615"];
-    refused_by("train", &count, &["--count", "10000000"]);
+    refused_by("train wake-model", &count, &["--count", "10000000"]);
 }
 
 /// Fewer pairs than a sheet shows are pairs to learn from, too.
@@ -383,15 +390,11 @@ fn a_set_of_three_images_is_learnt() {
         "--set",
         "scene.grid.columns=64",
     ];
-    done(
-        "make_dataset",
-        &[&size[..], &["--count", "3"]].concat(),
-        &set,
-    );
+    done("dataset", &[&size[..], &["--count", "3"]].concat(), &set);
     let config = toys.path("model.json");
     let common = ["--data", text(&set), "--config", text(&config)];
     done(
-        "train",
+        "train wake-model",
         &[&["mean", "--steps", "1", "--batch", "2"], &common[..]].concat(),
         &out,
     );
@@ -410,7 +413,7 @@ fn scenes_that_the_model_is_not_told_of_are_refused_by_name() {
     ];
     let mut arguments = vec!["--count", "1"];
     arguments.extend(changes.iter().flat_map(|change| ["--set", *change]));
-    done("make_dataset", &arguments, &set);
+    done("dataset", &arguments, &set);
     let recipe = Recipe::default().with_assignments(&changes[..2]).unwrap();
     let simulated = Simulated::new(recipe, 1).unwrap();
     let scenes: Vec<Scene> = (0..200).map(|n| simulated.scene(n).unwrap()).collect();
@@ -422,5 +425,9 @@ fn scenes_that_the_model_is_not_told_of_are_refused_by_name() {
     let config = toys.path("told.json");
     std::fs::write(&config, serde_json::to_vec(&model).unwrap()).unwrap();
     let arguments = ["mean", "--data", text(&set), "--config", text(&config)];
-    refused_by("train", &arguments, &["radar.polarization", "HH", "VV"]);
+    refused_by(
+        "train wake-model",
+        &arguments,
+        &["radar.polarization", "HH", "VV"],
+    );
 }

@@ -1,0 +1,55 @@
+//! `wake bench` and `wake gallery`: every part runs once.
+
+use serde_json::Value;
+
+use super::{done, names};
+
+fn rows(arguments: &[&str], files: &[&str]) -> Vec<Value> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let printed = done("bench", &[&["--json"], arguments].concat(), &out);
+    let written = names(&out);
+    for file in files {
+        assert!(
+            written.iter().any(|name| name == file),
+            "{file}: {written:?}"
+        );
+    }
+    let report: Value = serde_json::from_str(&printed).expect("JSON and nothing else");
+    report["rows"].as_array().expect("rows").clone()
+}
+
+#[test]
+fn a_stage_is_measured_against_its_oracle() {
+    let arguments = ["--stage", "bunching", "--largest", "128"];
+    let rows = rows(&arguments, &["report.json", "simulator.md", "frontier.svg"]);
+    assert!(rows.len() > 1);
+    for row in rows {
+        assert_eq!(row["stage"], "bunching");
+        assert!(row["rms_error"].as_f64().is_some_and(|e| e < 0.1), "{row}");
+    }
+}
+
+#[test]
+fn the_model_is_measured() {
+    let rows = rows(
+        &["--part", "model"],
+        &["report.json", "model.md", "model.svg"],
+    );
+    assert!(rows.iter().all(|row| row["stage"] == "model"));
+}
+
+#[test]
+fn the_loader_is_measured() {
+    let rows = rows(&["--part", "loader"], &["report.json", "loader.md"]);
+    let rate = |row: &Value| row["images_per_second"].as_f64();
+    assert!(rows.iter().all(|row| rate(row).is_some_and(|r| r > 0.0)));
+}
+
+#[test]
+fn the_pictures_of_the_documentation_are_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    done("gallery", &[], folder.path());
+    let drawn = names(folder.path());
+    assert_eq!(drawn, ["gallery.png", "stages.png", "wake.gif"]);
+}
