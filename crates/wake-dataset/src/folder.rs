@@ -25,7 +25,7 @@ impl Folder {
     /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first line that is broken or was changed.
     pub fn open(path: &Path) -> Result<Self> {
         let Some(manifest) = Manifest::read(path)? else {
-            let message = "no data set; make one with the example make_dataset";
+            let message = "no data set; make one with `wake dataset`";
             return Err(broken(path, 0, message));
         };
         let metadata = Layout(path).metadata();

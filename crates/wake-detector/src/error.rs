@@ -85,7 +85,7 @@ pub enum Error {
     /// Weights whose maps of a plain wake show nothing.
     #[error(
         "the weights in {} on {device} give maps that are {why} for an image with one plain wake; \
-         use weights that `detector train` has written, or the shipped ones",
+         use weights that `wake train detector` has written, or the shipped ones",
         path.display()
     )]
     WrongMaps {

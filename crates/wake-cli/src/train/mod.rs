@@ -24,10 +24,7 @@ pub(crate) struct Arguments {
 }
 
 #[derive(Subcommand)]
-#[expect(
-    clippy::enum_variant_names,
-    reason = "the wake model is called so"
-)]
+#[expect(clippy::enum_variant_names, reason = "the wake model is called so")]
 enum Model {
     #[command(mut_args(defaults(wake_model::DEFAULTS)))]
     WakeModel(wake_model::Options),

@@ -3,6 +3,7 @@
 //! A plan is complete when it is returned and never changed. What the methods then reach is
 //! [`Accuracy`](crate::Accuracy).
 
+mod advice;
 mod budget;
 mod cost;
 mod estimates;

@@ -1,6 +1,6 @@
 //! What the stages of a simulation will do, counted before they do it: operations, the time they take, and memory.
 
-use super::cost::Advice;
+use super::advice::Advice;
 use crate::kelvin::{LARGEST_SLOPE_VARIANCE, RingWork, WakePlan};
 use crate::models::Models;
 use crate::nufft::WAVES_AT_ONCE;

@@ -18,6 +18,7 @@ mod slope_lattice;
 mod slope_means;
 mod slopes;
 mod specular;
+mod facets;
 mod table;
 mod table_error;
 mod two_scale;

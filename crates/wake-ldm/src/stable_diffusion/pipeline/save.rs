@@ -1,5 +1,6 @@
 //! Writing a pipeline as a folder in diffusers layout.
 
+use std::io::Write;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -8,7 +9,7 @@ use wake_text::Tokenizer;
 use super::Pipeline;
 use crate::error::Result;
 use wake_nn::weights::{Layout, Precision, save_folder};
-use whole_files::write_atomically;
+use whole_files::write_synced;
 
 impl Pipeline {
     /// Writes a folder that [`load`](Self::load) and diffusers' `StableDiffusionPipeline` read:
@@ -72,5 +73,5 @@ impl Pipeline {
 }
 
 fn write_json(path: &Path, json: &Value) -> Result<()> {
-    Ok(write_atomically(path, format!("{json:#}\n").as_bytes())?)
+    Ok(write_synced(path, |file| write!(file, "{json:#}\n"))?)
 }

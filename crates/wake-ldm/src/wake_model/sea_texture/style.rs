@@ -98,7 +98,7 @@ impl SeaStyle {
             return Err(Error::Model(wake_nn::Error::InvalidOption {
                 option: "correlation".to_owned(),
                 value: "beyond -1 to 1, or not 1 of a pixel with itself".to_owned(),
-                expected: "what `train -- sea` writes".to_owned(),
+                expected: "what `wake train sea` writes".to_owned(),
             }));
         };
         let numbers = std::array::from_fn(|n| numbers.get(n).copied().unwrap_or(f32::NAN));

@@ -108,7 +108,7 @@ impl SeaTexture {
             Error::Model(wake_nn::Error::InvalidOption {
                 option: path.display().to_string(),
                 value: format!("no learnt sea: {what}"),
-                expected: "a file that `train -- sea` wrote".to_owned(),
+                expected: "a file that `wake train sea` wrote".to_owned(),
             })
         };
         let style = |(n, (numbers, correlation)): (usize, (&[f32], &[f32]))| {
