@@ -34,7 +34,7 @@ impl Folder {
         let expected = manifest.indices().end - manifest.indices().start;
         if rows.len() as u64 != expected {
             let message = format!(
-                "ends after {} of {expected} pairs; run make_dataset again to finish it",
+                "ends after {} of {expected} pairs; run `wake dataset` again to finish it",
                 rows.len()
             );
             return Err(broken(&metadata, rows.len(), message));

@@ -65,7 +65,7 @@ impl Row {
         }
         let message = format!(
             "damaged or another image: its CRC-32 is {found}, line {line} of metadata.jsonl has {}; remove the file and \
-             run make_dataset again to make it anew",
+             run `wake dataset` again to make it anew",
             self.image_crc32
         );
         Err(broken(path, 0, message))
@@ -98,7 +98,7 @@ impl Row {
         for (path, text) in labels.iter().zip(self.labels(size)) {
             if std::fs::read(path).map_err(|e| cannot("read", path, e))? != text.as_bytes() {
                 let message = format!(
-                    "changed: not the labels of line {line} of metadata.jsonl; remove the file and run make_dataset again \
+                    "changed: not the labels of line {line} of metadata.jsonl; remove the file and run `wake dataset` again \
                      to make it anew"
                 );
                 return Err(broken(path, 0, message));
@@ -238,7 +238,7 @@ pub(super) fn parse(path: &Path, text: &[u8], manifest: &Manifest) -> Result<Row
         let text = text.and_then(|line| line.strip_suffix('\n'));
         if text.and_then(unsealed).is_none() {
             let message = "changed: its checksum crc32 does not fit; restore the line, or remove it and all below it and \
-                           run make_dataset again";
+                           run `wake dataset` again";
             return Err(fail(message.to_owned()));
         }
         let index = indices

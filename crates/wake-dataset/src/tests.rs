@@ -325,7 +325,7 @@ fn foreign_folders_are_refused_and_left_alone() {
     let message = refused(write(path, &manifest(), 1, |_| ()), path);
     assert!(message.contains("not empty"), "{message}");
     assert_eq!(tree(path).len(), 1);
-    assert!(refused(Folder::open(path), path).contains("make_dataset"));
+    assert!(refused(Folder::open(path), path).contains("wake dataset"));
     fs::write(path.join("dataset.json"), "{\n\"info\": 3}").unwrap();
     for message in [
         refused(write(path, &manifest(), 1, |_| ()), path),
