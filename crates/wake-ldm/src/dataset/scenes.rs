@@ -430,7 +430,10 @@ mod tests {
         let mut seen = BTreeSet::new();
         for index in 0..40 {
             let ship = &source.scene(index).unwrap().ships[0];
-            assert_eq!((ship.roll > 0.0, ship.edge_time.is_some()), (ship.echo, ship.edge));
+            assert_eq!(
+                (ship.roll > 0.0, ship.edge_time.is_some()),
+                (ship.echo, ship.edge)
+            );
             seen.insert((ship.echo, ship.edge));
         }
         assert_eq!(seen.len(), 4);
