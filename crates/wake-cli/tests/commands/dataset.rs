@@ -232,7 +232,7 @@ fn damage_is_named_and_left_alone() {
     std::fs::remove_file(&image).expect("an image");
     done("dataset", &arguments, &out);
     assert!(files(&out) == whole);
-    let mut changed = text_of_lines.clone();
+    let mut changed = text_of_lines;
     let at = changed.len() / 2;
     changed[at] ^= 1;
     std::fs::write(&lines, changed).expect("a file");

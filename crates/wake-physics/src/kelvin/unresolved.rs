@@ -227,6 +227,11 @@ impl UnresolvedWaves {
         self.widest
     }
 
+    /// The track of the ship.
+    pub(crate) fn track(&self) -> &Track {
+        &self.track
+    }
+
     /// The largest slope variance at a distance astern of midship \[m\].
     pub(crate) fn steepest(&self, distance: f64) -> f64 {
         let waves = self.branches.iter().flatten();

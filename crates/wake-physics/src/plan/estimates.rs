@@ -101,7 +101,7 @@ impl<'a> Estimates<'a> {
             }
             Term::Turbulent => self.survey.damping * self.survey.modulation.bragg_share,
             Term::TiltAverage => self.backscatter[0],
-            Term::Specular => self.backscatter[1],
+            Term::Specular => self.backscatter[1].max(self.survey.rough_specular),
             Term::RangeBunching => {
                 self.part(|m| m.range_bunching) + self.both(|w| self.range_shift(w)) * self.contrast
             }
@@ -234,6 +234,7 @@ mod tests {
             damping: 0.11,
             edge: [0.12, 0.5],
             unresolved: [0.13, 0.14],
+            rough_specular: 0.2,
             slicks: 0.15,
             gusts: 0.16,
             added: [0.17, 0.18],
@@ -305,8 +306,12 @@ mod tests {
                 effect.estimate
             );
         }
-        // Speckle that neighbours share may be more than the contrast.
+        // Where a ship's waves roughen the sea, its specular return is more than that of the sea alone.
         let mut smooth = survey;
+        smooth.rough_specular = 0.4;
+        let estimates = Estimates::new(&smooth, BACKSCATTER);
+        assert!((estimates.of(Term::Specular) - (3.0 * 0.4 + 1e-6)).abs() < 1e-12);
+        // Speckle that neighbours share may be more than the contrast.
         smooth.response = 0.9;
         let estimates = Estimates::new(&smooth, BACKSCATTER);
         assert!((estimates.of(Term::Response) - 0.9).abs() < 1e-15);

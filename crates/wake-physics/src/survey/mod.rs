@@ -14,7 +14,7 @@ use crate::scene::{Scene, Term};
 use crate::track::Track;
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity};
 use std::f64::consts::{PI, SQRT_2};
-use strengths::{SLOPE_STEP, damping, edge, unresolved};
+use strengths::{SLOPE_STEP, damping, edge, rough_specular, unresolved};
 
 /// Tolerance of the coarse wake that is only weighed.
 const COARSE: f64 = 0.1;
@@ -54,6 +54,8 @@ pub(crate) struct Survey {
     /// Roots of mean squares over the image: what the ship's unresolved waves change σ⁰ by, relative, and the share of
     /// the width of a point that their velocities add, 0 to 1.
     pub(crate) unresolved: [f64; 2],
+    /// Specular return where the ship's unresolved waves are, root of the mean square over the mean σ⁰; 0 without them.
+    pub(crate) rough_specular: f64,
     /// Damping in slicks.
     pub(crate) slicks: f64,
     /// Root of the mean square of what gusts change σ⁰ by, relative.
@@ -109,6 +111,11 @@ impl Survey {
             swell,
             edge: edge(models),
             unresolved: unresolved(models, &backscatter),
+            rough_specular: if total > 0.0 {
+                rough_specular(models, &backscatter, &resolved) / total
+            } else {
+                0.0
+            },
             slicks: models.slicks.map_or(0.0, |s| s.damping),
             gusts: models
                 .gusts

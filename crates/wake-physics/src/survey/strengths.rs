@@ -1,8 +1,9 @@
 //! How much those terms change the image that no wave carries: the turbulent wake, its edges, waves that no pixel carries.
 
+use crate::kelvin::UnresolvedWaves;
 use crate::models::Models;
 use crate::raster::Raster;
-use crate::scattering::Backscatter;
+use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::turbulent::current::WakeEdge;
 use crate::wakes::Wake;
 use std::f64::consts::{PI, SQRT_2};
@@ -12,6 +13,9 @@ pub(super) const SLOPE_STEP: f64 = 0.05;
 
 /// Points along each side of the image where the turbulent wake is looked at.
 const DAMPING_POINTS: usize = 48;
+
+/// Rays on each side of a ship's track, and places on each.
+const RAY_POINTS: usize = 40;
 
 /// Root of the mean square of the damping by all turbulent wakes over the image.
 pub(super) fn damping(models: &Models) -> f64 {
@@ -84,6 +88,47 @@ pub(super) fn unresolved(models: &Models, backscatter: &Backscatter) -> [f64; 2]
         rms_over(&models.image, change),
         rms_over(&models.image, wider),
     ]
+}
+
+/// Root of the mean square of the specular return over the image and its resolved slopes, where the waves of a ship that pixels
+/// do not carry roughen the sea \[1\]; 0 where there are none.
+///
+/// Few places make it, near the track: it is summed over rays from the ship, the denser the nearer to the track. Behind several
+/// ships each counts alone.
+pub(super) fn rough_specular(
+    models: &Models,
+    backscatter: &Backscatter,
+    resolved: &SlopeCovariance,
+) -> f64 {
+    let image = &models.delivered;
+    let [rows, columns] = [image.rows as f64, image.columns as f64];
+    let specular = |waves: &UnresolvedWaves, place: [f64; 2]| {
+        let [column, row] = image.pixel(place[0], place[1]);
+        let inside = (-0.5..rows - 0.5).contains(&row) && (-0.5..columns - 0.5).contains(&column);
+        let rough = waves.at(place).filter(|_| inside);
+        rough.map_or(0.0, |rough| {
+            let [xx, xy, yy] = rough.slopes;
+            let over = backscatter.specular.over(&SlopeCovariance { xx, xy, yy });
+            over.rms_over(resolved).powi(2)
+        })
+    };
+    let mut sum = 0.0;
+    for waves in &models.unresolved {
+        let track = waves.track();
+        let step = track.farthest_astern(image) / RAY_POINTS as f64;
+        for n in 0..RAY_POINTS * RAY_POINTS {
+            let astern = step * ((n / RAY_POINTS) as f64 + 0.5);
+            // Tangents 0 to 1 of the angle to the track, evenly in their roots.
+            let root = ((n % RAY_POINTS) as f64 + 0.5) / RAY_POINTS as f64;
+            let aside = astern * root * root;
+            let area = step * astern * 2.0 * root / RAY_POINTS as f64;
+            let there = track.at(-astern);
+            for port in [-aside, aside] {
+                sum += area * specular(waves, there.on_sea([0.0, port]));
+            }
+        }
+    }
+    (sum / (rows * columns * image.spacing * image.spacing)).sqrt()
 }
 
 /// ½∂²σ⁰/∂s² over σ⁰ for variances xx, xy and yy of the slopes, on the calm facet.

@@ -222,9 +222,9 @@ fn weak_extras_are_left_out_and_change_less_than_estimated() {
 }
 
 /// Needed against all, same seed, with and without an echo, for every satellite at spacings below, around and above that at
-/// which its pixels no longer correlate, 1.1 to 1.5 resolutions: the image stays within the tolerance.
+/// which its pixels no longer correlate, 1.1 to 1.5 resolutions: the change stays below the estimate.
 #[test]
-fn what_is_needed_is_within_the_tolerance_of_all_for_every_satellite() {
+fn what_is_left_out_changes_less_than_estimated_for_every_satellite() {
     for (n, sensor) in Sensor::ALL.into_iter().enumerate() {
         let mode = sensor.mode();
         let name = serde_json::to_value(sensor).unwrap();
@@ -252,8 +252,8 @@ fn what_is_needed_is_within_the_tolerance_of_all_for_every_satellite() {
                 assert!(left_out <= scene.model.tolerance, "{sensor:?} {pixels}");
                 let change = needed.intensity.difference(&all.intensity).1 / all.intensity.mean();
                 assert!(
-                    change <= scene.model.tolerance,
-                    "{sensor:?} at {pixels} resolutions, echo {echo}: {change}\n{}",
+                    change <= left_out + 0.01 * scene.model.tolerance,
+                    "{sensor:?} at {pixels} resolutions, echo {echo}: {change} above {left_out}\n{}",
                     needed.plan
                 );
             }

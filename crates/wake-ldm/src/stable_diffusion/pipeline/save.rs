@@ -73,5 +73,5 @@ impl Pipeline {
 }
 
 fn write_json(path: &Path, json: &Value) -> Result<()> {
-    Ok(write_synced(path, |file| write!(file, "{json:#}\n"))?)
+    Ok(write_synced(path, |file| writeln!(file, "{json:#}"))?)
 }

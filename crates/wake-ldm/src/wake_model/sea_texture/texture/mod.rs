@@ -255,7 +255,7 @@ impl SeaTexture {
     ///
     /// - E: the image that is expected of the scene over all seas, wakes and noise in it, echoes not
     /// - s: a sea of mean 1 with its speckle, [`sample`](Self::sample) of the scene's seed
-    /// - echo: of the ships, as it is expected; it has no speckle
+    /// - echo: the bright points of the ships that the scene's seed draws; they have no speckle
     ///
     /// The sea takes no notice of the wake: where the wake doubles the intensity it doubles sea and speckle.
     ///

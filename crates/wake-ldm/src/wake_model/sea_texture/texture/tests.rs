@@ -238,17 +238,15 @@ fn the_image_is_the_expected_one_times_the_sea_and_the_echo_on_it() {
     let seeds = 8;
     let (mut ratio, mut spread) = (0.0, 0.0);
     for seed in 0..seeds {
-        let at = |scene: &Scene| {
-            sea.image(&Scene {
-                seed,
-                ..scene.clone()
-            })
-            .unwrap()
-        };
-        let (image, without) = (at(&scene), at(&silent));
+        let [scene, silent] = [&scene, &silent].map(|scene| Scene {
+            seed,
+            ..scene.clone()
+        });
+        let [image, without] = [&scene, &silent].map(|scene| sea.image(scene).unwrap());
+        let drawn = expected_intensity(&scene).unwrap();
         for n in 0..image.values.len() {
             let echo = image.values[n] - without.values[n];
-            let asked = all.values[n] - expected.values[n];
+            let asked = drawn.values[n] - expected.values[n];
             assert!((echo - asked).abs() <= 1e-5 * image.values[n].abs(), "{n}");
         }
         let ratios = dark
