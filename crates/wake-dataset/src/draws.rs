@@ -328,7 +328,7 @@ fn ship(
     }
     for (of, keys) in NEEDS {
         if ship.get(of).and_then(toml::Value::as_bool) != Some(true) {
-            ship.retain(|key, _| !keys.iter().any(|needless| key == *needless));
+            ship.retain(|key, _| !keys.contains(&AsRef::<str>::as_ref(key)));
         }
     }
     Ok(ship.into())
