@@ -26,9 +26,11 @@ impl Projection {
                 map: None,
             });
         }
-        let map = Proj::from_proj_string(&definition(code)?).ok()?;
-        let degrees =
-            Proj::from_proj_string("+proj=longlat +ellps=WGS84 +towgs84=0,0,0 +no_defs").ok()?;
+        let ellipsoid = ellipsoid(code);
+        let map = format!("{} {ellipsoid} +units=m +no_defs", definition(code)?);
+        let degrees = format!("+proj=longlat {ellipsoid} +no_defs");
+        let map = Proj::from_proj_string(&map).ok()?;
+        let degrees = Proj::from_proj_string(&degrees).ok()?;
         Some(Self {
             epsg: code,
             map: Some(Box::new((map, degrees))),
@@ -78,36 +80,36 @@ pub(crate) fn is_geographic(code: u32) -> bool {
     matches!(code, 4326 | 4979 | 4258 | 4269)
 }
 
-/// Definition in PROJ's words, from the EPSG registry.
+/// Ellipsoid of a map, on which its degrees are taken as those of WGS84.
+fn ellipsoid(code: u32) -> &'static str {
+    match code {
+        25828..=25838 | 26901..=26923 | 3034 | 3035 | 2154 => "+ellps=GRS80",
+        _ => "+ellps=WGS84",
+    }
+}
+
+/// Projection in PROJ's words, from the EPSG registry.
 fn definition(code: u32) -> Option<String> {
-    let utm = |zone: u32, south: &str| {
-        format!("+proj=utm +zone={zone}{south} +ellps=WGS84 +towgs84=0,0,0 +units=m +no_defs")
-    };
-    let laea = |lat: i32, lon: i32| format!("+proj=laea +lat_0={lat} +lon_0={lon} +x_0=0 +y_0=0");
-    let polar = |lat: i32, ts: &str, lon: i32| {
-        format!("+proj=stere +lat_0={lat} +lat_ts={ts} +lon_0={lon} +k=1 +x_0=0 +y_0=0")
-    };
-    let projection = match code {
-        32601..=32660 => return Some(utm(code - 32600, "")),
-        32701..=32760 => return Some(utm(code - 32700, " +south")),
-        25828..=25838 => return Some(utm(code - 25800, "")),
-        26901..=26923 => return Some(utm(code - 26900, "")),
-        3857 => {
-            return Some(
-                "+proj=merc +a=6378137 +b=6378137 +lat_ts=0 +lon_0=0 +x_0=0 +y_0=0 +k=1 +units=m +nadgrids=@null +no_defs"
-                    .to_owned(),
-            );
-        }
-        3395 => "+proj=merc +lon_0=0 +k=1 +x_0=0 +y_0=0".to_owned(),
-        6933 => "+proj=cea +lat_ts=30 +lon_0=0 +x_0=0 +y_0=0".to_owned(),
+    let utm = |zone: u32| format!("+proj=utm +zone={zone}");
+    let laea = |lat: i32, lon: i32| format!("+proj=laea +lat_0={lat} +lon_0={lon}");
+    let polar =
+        |lat: i32, ts: i32, lon: i32| format!("+proj=stere +lat_0={lat} +lat_ts={ts} +lon_0={lon}");
+    Some(match code {
+        32601..=32660 => utm(code - 32600),
+        32701..=32760 => utm(code - 32700) + " +south",
+        25828..=25838 => utm(code - 25800),
+        26901..=26923 => utm(code - 26900),
+        3857 => "+proj=webmerc +lon_0=0".to_owned(),
+        3395 => "+proj=merc +lon_0=0".to_owned(),
+        6933 => "+proj=cea +lat_ts=30 +lon_0=0".to_owned(),
         32661 => "+proj=stere +lat_0=90 +lon_0=0 +k=0.994 +x_0=2000000 +y_0=2000000".to_owned(),
         32761 => "+proj=stere +lat_0=-90 +lon_0=0 +k=0.994 +x_0=2000000 +y_0=2000000".to_owned(),
-        3413 => polar(90, "70", -45),
-        3995 => polar(90, "71", 0),
-        3996 => polar(90, "75", 0),
-        3031 => polar(-90, "-71", 0),
-        3976 => polar(-90, "-70", 0),
-        3035 => "+proj=laea +lat_0=52 +lon_0=10 +x_0=4321000 +y_0=3210000".to_owned(),
+        3413 => polar(90, 70, -45),
+        3995 => polar(90, 71, 0),
+        3996 => polar(90, 75, 0),
+        3031 => polar(-90, -71, 0),
+        3976 => polar(-90, -70, 0),
+        3035 => laea(52, 10) + " +x_0=4321000 +y_0=3210000",
         3571 => laea(90, 180),
         3572 => laea(90, -150),
         3573 => laea(90, -100),
@@ -123,8 +125,5 @@ fn definition(code: u32) -> Option<String> {
             "+proj=lcc +lat_1=49 +lat_2=44 +lat_0=46.5 +lon_0=3 +x_0=700000 +y_0=6600000".to_owned()
         }
         _ => return None,
-    };
-    Some(format!(
-        "{projection} +ellps=WGS84 +towgs84=0,0,0 +units=m +no_defs"
-    ))
+    })
 }

@@ -98,13 +98,16 @@ fn axes_agree_with_heading_and_spacing() {
             assert!(turn.abs() < 7.0, "{turn}");
             let right = (axes.pixel_azimuth - axes.line_azimuth).rem_euclid(360.0);
             assert!((right - 90.0).abs() < 1.0, "{right}");
-            // Spacing is nominal; ground height and ellipsoid change it by less than 1 %.
+            // Lines follow each other at the speed of the radar's footprint, about 6.8 km/s; the annotation's spacing of
+            // lines is nominal, up to 2 % less. Slopes of the terrain stretch pixels by as much.
+            let speed = axes.line_spacing / annotation.line_interval;
+            assert!((6700.0..6900.0).contains(&speed), "{axes:?}");
             assert!(
-                (axes.line_spacing / annotation.azimuth_spacing - 1.0).abs() < 0.01,
+                (axes.line_spacing / annotation.azimuth_spacing - 1.0).abs() < 0.02,
                 "{axes:?}"
             );
             assert!(
-                (axes.pixel_spacing / annotation.range_spacing - 1.0).abs() < 0.01,
+                (axes.pixel_spacing / annotation.range_spacing - 1.0).abs() < 0.02,
                 "{axes:?}"
             );
             let ratio = product

@@ -292,6 +292,7 @@ struct Tags {
     lines: u32,
     pixels: u32,
     compression: CompressionMethod,
+    predictor: u16,
     bands: u16,
     planar: PlanarConfiguration,
     photometric: PhotometricInterpretation,
@@ -322,6 +323,7 @@ impl Tags {
             lines,
             pixels,
             compression: CompressionMethod::from_u16_exhaustive(compression),
+            predictor: number(decoder, Tag::Predictor, 1)?,
             bands: number(decoder, Tag::SamplesPerPixel, 1)?,
             planar: PlanarConfiguration::from_u16(planar).unwrap_or(PlanarConfiguration::Chunky),
             photometric: PhotometricInterpretation::from_u16(photometric)
@@ -355,6 +357,17 @@ impl Tags {
         if !known {
             return Err(unsupported(format!(
                 "TIFF compression {:?}",
+                self.compression
+            )));
+        }
+        // Readers disagree whether these have a predictor.
+        let plain = matches!(
+            self.compression,
+            CompressionMethod::None | CompressionMethod::PackBits
+        );
+        if plain && self.predictor != 1 {
+            return Err(unsupported(format!(
+                "a predictor with TIFF compression {:?}",
                 self.compression
             )));
         }

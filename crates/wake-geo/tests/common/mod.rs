@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
+pub(crate) mod synthetic;
+
 use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
