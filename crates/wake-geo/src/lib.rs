@@ -5,7 +5,7 @@
 pub mod limits;
 
 mod error;
-mod read_seek;
+mod read_at;
 mod time;
 mod xml;
 

@@ -49,17 +49,20 @@ impl Picture {
         })
     }
 
-    /// Levels of a window inside the image.
-    pub(crate) fn read(&self, lines: Range<usize>, pixels: Range<usize>) -> Vec<f32> {
-        let rows =
-            lines.map(|line| line * self.pixels + pixels.start..line * self.pixels + pixels.end);
-        match &self.levels {
-            Levels::U8(levels) => rows
-                .flat_map(|row| levels[row].iter().map(|&v| f32::from(v)))
-                .collect(),
-            Levels::U16(levels) => rows
-                .flat_map(|row| levels[row].iter().map(|&v| f32::from(v)))
-                .collect(),
+    /// Levels of a window inside the image; `out` has its size.
+    pub(crate) fn read(&self, lines: Range<usize>, pixels: Range<usize>, out: &mut [f32]) {
+        for (line, out) in lines.zip(out.chunks_exact_mut(pixels.len())) {
+            let row = line * self.pixels + pixels.start..line * self.pixels + pixels.end;
+            match &self.levels {
+                Levels::U8(levels) => copy(&levels[row], out),
+                Levels::U16(levels) => copy(&levels[row], out),
+            }
         }
+    }
+}
+
+fn copy<T: Copy + Into<f32>>(levels: &[T], out: &mut [f32]) {
+    for (level, out) in levels.iter().zip(out) {
+        *out = (*level).into();
     }
 }

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::error::{Error, Result, check_range, quoted};
 use crate::geodesic::track;
@@ -82,7 +83,7 @@ impl Product {
             }
             b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+" => {
                 let name = quoted(&path.to_string_lossy());
-                Kind::GeoTiff(Box::new(GeoTiff::from_reader(&name, Box::new(file))?))
+                Kind::GeoTiff(Box::new(GeoTiff::from_source(&name, Arc::new(file))?))
             }
             b"\x89PNG" | [0xff, 0xd8, 0xff, _] => {
                 let why = "PNG and JPEG files have none".to_owned();
@@ -166,30 +167,41 @@ impl Product {
     /// # Errors
     /// A window that is empty, leaves the image or is above the limit; a product without measurement; damaged pixels.
     pub fn read_window(&self, lines: Range<usize>, pixels: Range<usize>) -> Result<Window> {
+        let mut window = Window::default();
+        self.read_window_into(lines, pixels, &mut window)?;
+        Ok(window)
+    }
+
+    /// As [`Product::read_window`], into a window whose memory is used again; after an error it holds nothing that is
+    /// valid.
+    ///
+    /// # Errors
+    /// As [`Product::read_window`].
+    pub fn read_window_into(
+        &self,
+        lines: Range<usize>,
+        pixels: Range<usize>,
+        window: &mut Window,
+    ) -> Result<()> {
         check_window(&lines, &pixels, self.size())?;
-        let mut window = Window {
-            lines: lines.len(),
-            pixels: pixels.len(),
-            ..Window::default()
-        };
+        window.start(lines.len(), pixels.len());
         match &self.kind {
-            Kind::Sentinel1(product, _) => return product.read_window(lines, pixels),
-            Kind::Picture(picture, _) => window.values = picture.read(lines, pixels),
+            Kind::Sentinel1(product, _) => product.read_window(lines, pixels, window)?,
+            Kind::Picture(picture, _) => picture.read(lines, pixels, &mut window.values),
             Kind::GeoTiff(tiff) => {
-                window.values = vec![0.0; lines.len() * pixels.len()];
                 tiff.read(lines, pixels, &mut window.values)?;
+                let values = &mut window.values;
                 if let Some(missing) = tiff.no_data() {
                     let equal = |value: &&mut f32| value.total_cmp(&missing).is_eq();
-                    window
-                        .values
+                    values
                         .iter_mut()
                         .filter(equal)
                         .for_each(|value| *value = f32::NAN);
                 }
-                window.no_data = window.values.iter().filter(|value| value.is_nan()).count();
+                window.no_data = values.iter().filter(|value| value.is_nan()).count();
             }
         }
-        Ok(window)
+        Ok(())
     }
 
     /// Place of a pixel; of a Sentinel-1 product with height, incidence and slant range time.

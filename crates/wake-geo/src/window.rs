@@ -21,6 +21,13 @@ pub struct Window {
 }
 
 impl Window {
+    /// Makes room for that many lines and pixels.
+    pub(crate) fn start(&mut self, lines: usize, pixels: usize) {
+        (self.lines, self.pixels) = (lines, pixels);
+        (self.no_data, self.below_noise) = (0, 0);
+        self.values.resize(lines * pixels, 0.0);
+    }
+
     /// One line of the window.
     ///
     /// # Panics

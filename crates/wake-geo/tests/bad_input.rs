@@ -80,7 +80,7 @@ fn other_products_are_named() {
         sentence_of(|files| {
             files
                 .iter_mut()
-                .for_each(|file| file.0 = file.0.replace("-grd-", to))
+                .for_each(|file| file.0 = file.0.replace("-grd-", to));
         })
     };
     says(&renamed("-slc-"), &["type SLC", "GRD"]);

@@ -95,7 +95,7 @@ fn what_is_written_is_read_by_windows() {
     );
 }
 
-/// Files of another writer: LZW, deflate and packbits, predictor, BigTIFF.
+/// Files of another writer: LZW, deflate and packbits, predictor, `BigTIFF`.
 #[test]
 fn compressed_files_of_others_are_read() {
     let folder = tempfile::tempdir().expect("a folder");

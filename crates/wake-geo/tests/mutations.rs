@@ -1,6 +1,6 @@
 //! Files changed at random give a value or a sentence: no panic, no hang, no memory beyond the limits.
 //!
-//! `MUTATIONS=100000 cargo test --release -p wake-geo --test mutations` tries more.
+//! `TMPDIR=/dev/shm MUTATIONS=1000000 cargo test --release -p wake-geo --test mutations` tries more.
 
 mod common;
 
@@ -70,7 +70,7 @@ fn mutate(random: &mut Random, bytes: &mut Vec<u8>) {
 
 fn count() -> usize {
     let count = std::env::var("MUTATIONS").ok();
-    count.map_or(3000, |text| text.parse().expect("MUTATIONS is a number"))
+    count.map_or(1000, |text| text.parse().expect("MUTATIONS is a number"))
 }
 
 /// Opens, locates and reads whatever there is.

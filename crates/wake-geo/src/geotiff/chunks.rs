@@ -1,46 +1,45 @@
 //! Strips and tiles of a TIFF file, of which only those under a window are read.
 
-use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use tiff::decoder::{Decoder, Limits};
-use tiff::tags::{
-    ByteOrder, CompressionMethod, PhotometricInterpretation, PlanarConfiguration, SampleFormat, Tag,
-};
+use tiff::tags::{CompressionMethod, Tag};
 use tiff::{TiffError, TiffResult};
 
+use super::directory::{Tags, TiffDecoder, check_size, decoder, failed};
 use super::sample::{Encoding, SampleType};
-use crate::error::{Error, Result, quoted};
-use crate::limits::{CACHE_BYTES, CHUNK_BYTES, IMAGE_PIXELS, IMAGE_SIDE};
-use crate::read_seek::ReadSeek;
-
-/// Command that converts a TIFF file into one that this crate reads.
-const CONVERT: &str =
-    "gdal_translate -ot Float32 -co TILED=YES -co COMPRESS=DEFLATE -co PREDICTOR=1";
+use crate::error::{Error, Result};
+use crate::limits::{CACHE_BYTES, CHUNK_BYTES};
+use crate::read_at::{ReadAt, Reader};
 
 /// The first image of a TIFF file.
 pub(crate) struct Chunks {
     file: String,
-    decoder: Decoder<Box<dyn ReadSeek>>,
+    source: Arc<dyn ReadAt>,
     pub(crate) lines: usize,
     pub(crate) pixels: usize,
-    /// Of the bytes in the file, and of those the decoder gives.
     stored: Encoding,
-    decoded: Encoding,
     compressed: bool,
     chunk_lines: usize,
     chunk_pixels: usize,
     chunks_across: usize,
     offsets: Vec<u64>,
     byte_counts: Vec<u64>,
-    cache: Cache,
+    decoded: Mutex<Decoded>,
 }
 
-/// Decoded chunks, the latest used last.
-#[derive(Default)]
-struct Cache {
-    chunks: Vec<(usize, Vec<u8>)>,
+/// Decoded chunks, the latest used last, and the decoder of others.
+struct Decoded {
+    decoder: TiffDecoder,
+    chunks: Vec<(usize, Chunk)>,
     bytes: usize,
+}
+
+#[derive(Clone)]
+struct Chunk {
+    bytes: Arc<Vec<u8>>,
+    encoding: Encoding,
+    pixels: usize,
 }
 
 impl Chunks {
@@ -48,19 +47,15 @@ impl Chunks {
     ///
     /// # Errors
     /// What is no TIFF file, is truncated, is beyond the limits, or has samples or a compression that are not read.
-    pub(crate) fn open(file: &str, mut reader: Box<dyn ReadSeek>) -> Result<Self> {
-        let io = |e: std::io::Error| Error::damaged(file, format!("it cannot be read ({e})"));
-        let length = reader.seek(SeekFrom::End(0)).map_err(io)?;
-        reader.rewind().map_err(io)?;
-        let mut limits = Limits::default();
-        limits.decoding_buffer_size = CHUNK_BYTES;
-        limits.intermediate_buffer_size = CHUNK_BYTES;
-        let decoder = Decoder::new(reader).map_err(|e| failed(file, &e))?;
-        let mut decoder = decoder.with_limits(limits);
+    pub(crate) fn open(file: &str, source: Arc<dyn ReadAt>) -> Result<Self> {
+        let length = source.size();
+        let length =
+            length.map_err(|e| Error::damaged(file, format!("it cannot be read ({e})")))?;
+        let mut decoder = decoder(file, Reader::new(source.clone()))?;
         let tags = Tags::read(&mut decoder).map_err(|e| failed(file, &e))?;
         let (lines, pixels) = (tags.lines as usize, tags.pixels as usize);
         check_size(file, lines, pixels)?;
-        let encoding = tags.encoding(file)?;
+        let stored = tags.encoding(file)?;
         let (chunk_pixels, chunk_lines) = decoder.chunk_dimensions();
         let (chunk_pixels, chunk_lines) =
             (chunk_pixels as usize, (chunk_lines as usize).min(lines));
@@ -69,21 +64,21 @@ impl Chunks {
         }
         let chunks = Self {
             file: file.to_owned(),
+            source,
             lines,
             pixels,
-            stored: encoding,
-            decoded: Encoding {
-                big_endian: cfg!(target_endian = "big"),
-                ..encoding
-            },
+            stored,
             compressed: tags.compression != CompressionMethod::None,
             chunk_lines,
             chunk_pixels,
             chunks_across: pixels.div_ceil(chunk_pixels),
             offsets: tags.offsets,
             byte_counts: tags.byte_counts,
-            cache: Cache::default(),
-            decoder,
+            decoded: Mutex::new(Decoded {
+                decoder,
+                chunks: Vec::new(),
+                bytes: 0,
+            }),
         };
         chunks.check_places(length)?;
         Ok(chunks)
@@ -95,9 +90,10 @@ impl Chunks {
     }
 
     /// Value of a tag, if the file has it and it can be read.
-    pub(crate) fn tag(&mut self, tag: u16) -> Option<tiff::decoder::ifd::Value> {
+    pub(crate) fn tag(&self, tag: u16) -> Option<tiff::decoder::ifd::Value> {
+        let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
         let tag = Tag::from_u16_exhaustive(tag);
-        self.decoder.find_tag(tag).ok().flatten()
+        decoded.decoder.find_tag(tag).ok().flatten()
     }
 
     /// Checks that all chunks are there and end before the end of the file.
@@ -112,8 +108,7 @@ impl Chunks {
                 ),
             ));
         }
-        let chunk =
-            self.chunk_lines as u64 * self.chunk_pixels as u64 * self.stored.pixel_bytes() as u64;
+        let chunk = self.bytes_of(self.chunk_lines);
         if self.compressed && chunk > CHUNK_BYTES as u64 {
             return Err(Error::TooLarge {
                 file: self.file.clone(),
@@ -148,12 +143,18 @@ impl Chunks {
             true => self.chunk_lines.min(self.lines - first),
             false => self.chunk_lines,
         };
-        lines as u64 * self.chunk_pixels as u64 * self.stored.pixel_bytes() as u64
+        self.bytes_of(lines)
+    }
+
+    /// Bytes of lines of a chunk, without compression.
+    fn bytes_of(&self, lines: usize) -> u64 {
+        let line = (self.chunk_pixels as u64).saturating_mul(self.stored.pixel_bytes() as u64);
+        line.saturating_mul(lines as u64)
     }
 
     /// Reads a window, line by line, into `out`. The window must lie inside the image.
     pub(crate) fn read(
-        &mut self,
+        &self,
         lines: Range<usize>,
         pixels: Range<usize>,
         out: &mut [f32],
@@ -186,7 +187,7 @@ impl Chunks {
 
     /// Reads only the bytes of the window; lines as wide as the chunk in one piece.
     fn read_stored(
-        &mut self,
+        &self,
         part: &Part,
         out: &mut [f32],
         width: usize,
@@ -204,10 +205,7 @@ impl Chunks {
             let count = together.min(part.lines.end - first);
             let at = start + ((first * self.chunk_pixels + part.pixels.start) * bytes) as u64;
             scratch.resize(count * line_bytes, 0);
-            let reader = self.decoder.inner();
-            let read = reader
-                .seek(SeekFrom::Start(at))
-                .and_then(|_| reader.read_exact(scratch));
+            let read = self.source.read_exact_at(at, scratch);
             read.map_err(|e| {
                 Error::damaged(&self.file, format!("byte {at} cannot be read ({e})"))
             })?;
@@ -220,54 +218,67 @@ impl Chunks {
         Ok(())
     }
 
-    fn read_compressed(&mut self, part: &Part, out: &mut [f32], width: usize) -> Result<()> {
-        let at = self
-            .cache
-            .chunks
-            .iter()
-            .position(|(index, _)| *index == part.index);
-        let chunk = match at {
-            Some(at) => self.cache.chunks.remove(at),
-            None => {
-                let bytes = self
-                    .decode(part.index)
-                    .map_err(|e| failed(&self.file, &e))?;
-                self.cache.bytes += bytes.len();
-                (part.index, bytes)
-            }
+    fn read_compressed(&self, part: &Part, out: &mut [f32], width: usize) -> Result<()> {
+        let chunk = {
+            let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
+            let chunk = decoded.chunk(part.index, self.stored);
+            chunk.map_err(|e| failed(&self.file, &e))?
         };
-        let (chunk_pixels, _) = self.decoder.chunk_data_dimensions(part.index as u32);
-        let line_bytes = chunk_pixels as usize * self.decoded.pixel_bytes();
+        let pixel_bytes = chunk.encoding.pixel_bytes();
+        let length = part.pixels.len() * pixel_bytes;
         for (i, line) in part.lines.clone().enumerate() {
-            let from = line * line_bytes + part.pixels.start * self.decoded.pixel_bytes();
-            let Some(bytes) = chunk
-                .1
-                .get(from..from + part.pixels.len() * self.decoded.pixel_bytes())
-            else {
+            let from = (line * chunk.pixels + part.pixels.start) * pixel_bytes;
+            let Some(bytes) = chunk.bytes.get(from..from + length) else {
                 return Err(Error::damaged(
                     &self.file,
                     format!("strip or tile {} is too short", part.index),
                 ));
             };
-            self.decoded
-                .decode(bytes, &mut out[i * width..i * width + part.pixels.len()]);
-        }
-        self.cache.chunks.push(chunk);
-        while self.cache.bytes > CACHE_BYTES && self.cache.chunks.len() > 1 {
-            self.cache.bytes -= self.cache.chunks.remove(0).1.len();
+            let row = &mut out[i * width..i * width + part.pixels.len()];
+            chunk.encoding.decode(bytes, row);
         }
         Ok(())
     }
+}
 
-    fn decode(&mut self, index: usize) -> TiffResult<Vec<u8>> {
-        let index = u32::try_from(index)?;
+impl Decoded {
+    /// A chunk, decoded now or before.
+    fn chunk(&mut self, index: usize, stored: Encoding) -> TiffResult<Chunk> {
+        let at = self.chunks.iter().position(|(known, _)| *known == index);
+        let chunk = match at {
+            Some(at) => self.chunks.remove(at).1,
+            None => {
+                let chunk = self.decode(u32::try_from(index)?, stored)?;
+                self.bytes += chunk.bytes.len();
+                chunk
+            }
+        };
+        self.chunks.push((index, chunk.clone()));
+        while self.bytes > CACHE_BYTES && self.chunks.len() > 1 {
+            self.bytes -= self.chunks.remove(0).1.bytes.len();
+        }
+        Ok(chunk)
+    }
+
+    fn decode(&mut self, index: u32, stored: Encoding) -> TiffResult<Chunk> {
         let layout = self.decoder.image_chunk_buffer_layout(index)?;
         if layout.len > CHUNK_BYTES {
             return Err(TiffError::LimitsExceeded);
         }
         let mut bytes = vec![0; layout.len];
         self.decoder.read_chunk_bytes(index, &mut bytes)?;
-        Ok(bytes)
+        let (pixels, lines) = self.decoder.chunk_data_dimensions(index);
+        let samples = (pixels as usize * lines as usize * stored.sample.bytes()).max(1);
+        Ok(Chunk {
+            // The decoder leaves out bands that are no colour.
+            encoding: Encoding {
+                bands: (layout.len / samples).max(1),
+                big_endian: cfg!(target_endian = "big"),
+                ..stored
+            },
+            bytes: Arc::new(bytes),
+            pixels: pixels as usize,
+        })
     }
 }
 
@@ -284,162 +295,5 @@ impl Part {
         for line in 0..self.lines.len() {
             out[line * width..line * width + self.pixels.len()].fill(0.0);
         }
-    }
-}
-
-/// What the directory of the first image says.
-struct Tags {
-    lines: u32,
-    pixels: u32,
-    compression: CompressionMethod,
-    predictor: u16,
-    bands: u16,
-    planar: PlanarConfiguration,
-    photometric: PhotometricInterpretation,
-    bits: Vec<u16>,
-    format: Vec<u16>,
-    big_endian: bool,
-    offsets: Vec<u64>,
-    byte_counts: Vec<u64>,
-}
-
-impl Tags {
-    fn read(decoder: &mut Decoder<Box<dyn ReadSeek>>) -> TiffResult<Self> {
-        let (pixels, lines) = decoder.dimensions()?;
-        let number = |decoder: &mut Decoder<Box<dyn ReadSeek>>, tag, default: u16| {
-            decoder
-                .find_tag_unsigned(tag)
-                .map(|v: Option<u16>| v.unwrap_or(default))
-        };
-        let tiled = decoder.find_tag(Tag::TileOffsets)?.is_some();
-        let (places, counts) = match tiled {
-            true => (Tag::TileOffsets, Tag::TileByteCounts),
-            false => (Tag::StripOffsets, Tag::StripByteCounts),
-        };
-        let compression = number(decoder, Tag::Compression, 1)?;
-        let planar = number(decoder, Tag::PlanarConfiguration, 1)?;
-        let photometric = number(decoder, Tag::PhotometricInterpretation, 1)?;
-        Ok(Self {
-            lines,
-            pixels,
-            compression: CompressionMethod::from_u16_exhaustive(compression),
-            predictor: number(decoder, Tag::Predictor, 1)?,
-            bands: number(decoder, Tag::SamplesPerPixel, 1)?,
-            planar: PlanarConfiguration::from_u16(planar).unwrap_or(PlanarConfiguration::Chunky),
-            photometric: PhotometricInterpretation::from_u16(photometric)
-                .unwrap_or(PhotometricInterpretation::BlackIsZero),
-            bits: decoder
-                .find_tag_unsigned_vec(Tag::BitsPerSample)?
-                .unwrap_or_default(),
-            format: decoder
-                .find_tag_unsigned_vec(Tag::SampleFormat)?
-                .unwrap_or_default(),
-            big_endian: decoder.byte_order() == ByteOrder::BigEndian,
-            offsets: decoder.find_tag_unsigned_vec(places)?.unwrap_or_default(),
-            byte_counts: decoder.find_tag_unsigned_vec(counts)?.unwrap_or_default(),
-        })
-    }
-
-    fn encoding(&self, file: &str) -> Result<Encoding> {
-        let unsupported = |what: String| Error::Unsupported {
-            file: file.to_owned(),
-            what: quoted(&what),
-            remedy: CONVERT,
-        };
-        let known = matches!(
-            self.compression,
-            CompressionMethod::None
-                | CompressionMethod::LZW
-                | CompressionMethod::Deflate
-                | CompressionMethod::OldDeflate
-                | CompressionMethod::PackBits
-        );
-        if !known {
-            return Err(unsupported(format!(
-                "TIFF compression {:?}",
-                self.compression
-            )));
-        }
-        // Readers disagree whether these have a predictor.
-        let plain = matches!(
-            self.compression,
-            CompressionMethod::None | CompressionMethod::PackBits
-        );
-        if plain && self.predictor != 1 {
-            return Err(unsupported(format!(
-                "a predictor with TIFF compression {:?}",
-                self.compression
-            )));
-        }
-        let shown = matches!(
-            self.photometric,
-            PhotometricInterpretation::BlackIsZero | PhotometricInterpretation::RGB
-        );
-        if !shown {
-            return Err(unsupported(format!("TIFF color {:?}", self.photometric)));
-        }
-        let format = self.format.first().map_or(SampleFormat::Uint, |f| {
-            SampleFormat::from_u16_exhaustive(*f)
-        });
-        let bits = self.bits.first().copied().unwrap_or(1);
-        let sample = match (format, bits) {
-            (SampleFormat::Uint, 8) => SampleType::U8,
-            (SampleFormat::Uint, 16) => SampleType::U16,
-            (SampleFormat::Int, 16) => SampleType::I16,
-            (SampleFormat::IEEEFP, 32) => SampleType::F32,
-            _ => {
-                return Err(unsupported(format!(
-                    "a TIFF sample of {bits} bits, {format:?}"
-                )));
-            }
-        };
-        let bands = match self.planar {
-            PlanarConfiguration::Planar => 1,
-            _ => usize::from(self.bands.max(1)),
-        };
-        Ok(Encoding {
-            sample,
-            bands,
-            big_endian: self.big_endian,
-        })
-    }
-}
-
-fn check_size(file: &str, lines: usize, pixels: usize) -> Result<()> {
-    let limits = [
-        ("the number of lines", lines as u64, IMAGE_SIDE as u64),
-        (
-            "the number of pixels of a line",
-            pixels as u64,
-            IMAGE_SIDE as u64,
-        ),
-        (
-            "the number of pixels",
-            lines as u64 * pixels as u64,
-            IMAGE_PIXELS,
-        ),
-    ];
-    for (what, value, limit) in limits {
-        if value > limit {
-            return Err(Error::TooLarge {
-                file: file.to_owned(),
-                what,
-                value,
-                limit,
-                remedy: "cut it into pieces",
-            });
-        }
-    }
-    Ok(())
-}
-
-fn failed(file: &str, error: &TiffError) -> Error {
-    match error {
-        TiffError::UnsupportedError(what) => Error::Unsupported {
-            file: file.to_owned(),
-            what: quoted(&format!("a feature of this TIFF ({what})")),
-            remedy: CONVERT,
-        },
-        other => Error::damaged(file, quoted(&format!("no readable TIFF ({other})"))),
     }
 }

@@ -24,14 +24,14 @@ pub(crate) const PIXEL_IS_AREA: u16 = 1;
 pub(crate) const PIXEL_IS_POINT: u16 = 2;
 
 /// The places of an image; unknown, with the reason, where the file has none that are understood.
-pub(crate) fn geolocation(file: &str, chunks: &mut Chunks) -> Geolocation {
+pub(crate) fn geolocation(file: &str, chunks: &Chunks) -> Geolocation {
     match read(file, chunks) {
         Ok(geolocation) => geolocation,
         Err(why) => Geolocation::Unknown(quoted(&why)),
     }
 }
 
-fn read(file: &str, chunks: &mut Chunks) -> Result<Geolocation, String> {
+fn read(file: &str, chunks: &Chunks) -> Result<Geolocation, String> {
     let Some(keys) = chunks.tag(KEY_DIRECTORY) else {
         return Err("it has no GeoTIFF keys".to_owned());
     };
@@ -81,7 +81,7 @@ fn read(file: &str, chunks: &mut Chunks) -> Result<Geolocation, String> {
 }
 
 /// The affine map from raster coordinates, which count from 0.
-fn affine(chunks: &mut Chunks) -> Result<Option<Affine>, String> {
+fn affine(chunks: &Chunks) -> Result<Option<Affine>, String> {
     if let Some(m) = doubles(chunks, TRANSFORMATION)? {
         let &[a, b, _, d, e, f, _, h, ..] = m.as_slice() else {
             return Err(format!(
@@ -107,7 +107,7 @@ fn affine(chunks: &mut Chunks) -> Result<Option<Affine>, String> {
     }))
 }
 
-fn doubles(chunks: &mut Chunks, tag: u16) -> Result<Option<Vec<f64>>, String> {
+fn doubles(chunks: &Chunks, tag: u16) -> Result<Option<Vec<f64>>, String> {
     let Some(value) = chunks.tag(tag) else {
         return Ok(None);
     };
@@ -119,7 +119,7 @@ fn doubles(chunks: &mut Chunks, tag: u16) -> Result<Option<Vec<f64>>, String> {
 }
 
 /// Value that stands for missing pixels, as GDAL writes it.
-pub(crate) fn no_data(chunks: &mut Chunks) -> Option<f32> {
+pub(crate) fn no_data(chunks: &Chunks) -> Option<f32> {
     match chunks.tag(NO_DATA)? {
         Value::Ascii(text) => text
             .trim_matches(|c: char| c.is_whitespace() || c == '\0')

@@ -1,6 +1,7 @@
 //! TIFF files, with or without places, read by windows and written in strips.
 
 mod chunks;
+mod directory;
 mod keys;
 mod sample;
 mod writer;
@@ -8,7 +9,7 @@ mod writer;
 use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Arc;
 
 pub use sample::SampleType;
 pub use writer::{Compression, GeoTiffLayout, Placement, TiffSample, write_geotiff};
@@ -17,12 +18,12 @@ use chunks::Chunks;
 
 use crate::error::{Error, Result, quoted};
 use crate::geolocation::Geolocation;
-use crate::read_seek::ReadSeek;
+use crate::read_at::ReadAt;
 
 /// First image of a TIFF file, of which windows are read. Of several bands the first is read.
 ///
 /// Samples are u8, u16, i16 or f32 in strips or tiles, without compression or with deflate, LZW or `PackBits`, with or
-/// without a predictor, in TIFF or BigTIFF of either byte order. Places come from an affine map or from control points
+/// without a predictor, in TIFF or `BigTIFF` of either byte order. Places come from an affine map or from control points
 /// on a rectangular grid, with an EPSG code of [`Projection`](crate::Projection).
 pub struct GeoTiff {
     lines: usize,
@@ -30,7 +31,7 @@ pub struct GeoTiff {
     sample: SampleType,
     no_data: Option<f32>,
     geolocation: Geolocation,
-    chunks: Mutex<Chunks>,
+    chunks: Chunks,
 }
 
 impl std::fmt::Debug for GeoTiff {
@@ -50,18 +51,18 @@ impl GeoTiff {
     /// A file that cannot be read, is no TIFF, is truncated, is beyond the limits, or uses what is not supported.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
-        Self::from_reader(&quoted(&path.to_string_lossy()), Box::new(file))
+        Self::from_source(&quoted(&path.to_string_lossy()), Arc::new(file))
     }
 
-    pub(crate) fn from_reader(name: &str, reader: Box<dyn ReadSeek>) -> Result<Self> {
-        let mut chunks = Chunks::open(name, reader)?;
+    pub(crate) fn from_source(name: &str, source: Arc<dyn ReadAt>) -> Result<Self> {
+        let chunks = Chunks::open(name, source)?;
         Ok(Self {
             lines: chunks.lines,
             pixels: chunks.pixels,
             sample: chunks.sample(),
-            no_data: keys::no_data(&mut chunks),
-            geolocation: keys::geolocation(name, &mut chunks),
-            chunks: Mutex::new(chunks),
+            no_data: keys::no_data(&chunks),
+            geolocation: keys::geolocation(name, &chunks),
+            chunks,
         })
     }
 
@@ -96,7 +97,6 @@ impl GeoTiff {
         pixels: Range<usize>,
         out: &mut [f32],
     ) -> Result<()> {
-        let mut chunks = self.chunks.lock().unwrap_or_else(PoisonError::into_inner);
-        chunks.read(lines, pixels, out)
+        self.chunks.read(lines, pixels, out)
     }
 }

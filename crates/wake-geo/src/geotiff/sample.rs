@@ -92,7 +92,7 @@ mod tests {
             assert!(
                 a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9),
                 "{a:?} {b:?}"
-            )
+            );
         };
         same(read(SampleType::U8, 1, false, &[7, 255]), [7.0, 255.0]);
         same(

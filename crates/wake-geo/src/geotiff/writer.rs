@@ -85,12 +85,12 @@ pub struct GeoTiffLayout {
 
 /// Size of a strip \[bytes\], rounded to whole lines.
 const STRIP_BYTES: usize = 1 << 18;
-/// From this many bytes of pixels a file is a BigTIFF: offsets of TIFF have 32 bits, and directories need some.
+/// From this many bytes of pixels a file is a `BigTIFF`: offsets of TIFF have 32 bits, and directories need some.
 const BIG_TIFF: u64 = (1 << 32) - (1 << 27);
 
 /// Writes a GeoTIFF in strips. `fill` gives the samples of the lines it is asked for, in order; its buffer holds zeros.
 ///
-/// The file appears under its name when it is complete. Files above 4 GB become BigTIFF.
+/// The file appears under its name when it is complete. Files above 4 GB become `BigTIFF`.
 ///
 /// # Errors
 /// A size of 0 or beyond the limits, more than 65,535 control points, a file that cannot be written, or what `fill`
@@ -108,9 +108,11 @@ pub fn write_geotiff<T: TiffSample>(
     let bytes = layout.lines as u64 * layout.pixels as u64 * T::TYPE.bytes() as u64;
     let writer = BufWriter::with_capacity(1 << 20, file.as_file_mut());
     match bytes > BIG_TIFF {
-        true => write::<T, TiffKindBig, _>(path, TiffEncoder::new_big(writer), layout, &mut fill)?,
+        true => {
+            write::<T, TiffKindBig, _>(path, TiffEncoder::new_big(writer), layout, &mut fill)?;
+        }
         false => {
-            write::<T, TiffKindStandard, _>(path, TiffEncoder::new(writer), layout, &mut fill)?
+            write::<T, TiffKindStandard, _>(path, TiffEncoder::new(writer), layout, &mut fill)?;
         }
     }
     set_permissions(&file).map_err(io)?;

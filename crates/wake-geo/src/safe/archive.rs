@@ -1,14 +1,15 @@
 //! Files of a product: a `.SAFE` folder, or a `.zip` of one.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use zip::{CompressionMethod, ZipArchive};
 
 use crate::error::{Error, Result};
 use crate::limits::{ARCHIVE_FILES, XML_BYTES};
-use crate::read_seek::ReadSeek;
+use crate::read_at::{ReadAt, Section};
 
 /// Files of a product, by their paths below the `.SAFE` folder, with `/` between folders.
 #[derive(Debug)]
@@ -151,11 +152,11 @@ impl Archive {
 
     /// Opens a file of pixels of at most `most` bytes. A compressed file of a `.zip` is unpacked into a temporary
     /// file, which the system removes once it is closed.
-    pub(crate) fn pixels(&self, name: &str, most: u64) -> Result<Box<dyn ReadSeek>> {
+    pub(crate) fn pixels(&self, name: &str, most: u64) -> Result<Arc<dyn ReadAt>> {
         let Kind::Zip { prefix } = &self.kind else {
             let path = self.path.join(name);
             let file = File::open(&path).map_err(|e| Error::io(&path, e))?;
-            return Ok(Box::new(file));
+            return Ok(Arc::new(file));
         };
         let mut archive = zip_at(&self.path)?;
         let entry = archive.by_name(&format!("{prefix}{name}"));
@@ -168,12 +169,7 @@ impl Archive {
         {
             drop(entry);
             let file = File::open(&self.path).map_err(|e| Error::io(&self.path, e))?;
-            return Ok(Box::new(Section {
-                file,
-                start,
-                size,
-                at: 0,
-            }));
+            return Ok(Arc::new(Section { file, start, size }));
         }
         let folder = std::env::temp_dir();
         let mut file = tempfile::tempfile().map_err(|e| Error::io(&folder, e))?;
@@ -185,8 +181,7 @@ impl Archive {
                 format!("it unpacks to other than its declared {size} bytes"),
             ));
         }
-        file.rewind().map_err(|e| Error::io(&folder, e))?;
-        Ok(Box::new(file))
+        Ok(Arc::new(file))
     }
 }
 
@@ -227,39 +222,4 @@ fn damaged_entry(name: &str, error: &dyn std::fmt::Display) -> Error {
         name,
         crate::error::quoted(&format!("it cannot be unpacked ({error})")),
     )
-}
-
-/// Part of a file, read as if it were one.
-struct Section {
-    file: File,
-    start: u64,
-    size: u64,
-    at: u64,
-}
-
-impl Read for Section {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let left = self.size.saturating_sub(self.at);
-        let length = (buffer.len() as u64).min(left) as usize;
-        let from = self
-            .start
-            .checked_add(self.at)
-            .ok_or(io::ErrorKind::UnexpectedEof)?;
-        self.file.seek(SeekFrom::Start(from))?;
-        let read = self.file.read(&mut buffer[..length])?;
-        self.at += read as u64;
-        Ok(read)
-    }
-}
-
-impl Seek for Section {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let at = match to {
-            SeekFrom::Start(at) => Some(at),
-            SeekFrom::Current(by) => self.at.checked_add_signed(by),
-            SeekFrom::End(by) => self.size.checked_add_signed(by),
-        };
-        self.at = at.ok_or(io::ErrorKind::InvalidInput)?;
-        Ok(self.at)
-    }
 }

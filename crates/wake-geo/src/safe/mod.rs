@@ -10,7 +10,7 @@ mod sigma;
 
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 pub use annotation::{Annotation, Pass, Polarization, SwathLooks};
 
@@ -40,7 +40,7 @@ pub struct Sentinel1 {
     annotation: Annotation,
     calibration: Calibration,
     noise: Option<Noise>,
-    measurement: Mutex<Option<GeoTiff>>,
+    measurement: Mutex<Option<Arc<GeoTiff>>>,
 }
 
 /// Calibration of one pixel.
@@ -140,35 +140,36 @@ impl Sentinel1 {
         pixels: Range<usize>,
         out: &mut [f32],
     ) -> Result<()> {
-        let mut measurement = self
-            .measurement
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let open = match measurement.take() {
-            Some(open) => open,
-            None => self.open_measurement()?,
+        let measurement = {
+            let mut known = self
+                .measurement
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            let opened = match known.take() {
+                Some(opened) => opened,
+                None => Arc::new(self.open_measurement()?),
+            };
+            known.insert(opened).clone()
         };
-        measurement.insert(open).read(lines, pixels, out)
+        measurement.read(lines, pixels, out)
     }
 
-    /// σ⁰ of a window inside the image.
-    pub(crate) fn read_window(&self, lines: Range<usize>, pixels: Range<usize>) -> Result<Window> {
-        let width = pixels.len();
-        let mut values = vec![0.0; lines.len() * width];
-        self.digital_numbers(lines.clone(), pixels.clone(), &mut values)?;
-        let mut window = Window {
-            lines: lines.len(),
-            pixels: width,
-            ..Window::default()
-        };
+    /// σ⁰ of a window inside the image; `window` has its size.
+    pub(crate) fn read_window(
+        &self,
+        lines: Range<usize>,
+        pixels: Range<usize>,
+        window: &mut Window,
+    ) -> Result<()> {
+        self.digital_numbers(lines.clone(), pixels.clone(), &mut window.values)?;
+        let rows = window.values.chunks_exact_mut(pixels.len());
         let mut calibrator = Calibrator::new(&self.calibration, self.noise.as_ref(), pixels);
-        for (line, row) in lines.zip(values.chunks_exact_mut(width)) {
+        for (line, row) in lines.zip(rows) {
             let counts = calibrator.apply(line, row);
             window.no_data += counts.no_data;
             window.below_noise += counts.below_noise;
         }
-        window.values = values;
-        Ok(window)
+        Ok(())
     }
 
     fn measurement_name(&self) -> String {
@@ -184,7 +185,7 @@ impl Sentinel1 {
         }
         let (lines, pixels) = (self.annotation.lines, self.annotation.pixels);
         let most = 2 * lines as u64 * pixels as u64 + MEASUREMENT_EXTRA_BYTES;
-        let tiff = GeoTiff::from_reader(&name, self.archive.pixels(&name, most)?)?;
+        let tiff = GeoTiff::from_source(&name, self.archive.pixels(&name, most)?)?;
         if (tiff.lines(), tiff.pixels()) != (lines, pixels) || tiff.sample_type() != SampleType::U16
         {
             return Err(Error::damaged(
@@ -229,7 +230,7 @@ fn stems(archive: &Archive) -> Result<Vec<(Polarization, String)>> {
         .filter(|kind| kind.len() >= 3);
     let by_name = from_name
         .filter(|_| archive.folder_name().starts_with("S1"))
-        .map(|kind| quoted(kind));
+        .map(quoted);
     let no_xml = archive
         .names_in("measurement")
         .any(|name| name.ends_with(".nc"));
