@@ -139,6 +139,45 @@ fn compressed_files_of_others_are_read() {
     }
 }
 
+/// Files of GDAL: tiles and strips, both byte orders, predictors, bands, control points.
+#[test]
+fn files_of_gdal_are_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/gdal");
+    type Value = fn(u16) -> f32;
+    let files: [(&str, Value); 9] = [
+        ("tiles_lzw_float", |v| f32::from(v) / 4.0),
+        ("strips_lzw_bands", |v| v.into()),
+        ("tiles_deflate_float", |v| f32::from(v) / 4.0),
+        ("tiles_lzw_big_endian", |v| v.into()),
+        ("strips_packbits", |v| (v % 251).into()),
+        ("strips_signed_big", |v| f32::from(v) - 3000.0),
+        ("bands_pixel", |v| v.into()),
+        ("bands_line", |v| v.into()),
+        ("points", |v| v.into()),
+    ];
+    for (name, value) in files {
+        let path = folder.join(name).with_extension("tif");
+        check_windows(&path, |l, p| value(level(l, p)));
+        let place = Product::open(&path)
+            .expect("an image")
+            .place(0.0, 0.0)
+            .expect("a place");
+        // pyproj 3.7: 500005, 5999995 of EPSG:32632.
+        let (latitude, longitude) = match name {
+            "points" => (50.0, 7.0),
+            _ => (54.14805916537192, 9.000076550075905),
+        };
+        assert!(
+            (place.latitude - latitude).abs() < 1e-9,
+            "{name}: {place:?}"
+        );
+        assert!(
+            (place.longitude - longitude).abs() < 1e-9,
+            "{name}: {place:?}"
+        );
+    }
+}
+
 fn affine(x: [f64; 3], y: [f64; 3], epsg: u16) -> Placement {
     Placement::Affine {
         affine: Affine { x, y },
@@ -417,4 +456,58 @@ fn files_appear_whole_or_not_at_all() {
     );
     let empty = GeoTiffLayout { lines: 0, ..layout };
     assert!(write_geotiff(&path, &empty, |_, _: &mut [u16]| Ok(())).is_err());
+}
+
+/// Files for `tests/foreign/read_geotiff.py`: u16 and f32, plain and deflated, with a map and with control points.
+#[test]
+#[ignore = "writes files for another program into the folder WAKE_GEO_OUT"]
+fn files_for_others() {
+    let folder = std::env::var_os("WAKE_GEO_OUT").expect("WAKE_GEO_OUT is a folder");
+    let folder = Path::new(&folder);
+    let upright = affine([500_000.0, 10.0, 0.0], [6_000_000.0, 0.0, -10.0], 32632);
+    let turned = affine([500_000.0, 9.0, 1.0], [6_000_000.0, 1.0, -9.0], 32632);
+    let points = [(0.0, 0.0), (0.0, 52.0), (69.0, 0.0), (69.0, 52.0)];
+    let points = points.map(|(line, pixel)| GridPoint {
+        line,
+        pixel,
+        place: Place {
+            latitude: 50.0 - 1e-4 * line,
+            longitude: 7.0 + 1e-4 * pixel,
+            height: Some(12.5),
+            incidence: None,
+            slant_range_time: None,
+        },
+    });
+    let points = Placement::ControlPoints(points.to_vec());
+    for (name, placement) in [("upright", upright), ("turned", turned), ("points", points)] {
+        for (kind, compression) in [
+            ("plain", Compression::None),
+            ("deflate", Compression::Deflate),
+        ] {
+            let layout = GeoTiffLayout {
+                no_data: Some(0.0),
+                ..layout(compression, placement.clone())
+            };
+            write::<u16>(
+                &folder.join(format!("{name}_{kind}_u16.tif")),
+                &layout,
+                level,
+            );
+            write::<f32>(
+                &folder.join(format!("{name}_{kind}_f32.tif")),
+                &layout,
+                |l, p| f32::from(level(l, p)) / 4.0,
+            );
+        }
+    }
+    let big = GeoTiffLayout {
+        lines: 45_000,
+        pixels: 25_000,
+        compression: Compression::None,
+        placement: Placement::None,
+        no_data: None,
+    };
+    write::<f32>(&folder.join("big.tif"), &big, |l, p| {
+        l as f32 + p as f32 / 32_768.0
+    });
 }

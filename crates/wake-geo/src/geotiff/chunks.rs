@@ -7,6 +7,7 @@ use tiff::tags::{CompressionMethod, Tag};
 use tiff::{TiffError, TiffResult};
 
 use super::directory::{Tags, TiffDecoder, check_size, decoder, failed};
+use super::lzw;
 use super::sample::{Encoding, SampleType};
 use crate::error::{Error, Result};
 use crate::limits::{CACHE_BYTES, CHUNK_BYTES};
@@ -20,6 +21,8 @@ pub(crate) struct Chunks {
     pub(crate) pixels: usize,
     stored: Encoding,
     compressed: bool,
+    /// Predictor of chunks with LZW, which this crate decodes itself.
+    lzw: Option<u16>,
     chunk_lines: usize,
     chunk_pixels: usize,
     chunks_across: usize,
@@ -69,6 +72,7 @@ impl Chunks {
             pixels,
             stored,
             compressed: tags.compression != CompressionMethod::None,
+            lzw: (tags.compression == CompressionMethod::LZW).then_some(tags.predictor),
             chunk_lines,
             chunk_pixels,
             chunks_across: pixels.div_ceil(chunk_pixels),
@@ -219,11 +223,7 @@ impl Chunks {
     }
 
     fn read_compressed(&self, part: &Part, out: &mut [f32], width: usize) -> Result<()> {
-        let chunk = {
-            let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
-            let chunk = decoded.chunk(part.index, self.stored);
-            chunk.map_err(|e| failed(&self.file, &e))?
-        };
+        let chunk = self.chunk(part.index)?;
         let pixel_bytes = chunk.encoding.pixel_bytes();
         let length = part.pixels.len() * pixel_bytes;
         for (i, line) in part.lines.clone().enumerate() {
@@ -239,27 +239,61 @@ impl Chunks {
         }
         Ok(())
     }
-}
 
-impl Decoded {
     /// A chunk, decoded now or before.
-    fn chunk(&mut self, index: usize, stored: Encoding) -> TiffResult<Chunk> {
-        let at = self.chunks.iter().position(|(known, _)| *known == index);
-        let chunk = match at {
-            Some(at) => self.chunks.remove(at).1,
-            None => {
-                let chunk = self.decode(u32::try_from(index)?, stored)?;
-                self.bytes += chunk.bytes.len();
+    fn chunk(&self, index: usize) -> Result<Chunk> {
+        let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = decoded.chunks.iter().position(|(known, _)| *known == index);
+        let chunk = match (at, self.lzw) {
+            (Some(at), _) => decoded.chunks.remove(at).1,
+            (None, Some(predictor)) => {
+                let chunk = self.decode_lzw(index, predictor)?;
+                decoded.bytes += chunk.bytes.len();
+                chunk
+            }
+            (None, None) => {
+                let chunk = decoded.decode(index as u32, self.stored);
+                let chunk = chunk.map_err(|e| failed(&self.file, &e))?;
+                decoded.bytes += chunk.bytes.len();
                 chunk
             }
         };
-        self.chunks.push((index, chunk.clone()));
-        while self.bytes > CACHE_BYTES && self.chunks.len() > 1 {
-            self.bytes -= self.chunks.remove(0).1.bytes.len();
+        decoded.chunks.push((index, chunk.clone()));
+        while decoded.bytes > CACHE_BYTES && decoded.chunks.len() > 1 {
+            decoded.bytes -= decoded.chunks.remove(0).1.bytes.len();
         }
         Ok(chunk)
     }
 
+    fn decode_lzw(&self, index: usize, predictor: u16) -> Result<Chunk> {
+        let damaged = |why: String| {
+            Error::damaged(
+                &self.file,
+                format!("strip or tile {index} is no LZW: {why}"),
+            )
+        };
+        let packed = self.byte_counts[index];
+        if packed > CHUNK_BYTES as u64 {
+            return Err(damaged(format!(
+                "it has {packed} bytes, above {CHUNK_BYTES}"
+            )));
+        }
+        let mut bytes = vec![0; packed as usize];
+        let read = self.source.read_exact_at(self.offsets[index], &mut bytes);
+        read.map_err(|e| damaged(e.to_string()))?;
+        // Within the limit: the opening checks whole chunks.
+        let size = self.stored_bytes(index) as usize;
+        let decoded = lzw::decode(&bytes, size, self.chunk_pixels, self.stored, predictor);
+        let (bytes, encoding) = decoded.map_err(damaged)?;
+        Ok(Chunk {
+            bytes: Arc::new(bytes),
+            encoding,
+            pixels: self.chunk_pixels,
+        })
+    }
+}
+
+impl Decoded {
     fn decode(&mut self, index: u32, stored: Encoding) -> TiffResult<Chunk> {
         let layout = self.decoder.image_chunk_buffer_layout(index)?;
         if layout.len > CHUNK_BYTES {

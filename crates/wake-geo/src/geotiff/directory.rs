@@ -34,7 +34,7 @@ pub(super) struct Tags {
     pub(super) lines: u32,
     pub(super) pixels: u32,
     pub(super) compression: CompressionMethod,
-    predictor: u16,
+    pub(super) predictor: u16,
     bands: u16,
     planar: PlanarConfiguration,
     photometric: PhotometricInterpretation,

@@ -3,6 +3,7 @@
 mod chunks;
 mod directory;
 mod keys;
+mod lzw;
 mod sample;
 mod writer;
 
