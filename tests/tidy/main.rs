@@ -16,7 +16,13 @@ use imports::{Crate, Names};
 use picture::Column;
 
 /// The crates, in the order in which they import each other.
-const CRATES: [&str; 4] = ["wake-physics", "wake-text", "wake-ldm", "wake-detector"];
+const CRATES: [&str; 5] = [
+    "wake-physics",
+    "wake-text",
+    "wake-ldm",
+    "wake-detector",
+    "wake-geo",
+];
 
 /// Longest source file [lines]: tests are not counted.
 const LONGEST_FILE: usize = 450;

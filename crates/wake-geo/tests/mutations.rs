@@ -184,21 +184,35 @@ fn changed_tiffs() {
                 Ok(())
             })
             .expect("a file");
-            let whole = std::fs::read(&path).expect("a file");
-            for _ in 0..count() / 4 {
-                let mut bytes = whole.clone();
-                // The directory is at the end.
-                match random.below(3) {
-                    0 => mutate(&mut random, &mut bytes),
-                    _ => {
-                        let mut end = bytes.split_off(bytes.len().saturating_sub(400));
-                        mutate(&mut random, &mut end);
-                        bytes.extend(end);
-                    }
-                }
-                std::fs::write(&path, bytes).expect("a file");
-                attack(&path);
+            attack_near(&mut random, &path, &std::fs::read(&path).expect("a file"));
+        }
+    }
+    for entry in std::fs::read_dir(common::fixtures().join("gdal")).expect("a folder") {
+        let whole = std::fs::read(entry.expect("an entry").path()).expect("a file");
+        attack_near(&mut random, &path, &whole);
+    }
+}
+
+/// Attacks with files near one, whose directory lies at an end.
+fn attack_near(random: &mut Random, path: &Path, whole: &[u8]) {
+    const DIRECTORY: usize = 400;
+    for _ in 0..count() / 4 {
+        let mut bytes = whole.to_vec();
+        let length = bytes.len();
+        match random.below(4) {
+            0 => mutate(random, &mut bytes),
+            1 => {
+                let mut start = bytes.drain(..DIRECTORY.min(length)).collect();
+                mutate(random, &mut start);
+                bytes.splice(..0, start);
+            }
+            _ => {
+                let mut end = bytes.split_off(length.saturating_sub(DIRECTORY));
+                mutate(random, &mut end);
+                bytes.extend(end);
             }
         }
+        std::fs::write(path, bytes).expect("a file");
+        attack(path);
     }
 }
