@@ -17,7 +17,7 @@ use imports::{Crate, Names};
 use picture::Column;
 
 /// The crates, in the order in which they import each other.
-const CRATES: [&str; 8] = [
+const CRATES: [&str; 9] = [
     "whole-files",
     "wake-physics",
     "wake-text",
@@ -26,6 +26,7 @@ const CRATES: [&str; 8] = [
     "wake-ldm",
     "wake-detector",
     "wake-train",
+    "wake-geo",
 ];
 
 /// Longest source file [lines]: tests are not counted.

@@ -1,0 +1,161 @@
+//! The one error type of this crate.
+
+use std::path::{Path, PathBuf};
+
+/// Result of the fallible functions of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Reason why a product could not be opened, read or written, or a pixel not be placed.
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message names every field")]
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file or folder that cannot be read or written.
+    #[error("cannot access {}: {source}", shown(path))]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+
+    /// A path of unknown format.
+    #[error(
+        "{} is no product that can be read ({why}); give a Sentinel-1 GRD product (.SAFE folder or .zip) or a GeoTIFF, \
+         PNG or JPEG file",
+        shown(path)
+    )]
+    Unreadable { path: PathBuf, why: String },
+
+    /// A Sentinel-1 product of a type other than GRD.
+    #[error(
+        "{} is a Sentinel-1 product of type {found}, but only Level-1 GRD can be read; download the GRD product of the \
+         same scene",
+        shown(path)
+    )]
+    ProductType { path: PathBuf, found: String },
+
+    /// A polarization that the product does not have.
+    #[error("{} has no polarization {wanted}; choose one of {there}", shown(path))]
+    Polarization {
+        path: PathBuf,
+        wanted: &'static str,
+        there: String,
+    },
+
+    /// A file that a product must have.
+    #[error(
+        "{} has no file {name:?}; download the product again and unpack it whole",
+        shown(path)
+    )]
+    Missing { path: PathBuf, name: String },
+
+    /// A product without measurement, whose pixels were asked for.
+    #[error(
+        "{} has annotation but no measurement, so it has places but no pixels; download the product again and unpack it \
+         whole",
+        shown(path)
+    )]
+    NoMeasurement { path: PathBuf },
+
+    /// Content of a file that cannot be right.
+    #[error("{file:?}: {why}; the file is damaged: download the product again")]
+    Damaged { file: String, why: String },
+
+    /// More than a limit of this crate allows.
+    #[error("{file:?}: {what} is {value}, above the limit {limit}; {remedy}")]
+    TooLarge {
+        file: String,
+        what: &'static str,
+        value: u64,
+        limit: u64,
+        remedy: &'static str,
+    },
+
+    /// A TIFF file that uses what this crate does not read.
+    #[error("{file:?}: {what} is not supported; convert the file with `{remedy}`")]
+    Unsupported {
+        file: String,
+        what: String,
+        remedy: &'static str,
+    },
+
+    /// An image without places on Earth.
+    #[error(
+        "{file:?} has no places on Earth ({why}); give a GeoTIFF with EPSG code or control points, or a Sentinel-1 product"
+    )]
+    NoPlaces { file: String, why: String },
+
+    /// A number outside the closed range in which it means something.
+    #[error("{name} is {value}, outside [{min}, {max}]; give a number in this range")]
+    OutOfRange {
+        name: &'static str,
+        value: f64,
+        min: f64,
+        max: f64,
+    },
+
+    /// A window that is empty or not wholly inside the image.
+    #[error(
+        "the window of lines {lines:?} and pixels {pixels:?} is empty or leaves the image of {size_lines} lines and \
+         {size_pixels} pixels; cut it at the borders"
+    )]
+    Window {
+        lines: std::ops::Range<usize>,
+        pixels: std::ops::Range<usize>,
+        size_lines: usize,
+        size_pixels: usize,
+    },
+
+    /// A file that could not be written as asked.
+    #[error("cannot write {}: {why}", shown(path))]
+    Unwritable { path: PathBuf, why: String },
+}
+
+impl Error {
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        Self::Io { path, source }
+    }
+
+    pub(crate) fn unreadable(path: &Path, why: impl std::fmt::Display) -> Self {
+        Self::Unreadable {
+            path: path.to_owned(),
+            why: quoted(&why.to_string()),
+        }
+    }
+
+    pub(crate) fn damaged(file: &str, why: impl Into<String>) -> Self {
+        Self::Damaged {
+            file: file.to_owned(),
+            why: why.into(),
+        }
+    }
+}
+
+/// A path in a sentence, without control characters.
+fn shown(path: &Path) -> String {
+    quoted(&path.to_string_lossy())
+}
+
+/// Foreign text in a sentence: shortened, control characters replaced.
+pub(crate) fn quoted(text: &str) -> String {
+    const LONGEST: usize = 300;
+    let clean = |c: char| if c.is_control() { '?' } else { c };
+    let mut short: String = text.chars().take(LONGEST).map(clean).collect();
+    if text.chars().nth(LONGEST).is_some() {
+        short.push('…');
+    }
+    short
+}
+
+/// Checks a number against a closed range; NaN lies outside.
+pub(crate) fn check_range(name: &'static str, value: f64, min: f64, max: f64) -> Result<()> {
+    match (min..=max).contains(&value) {
+        true => Ok(()),
+        false => Err(Error::OutOfRange {
+            name,
+            value,
+            min,
+            max,
+        }),
+    }
+}

@@ -1,0 +1,103 @@
+//! TIFF files, with or without places, read by windows and written in strips.
+
+mod chunks;
+mod directory;
+mod keys;
+mod lzw;
+mod sample;
+mod writer;
+
+use std::fs::File;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+pub use sample::SampleType;
+pub use writer::{Compression, GeoTiffLayout, Placement, TiffSample, write_geotiff};
+
+use chunks::Chunks;
+
+use crate::error::{Error, Result, quoted};
+use crate::geolocation::Geolocation;
+use crate::read_at::ReadAt;
+
+/// First image of a TIFF file, of which windows are read. Of several bands the first is read.
+///
+/// Samples are u8, u16, i16 or f32 in strips or tiles, without compression or with deflate, LZW or `PackBits`, with or
+/// without a predictor, in TIFF or `BigTIFF` of either byte order. Places come from an affine map or from control points
+/// on a rectangular grid, with an EPSG code of [`Projection`](crate::Projection).
+pub struct GeoTiff {
+    lines: usize,
+    pixels: usize,
+    sample: SampleType,
+    no_data: Option<f32>,
+    geolocation: Geolocation,
+    chunks: Chunks,
+}
+
+impl std::fmt::Debug for GeoTiff {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("GeoTiff")
+            .field("lines", &self.lines)
+            .field("pixels", &self.pixels)
+            .field("sample", &self.sample)
+            .finish_non_exhaustive()
+    }
+}
+
+impl GeoTiff {
+    /// Opens a TIFF file and reads its directory, but no pixels.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is no TIFF, is truncated, is beyond the limits, or uses what is not supported.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|e| Error::io(path, e))?;
+        Self::from_source(&quoted(&path.to_string_lossy()), Arc::new(file))
+    }
+
+    pub(crate) fn from_source(name: &str, source: Arc<dyn ReadAt>) -> Result<Self> {
+        let chunks = Chunks::open(name, source)?;
+        Ok(Self {
+            lines: chunks.lines,
+            pixels: chunks.pixels,
+            sample: chunks.sample(),
+            no_data: keys::no_data(&chunks),
+            geolocation: keys::geolocation(name, &chunks),
+            chunks,
+        })
+    }
+
+    /// Number of lines.
+    pub fn lines(&self) -> usize {
+        self.lines
+    }
+
+    /// Number of pixels of a line.
+    pub fn pixels(&self) -> usize {
+        self.pixels
+    }
+
+    /// Type of the samples.
+    pub fn sample_type(&self) -> SampleType {
+        self.sample
+    }
+
+    /// Value that stands for missing pixels, where the file names one.
+    pub fn no_data(&self) -> Option<f32> {
+        self.no_data
+    }
+
+    pub(crate) fn geolocation(&self) -> &Geolocation {
+        &self.geolocation
+    }
+
+    /// Reads samples of a window that lies inside the image, line by line; `out` has its size.
+    pub(crate) fn read(
+        &self,
+        lines: Range<usize>,
+        pixels: Range<usize>,
+        out: &mut [f32],
+    ) -> Result<()> {
+        self.chunks.read(lines, pixels, out)
+    }
+}

@@ -1,0 +1,30 @@
+//! Radiometric calibration of a product: digital numbers to σ⁰.
+
+use super::lut::{Extent, Lut};
+use crate::error::Result;
+use crate::xml::Document;
+
+/// Largest calibration value or noise power that is believed; products of 16 bits have at most 2³².
+const LARGEST: f64 = 1e12;
+
+/// Table of the σ⁰ calibration: σ⁰ = (DN² − noise) / A².
+#[derive(Clone, Debug)]
+pub(crate) struct Calibration {
+    /// A at each place.
+    pub(crate) sigma_nought: Lut,
+}
+
+impl Calibration {
+    /// Reads a calibration file of an image of that many lines and pixels.
+    pub(crate) fn read(document: &Document, lines: usize, pixels: usize) -> Result<Self> {
+        let list = document.root().get("calibrationVectorList")?;
+        let extent = Extent {
+            lines,
+            pixels,
+            smallest: 1e-6,
+            largest: LARGEST,
+        };
+        let sigma_nought = Lut::read(list, "calibrationVector", "sigmaNought", extent)?;
+        Ok(Self { sigma_nought })
+    }
+}

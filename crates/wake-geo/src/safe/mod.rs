@@ -1,0 +1,288 @@
+//! Sentinel-1 Level-1 GRD products.
+
+mod annotation;
+mod archive;
+mod calibration;
+mod lut;
+mod noise;
+mod orbit;
+mod sigma;
+
+use std::ops::Range;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+pub use annotation::{Annotation, Pass, Polarization, SwathLooks};
+
+use archive::Archive;
+use calibration::Calibration;
+use noise::Noise;
+use sigma::{Calibrator, sigma_nought};
+
+use crate::error::{Error, Result, quoted};
+use crate::geotiff::{GeoTiff, SampleType};
+use crate::limits::MEASUREMENT_EXTRA_BYTES;
+use crate::window::Window;
+use crate::xml::Document;
+
+/// One polarization of a Sentinel-1 Level-1 GRD product.
+///
+/// σ⁰ = (DN² − noise) / A². A is bilinear between the vectors of `sigmaNought`; the noise is bilinear between its range
+/// vectors, times the factor of its azimuth block, linear along azimuth. Tables are constant beyond their first and
+/// last line or pixel. A pixel with DN² below the noise has σ⁰ = 0 and is counted; DN = 0 is no data. Where the
+/// processor has removed the noise already, the noise is 0.
+#[derive(Debug)]
+pub struct Sentinel1 {
+    archive: Archive,
+    /// File name of annotation and measurement, without ending.
+    stem: String,
+    polarizations: Vec<Polarization>,
+    annotation: Annotation,
+    calibration: Calibration,
+    noise: Option<Noise>,
+    measurement: Mutex<Option<Arc<GeoTiff>>>,
+}
+
+/// Calibration of one pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelCalibration {
+    /// A, the value of the σ⁰ table.
+    pub sigma_nought_lut: f64,
+    /// Thermal noise power \[DN²\].
+    pub noise: f64,
+}
+
+impl PixelCalibration {
+    /// σ⁰ (linear) of a digital number: (DN² − noise) / A², and 0 for a number below the noise.
+    pub fn sigma_nought(self, digital_number: f64) -> f64 {
+        sigma_nought(digital_number, self.noise, self.sigma_nought_lut)
+    }
+}
+
+impl Sentinel1 {
+    /// Opens a product: a `.SAFE` folder, or a `.zip` of one. Without a polarization the first of VV, HH, VH and HV that
+    /// the product has is opened. The measurement is opened when it is first read.
+    ///
+    /// # Errors
+    /// Files that are missing, damaged or beyond the limits; a product of another type; a polarization that is not there.
+    pub fn open(path: &Path, polarization: Option<Polarization>) -> Result<Self> {
+        let archive = Archive::open(path)?;
+        let stems = stems(&archive)?;
+        let polarizations: Vec<Polarization> = stems.iter().map(|(p, _)| *p).collect();
+        let chosen = match polarization {
+            None => stems.first(),
+            Some(wanted) => stems.iter().find(|(p, _)| *p == wanted),
+        };
+        let Some((polarization, stem)) = chosen else {
+            let names: Vec<&str> = polarizations.iter().map(|p| p.name()).collect();
+            return Err(Error::Polarization {
+                path: path.to_owned(),
+                wanted: polarization.map_or("", Polarization::name),
+                there: names.join(", "),
+            });
+        };
+        let (annotation, calibration, noise) = read_files(&archive, stem, *polarization)?;
+        Ok(Self {
+            stem: stem.clone(),
+            polarizations,
+            annotation,
+            calibration,
+            noise,
+            measurement: Mutex::new(None),
+            archive,
+        })
+    }
+
+    /// What the annotation says.
+    pub fn annotation(&self) -> &Annotation {
+        &self.annotation
+    }
+
+    /// Polarizations of the product.
+    pub fn polarizations(&self) -> &[Polarization] {
+        &self.polarizations
+    }
+
+    /// Name that annotation and measurement files share, such as `s1a-iw-grd-vv-20210119t031653-…-001`.
+    pub fn stem(&self) -> &str {
+        &self.stem
+    }
+
+    /// Whether the product has pixels of this polarization; some have annotation alone.
+    pub fn has_measurement(&self) -> bool {
+        self.archive.has(&self.measurement_name())
+    }
+
+    /// Calibration of a pixel.
+    pub fn calibration(&self, line: f64, pixel: f64) -> PixelCalibration {
+        PixelCalibration {
+            sigma_nought_lut: self.calibration.sigma_nought.at(line, pixel),
+            noise: self
+                .noise
+                .as_ref()
+                .map_or(0.0, |noise| noise.at(line, pixel)),
+        }
+    }
+
+    /// Noise-equivalent σ⁰ of a pixel: thermal noise / A².
+    pub fn noise_equivalent_sigma_nought(&self, line: f64, pixel: f64) -> f64 {
+        let PixelCalibration {
+            sigma_nought_lut,
+            noise,
+        } = self.calibration(line, pixel);
+        noise / (sigma_nought_lut * sigma_nought_lut)
+    }
+
+    /// Reads digital numbers of a window inside the image, line by line; `out` has its size.
+    pub(crate) fn digital_numbers(
+        &self,
+        lines: Range<usize>,
+        pixels: Range<usize>,
+        out: &mut [f32],
+    ) -> Result<()> {
+        let measurement = {
+            let mut known = self
+                .measurement
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            let opened = match known.take() {
+                Some(opened) => opened,
+                None => Arc::new(self.open_measurement()?),
+            };
+            known.insert(opened).clone()
+        };
+        measurement.read(lines, pixels, out)
+    }
+
+    /// σ⁰ of a window inside the image; `window` has its size.
+    pub(crate) fn read_window(
+        &self,
+        lines: Range<usize>,
+        pixels: Range<usize>,
+        window: &mut Window,
+    ) -> Result<()> {
+        self.digital_numbers(lines.clone(), pixels.clone(), &mut window.values)?;
+        let rows = window.values.chunks_exact_mut(pixels.len());
+        let mut calibrator = Calibrator::new(&self.calibration, self.noise.as_ref(), pixels);
+        for (line, row) in lines.zip(rows) {
+            let counts = calibrator.apply(line, row);
+            window.no_data += counts.no_data;
+            window.below_noise += counts.below_noise;
+        }
+        Ok(())
+    }
+
+    fn measurement_name(&self) -> String {
+        format!("measurement/{}.tiff", self.stem)
+    }
+
+    fn open_measurement(&self) -> Result<GeoTiff> {
+        let name = self.measurement_name();
+        if !self.archive.has(&name) {
+            return Err(Error::NoMeasurement {
+                path: self.archive.path().to_owned(),
+            });
+        }
+        let (lines, pixels) = (self.annotation.lines, self.annotation.pixels);
+        let most = 2 * lines as u64 * pixels as u64 + MEASUREMENT_EXTRA_BYTES;
+        let tiff = GeoTiff::from_source(&name, self.archive.pixels(&name, most)?)?;
+        if (tiff.lines(), tiff.pixels()) != (lines, pixels) || tiff.sample_type() != SampleType::U16
+        {
+            return Err(Error::damaged(
+                &name,
+                format!(
+                    "it has {} lines of {} pixels of {:?}, but the annotation says {lines} lines of {pixels} pixels of U16",
+                    tiff.lines(),
+                    tiff.pixels(),
+                    tiff.sample_type()
+                ),
+            ));
+        }
+        Ok(tiff)
+    }
+}
+
+/// Polarizations and file names of the annotations of a GRD product, co-polarized first.
+fn stems(archive: &Archive) -> Result<Vec<(Polarization, String)>> {
+    let mut found = Vec::new();
+    let mut other = None;
+    for name in archive.names_in("annotation") {
+        let Some(stem) = name.strip_suffix(".xml") else {
+            continue;
+        };
+        let mut parts = stem.split('-').skip(2);
+        match (parts.next(), parts.next().and_then(Polarization::from_name)) {
+            (Some("grd"), Some(polarization)) => found.push((polarization, stem.to_owned())),
+            (Some(kind), _) if other.is_none() => other = Some(quoted(kind).to_uppercase()),
+            _ => {}
+        }
+    }
+    let order = |p: Polarization| Polarization::ALL.iter().position(|known| *known == p);
+    found.sort_by_key(|(polarization, _)| order(*polarization));
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let path = archive.path();
+    let from_name = archive
+        .folder_name()
+        .split('_')
+        .nth(2)
+        .filter(|kind| kind.len() >= 3);
+    let by_name = from_name
+        .filter(|_| archive.folder_name().starts_with("S1"))
+        .map(quoted);
+    let no_xml = archive
+        .names_in("measurement")
+        .any(|name| name.ends_with(".nc"));
+    match other.or(no_xml.then(|| "OCN".to_owned())).or(by_name) {
+        Some(found) if !found.starts_with("GRD") => Err(Error::ProductType {
+            path: path.to_owned(),
+            found,
+        }),
+        Some(_) => Err(Error::Missing {
+            path: path.to_owned(),
+            name: "annotation/s1*-*-grd-*.xml".to_owned(),
+        }),
+        None => Err(Error::unreadable(
+            path,
+            "it has no file annotation/s1*-*-grd-*.xml",
+        )),
+    }
+}
+
+fn read_files(
+    archive: &Archive,
+    stem: &str,
+    polarization: Polarization,
+) -> Result<(Annotation, Calibration, Option<Noise>)> {
+    let read = |name: &str| Document::parse(name, &archive.text(name)?);
+    let name = format!("annotation/{stem}.xml");
+    let document = read(&name)?;
+    let header = document.root().get("adsHeader")?;
+    let kind = header.get("productType")?.text();
+    if kind != "GRD" {
+        return Err(Error::ProductType {
+            path: archive.path().to_owned(),
+            found: quoted(kind),
+        });
+    }
+    let annotation = Annotation::read(&name, &document)?;
+    if annotation.polarization != polarization {
+        return Err(header.error(format!(
+            "polarisation is {}, but the file name says {}",
+            annotation.polarization.name(),
+            polarization.name()
+        )));
+    }
+    let (lines, pixels) = (annotation.lines, annotation.pixels);
+    let document = read(&format!("annotation/calibration/calibration-{stem}.xml"))?;
+    let calibration = Calibration::read(&document, lines, pixels)?;
+    let noise = match annotation.noise_removed {
+        true => None,
+        false => {
+            let document = read(&format!("annotation/calibration/noise-{stem}.xml"))?;
+            Some(Noise::read(&document, lines, pixels)?)
+        }
+    };
+    Ok((annotation, calibration, noise))
+}
