@@ -66,6 +66,15 @@ impl Folder {
         self.rows.iter().map(|(_, row)| &row.scene)
     }
 
+    /// Positions of the pairs that are to be learnt from, those that `trainset.txt` names.
+    #[must_use]
+    pub fn trainset(&self) -> Vec<u64> {
+        let rows = self.rows.iter().zip(0..);
+        rows.filter(|((index, _), _)| !self.manifest.is_val(*index))
+            .map(|(_, position)| position)
+            .collect()
+    }
+
     /// Reads a pair; `position` counts from 0 in this folder.
     ///
     /// # Errors

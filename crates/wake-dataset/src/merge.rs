@@ -89,7 +89,7 @@ fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
         }
         Some(_) => Err(broken(&path, 0, format!("not shard {number}"))),
         None => {
-            let message = format!("shard {number} is missing; make it with --shard {number}/n");
+            let message = format!("shard {number} is missing; make it too, into the same folder");
             Err(broken(&path, 0, message))
         }
     }
@@ -101,7 +101,7 @@ fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec
     let text = std::fs::read(&metadata).map_err(|e| cannot("read", &metadata, e))?;
     let rows = parse(&metadata, &text, manifest)?;
     let unfinished = |what: String| {
-        let message = format!("{what}; run the same --shard again to finish it");
+        let message = format!("{what}; make the same shard again to finish it");
         broken(&metadata, rows.len(), message)
     };
     let count = manifest.indices().end - manifest.indices().start;

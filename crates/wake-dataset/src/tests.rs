@@ -576,6 +576,11 @@ fn training_and_validation_share_no_scene() {
         .collect();
     assert_eq!(all, images);
     assert_eq!(val.lines().count(), 1);
+    let folder = tempfile::tempdir().unwrap();
+    made(folder.path(), &manifest());
+    let learnt = Folder::open(folder.path()).unwrap().trainset();
+    let learnt = learnt.iter().map(|i| format!("./images/00000{i}.png"));
+    assert!(learnt.eq(train.lines()));
 }
 
 #[test]

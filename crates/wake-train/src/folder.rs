@@ -184,17 +184,17 @@ pub(super) fn check_begin(
     match (Checkpoint::newest_step(checkpoints)?, resume) {
         (Some(_), true) | (None, false) => Ok(()),
         (None, true) => Err(Error::Value(wake_nn::Error::InvalidOption {
-            option: "--resume".to_owned(),
+            option: "resume".to_owned(),
             value: format!(
-                "given, but there is no checkpoint in {}",
+                "asked for, but there is no checkpoint in {}",
                 checkpoints.display()
             ),
-            expected: "no --resume for a run that begins".to_owned(),
+            expected: "a new beginning, without resume".to_owned(),
         })),
         (Some(step), false) => Err(Error::Value(wake_nn::Error::InvalidOption {
             option: path.display().to_string(),
             value: format!("a run whose stage {stage} has made {step} steps"),
-            expected: "another folder for a new run; --resume goes on with this one".to_owned(),
+            expected: "another folder for a new run; resume goes on with this one".to_owned(),
         })),
     }
 }
@@ -284,7 +284,7 @@ mod tests {
         }
         let refused = run.begin("mean", false).unwrap_err().to_string();
         assert!(
-            refused.contains("100 steps") && refused.contains("--resume"),
+            refused.contains("100 steps") && refused.contains("resume goes on"),
             "{refused}"
         );
         assert_eq!(run.begin("mean", true).unwrap().unwrap().step, 100);

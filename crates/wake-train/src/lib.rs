@@ -41,7 +41,9 @@ pub mod detector;
 
 pub use checkpoint::{Checkpoint, Tensors};
 pub use error::{Error, Result};
-pub use fine_tune::{FineTune, FineTuneOptions, FineTuning, Frozen, PromptedBatches};
+pub use fine_tune::{
+    FineTuneTask, FineTuning, Frozen, Prompted, PromptedBatch, PromptedPairs, PromptedSource,
+};
 pub use folder::RunFolder;
 pub use latents::{Example, LatentSet, fit_patches};
 pub use log::Metrics;
@@ -55,7 +57,7 @@ pub use sea_training::SeaTraining;
 pub use small_pipeline::PipelineTraining;
 pub use stage::Stage;
 pub use stage_options::{StageOptions, Usual};
-pub use tasks::{FlowTask, PriorTask, WordsTask};
+pub use tasks::{FlowBatch, FlowTask, PriorTask, WordsTask};
 pub use text_to_image::{
     AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
 };

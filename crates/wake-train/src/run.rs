@@ -18,11 +18,44 @@ pub type Terms = Vec<(&'static str, f64)>;
 
 /// What a part of a model learns.
 ///
-/// A step of batch b takes the positions b · batch … (b + 1) · batch − 1, whatever the number of devices: what is
-/// drawn for a position follows from the position.
+/// Step s takes the positions s · batch … (s + 1) · batch − 1, however many devices and parts share them: what is drawn for a
+/// position follows from the position alone.
 pub trait Task<M>: Sync {
-    /// The mean loss over some positions, and its terms.
-    fn loss(&self, model: &M, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms);
+    /// What a loss is computed from.
+    type Batch: Send + Sync;
+
+    /// Reads or makes what the loss needs at some positions.
+    ///
+    /// A stage calls it for the next step while the model learns from this one.
+    ///
+    /// # Errors
+    ///
+    /// Those of the data; they end the run.
+    fn batch(&self, positions: Range<u64>) -> Result<Self::Batch>;
+
+    /// The mean loss over a batch, and its terms.
+    ///
+    /// - `device`: of the model, in autodiff
+    fn loss(&self, model: &M, device: &Device, batch: &Self::Batch) -> (Tensor<1>, Terms);
+}
+
+/// How steps cut positions into parts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parts {
+    batch: usize,
+    parts: usize,
+}
+
+impl Parts {
+    /// What a task needs for a step, part by part.
+    pub(super) fn of_step<M, T: Task<M>>(self, task: &T, step: usize) -> Result<Vec<T::Batch>> {
+        let each = (self.batch / self.parts) as u64;
+        let first = (step * self.batch) as u64;
+        let begins = (0..self.parts as u64).map(|part| first + part * each);
+        begins
+            .map(|begin| task.batch(begin..begin + each))
+            .collect()
+    }
 }
 
 /// Constants of a [`Run`].
@@ -149,19 +182,33 @@ impl<M: Module> Run<M> {
         self.trainer.averaged()
     }
 
+    /// How its steps cut positions into parts.
+    pub(super) fn parts(&self) -> Parts {
+        Parts {
+            batch: self.options.batch,
+            parts: self.trainer.parts(),
+        }
+    }
+
     /// One step on the next batch; the terms are means over the batch.
     ///
     /// # Errors
     ///
-    /// [`Error::Diverged`] when many steps in a row, or all of the run, had no finite loss and gradient.
+    /// As [`Task::batch`], and [`Error::Diverged`] when many steps in a row, or all of the run, had no finite loss and gradient.
     pub fn step(&mut self, task: &impl Task<M>) -> Result<(StepReport, Terms)> {
-        let parts = self.trainer.parts();
-        let each = (self.options.batch / parts) as u64;
-        let first = (self.trainer.steps() * self.options.batch) as u64;
-        let terms = Mutex::new(vec![Terms::new(); parts]);
+        let batches = self.parts().of_step(task, self.steps())?;
+        self.step_on(task, &batches)
+    }
+
+    /// The same, with the parts of the batch that were made before.
+    pub(super) fn step_on<T: Task<M>>(
+        &mut self,
+        task: &T,
+        batches: &[T::Batch],
+    ) -> Result<(StepReport, Terms)> {
+        let terms = Mutex::new(vec![Terms::new(); batches.len()]);
         let report = self.trainer.step(|model, device, part| {
-            let begin = first + part as u64 * each;
-            let (loss, found) = task.loss(model, device, begin..begin + each);
+            let (loss, found) = task.loss(model, device, &batches[part]);
             terms.lock().unwrap_or_else(PoisonError::into_inner)[part] = found;
             loss
         });

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::run::{Task, Terms, number};
 use super::tasks::{examples, noise_level, noise_of, on_the_way};
+use crate::error::Result;
 use crate::streams::SEA_PLACES;
 use wake_ldm::sea_texture::{PATCH, SeaFlow, SeaImage, SeaStyle};
 use wake_nn::noise::NoiseSource;
@@ -117,7 +118,13 @@ pub struct SeaTask<'a> {
 }
 
 impl Task<SeaFlow> for SeaTask<'_> {
-    fn loss(&self, model: &SeaFlow, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+    type Batch = Range<u64>;
+
+    fn batch(&self, positions: Range<u64>) -> Result<Range<u64>> {
+        Ok(positions)
+    }
+
+    fn loss(&self, model: &SeaFlow, device: &Device, positions: &Range<u64>) -> (Tensor<1>, Terms) {
         let random = NoiseSource::new(self.seed);
         let indices = examples(self.seed, positions.clone(), self.patches.len());
         let patches: Vec<&Patch> = indices.iter().map(|&i| &self.patches.patches[i]).collect();
@@ -125,7 +132,7 @@ impl Task<SeaFlow> for SeaTask<'_> {
             .clone()
             .map(|p| noise_level(random, p) as f32)
             .collect();
-        let drawn: Vec<(&Patch, u64)> = patches.iter().copied().zip(positions).collect();
+        let drawn: Vec<(&Patch, u64)> = patches.iter().copied().zip(positions.clone()).collect();
         let noise = drawn.par_iter().map(|(patch, position)| {
             let source = noise_of(self.seed, *position);
             patch.style.noise(source, PATCH, PATCH).values

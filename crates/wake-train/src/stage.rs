@@ -6,7 +6,8 @@ use serde_json::{Map, Value, json};
 use super::folder::RunFolder;
 use super::log::Metrics;
 use super::progress::Progress;
-use super::run::{Run, Task};
+use super::run::{Run, Task, Terms};
+use super::trainer::StepReport;
 use crate::error::Error;
 
 /// How a [`Run`] is kept in a folder.
@@ -33,11 +34,11 @@ impl Stage<'_> {
     /// # Errors
     ///
     /// Those of `show`, of the run's steps, and of files that cannot be written.
-    pub fn train<M: Module, E: From<Error>>(
+    pub fn train<M: Module, T: Task<M>, E: From<Error>>(
         self,
         folder: &mut RunFolder,
         mut run: Run<M>,
-        task: &impl Task<M>,
+        task: &T,
         progress: &dyn Fn(Progress),
         show: impl Fn(&Run<M>) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -55,8 +56,9 @@ impl Stage<'_> {
         }
         let log = folder.path().join(format!("{name}.jsonl"));
         let mut metrics = Metrics::open(&log, run.steps())?;
+        let mut ready = Vec::new();
         while run.steps() < steps {
-            let (report, terms) = run.step(task)?;
+            let (report, terms) = step_ahead(&mut run, task, &mut ready, steps)?;
             let terms: Map<String, Value> = terms
                 .into_iter()
                 .map(|(term, value)| (term.to_owned(), json!(value)))
@@ -75,4 +77,34 @@ impl Stage<'_> {
         progress(Progress::Made { stage: name, steps });
         Ok(())
     }
+}
+
+/// One step, while another thread makes the batch of the next.
+///
+/// - `ready`: the parts of the batch of this step, empty at first; of the next step afterwards, if the run of `steps` has one
+fn step_ahead<M: Module, T: Task<M>>(
+    run: &mut Run<M>,
+    task: &T,
+    ready: &mut Vec<T::Batch>,
+    steps: usize,
+) -> Result<(StepReport, Terms), Error> {
+    let (parts, step) = (run.parts(), run.steps());
+    let batches = match std::mem::take(ready) {
+        none if none.is_empty() => parts.of_step(task, step)?,
+        made => made,
+    };
+    let (report, next) = std::thread::scope(|scope| {
+        let maker = scope.spawn(|| match step + 1 < steps {
+            true => parts.of_step(task, step + 1),
+            false => Ok(Vec::new()),
+        });
+        let report = run.step_on(task, &batches);
+        let next = maker.join();
+        (
+            report,
+            next.unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+        )
+    });
+    *ready = next?;
+    report
 }

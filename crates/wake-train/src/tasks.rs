@@ -9,6 +9,7 @@ use wake_physics::Scene;
 
 use super::latents::LatentSet;
 use super::run::{Task, Terms, number};
+use crate::error::Result;
 use crate::prompts::Prompts;
 use crate::streams;
 use wake_dataset::shuffled;
@@ -59,13 +60,21 @@ pub struct WordsTask<'a> {
 }
 
 impl Task<PromptParser> for WordsTask<'_> {
+    type Batch = Range<u64>;
+
+    fn batch(&self, positions: Range<u64>) -> Result<Range<u64>> {
+        Ok(positions)
+    }
+
     fn loss(
         &self,
         model: &PromptParser,
         device: &Device,
-        positions: Range<u64>,
+        positions: &Range<u64>,
     ) -> (Tensor<1>, Terms) {
-        let drawn = positions.filter_map(|position| self.prompts.prompt(position).ok());
+        let drawn = positions
+            .clone()
+            .filter_map(|position| self.prompts.prompt(position).ok());
         let (prompts, said): (Vec<_>, Vec<_>) = drawn
             .map(|(text, conditions)| (tokens(&text), statement(&conditions)))
             .unzip();
@@ -130,12 +139,18 @@ impl PriorTask<'_> {
 }
 
 impl Task<Prior> for PriorTask<'_> {
-    fn loss(&self, model: &Prior, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+    type Batch = Range<u64>;
+
+    fn batch(&self, positions: Range<u64>) -> Result<Range<u64>> {
+        Ok(positions)
+    }
+
+    fn loss(&self, model: &Prior, device: &Device, positions: &Range<u64>) -> (Tensor<1>, Terms) {
         let indices = examples(self.seed, positions.clone(), self.set.len());
         let scenes = self.set.scenes(&indices);
         let cells: Vec<Vec<usize>> = scenes
             .iter()
-            .zip(positions)
+            .zip(positions.clone())
             .map(|(scene, position)| self.cells(scene, position))
             .collect();
         let tensor = |pixels: fn(&LatentSet, usize, &[usize]) -> Vec<f32>| -> Tensor<4> {
@@ -204,38 +219,46 @@ pub struct FlowTask<'a> {
     pub seed: u64,
 }
 
-impl FlowTask<'_> {
-    /// The noise at some positions, made on all cores.
-    fn noise(&self, indices: &[usize], positions: Range<u64>) -> Tensor<4> {
-        let scenes = indices.iter().map(|&i| &self.set.example(i).scene);
-        let pairs: Vec<(&Scene, u64)> = scenes.zip(positions).collect();
-        let [channels, rows, columns] = self.set.shape();
-        let windows = ChannelWindows::new(self.patches);
-        let noise = pairs.par_iter().map(|&(scene, position)| {
-            let (scenes, sources) = (std::slice::from_ref(scene), [noise_of(self.seed, position)]);
-            let seas = SeaFields::new(scenes, &sources, &windows);
-            seas.map_or_else(
-                |_| Tensor::full([1, channels, rows, columns], f32::NAN, &Device::default()),
-                |seas| seas.noise(scenes, &sources, self.patches),
-            )
-        });
-        Tensor::cat(noise.collect(), 0)
-    }
+/// What a step of the flow needs, but the latents themselves.
+#[derive(Debug)]
+pub struct FlowBatch {
+    /// Which examples.
+    indices: Vec<usize>,
+    /// Their noise levels.
+    levels: Vec<f32>,
+    /// Their noise, `[examples, channels, rows, columns]`.
+    noise: TensorData,
 }
 
 impl Task<Flow> for FlowTask<'_> {
-    fn loss(&self, model: &Flow, device: &Device, positions: Range<u64>) -> (Tensor<1>, Terms) {
+    type Batch = FlowBatch;
+
+    /// Draws the noise on all cores.
+    fn batch(&self, positions: Range<u64>) -> Result<FlowBatch> {
         let random = NoiseSource::new(self.seed);
         let indices = examples(self.seed, positions.clone(), self.set.len());
-        let levels: Vec<f32> = positions
-            .clone()
-            .map(|p| noise_level(random, p) as f32)
-            .collect();
-        let noise = self.noise(&indices, positions);
-        let noise = Tensor::from_inner(noise.to_device(&device.clone().inner()));
-        let residual = self.set.latents(&indices, device);
-        let (x, target, levels) = on_the_way(residual, noise, &levels);
-        let known = model.prepared(&self.set.known(&indices, device));
+        let levels = positions.clone().map(|p| noise_level(random, p) as f32);
+        let scenes = indices.iter().map(|&i| &self.set.example(i).scene);
+        let pairs: Vec<(&Scene, u64)> = scenes.zip(positions.clone()).collect();
+        let windows = ChannelWindows::new(self.patches);
+        let noise = pairs.par_iter().map(|&(scene, position)| {
+            let (scenes, sources) = (std::slice::from_ref(scene), [noise_of(self.seed, position)]);
+            let seas = SeaFields::new(scenes, &sources, &windows)?;
+            Ok(seas.noise(scenes, &sources, self.patches))
+        });
+        let noise = Tensor::cat(noise.collect::<Result<Vec<_>>>()?, 0).into_data();
+        Ok(FlowBatch {
+            levels: levels.collect(),
+            indices,
+            noise,
+        })
+    }
+
+    fn loss(&self, model: &Flow, device: &Device, batch: &FlowBatch) -> (Tensor<1>, Terms) {
+        let noise: Tensor<4> = Tensor::from_data(batch.noise.clone(), device);
+        let residual = self.set.latents(&batch.indices, device);
+        let (x, target, levels) = on_the_way(residual, noise, &batch.levels);
+        let known = model.prepared(&self.set.known(&batch.indices, device));
         let error = model.velocity(x, levels, &known) - target;
         let loss = error.square().mean();
         let terms = vec![("flow", number(&loss))];

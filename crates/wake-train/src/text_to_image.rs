@@ -6,7 +6,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use half::f16;
 
-use super::fine_tune::noised;
+use super::fine_tune::{WITHOUT_PROMPT, noised};
 use super::latents::batch;
 use super::run::{Task, Terms, number};
 use super::tasks::{examples, noise_of};
@@ -27,9 +27,6 @@ const CROP: usize = 128;
 const DIVERGENCE: f64 = 1e-5;
 /// Images that are encoded at once.
 const ENCODED: usize = 16;
-/// Part of the examples whose prompt is left out, for guidance.
-const WITHOUT_PROMPT: f64 = 0.1;
-
 /// Images of one size beside their prompts in memory, 16 bits a pixel.
 #[derive(Debug, Default)]
 pub struct PromptedImages {
@@ -176,11 +173,17 @@ pub struct AutoencoderTask<'a> {
 }
 
 impl Task<AutoencoderKl> for AutoencoderTask<'_> {
+    type Batch = Range<u64>;
+
+    fn batch(&self, positions: Range<u64>) -> Result<Range<u64>> {
+        Ok(positions)
+    }
+
     fn loss(
         &self,
         model: &AutoencoderKl,
         device: &Device,
-        positions: Range<u64>,
+        positions: &Range<u64>,
     ) -> (Tensor<1>, Terms) {
         let random = NoiseSource::new(self.seed);
         let crop = self.images.size.map(|side| side.min(CROP));
@@ -199,7 +202,7 @@ impl Task<AutoencoderKl> for AutoencoderTask<'_> {
             .repeat_dim(1, model.image_channels());
         let posterior = model.encode(images.clone());
         let [count, channels, rows, columns] = posterior.mean.dims();
-        let sources: Vec<NoiseSource> = positions.map(|p| noise_of(self.seed, p)).collect();
+        let sources: Vec<NoiseSource> = positions.clone().map(|p| noise_of(self.seed, p)).collect();
         let noise = normal_batch(
             &sources,
             POSTERIOR_STREAM,
@@ -250,11 +253,17 @@ pub struct TextToImageTask<'a> {
 }
 
 impl Task<TextToImage> for TextToImageTask<'_> {
+    type Batch = Range<u64>;
+
+    fn batch(&self, positions: Range<u64>) -> Result<Range<u64>> {
+        Ok(positions)
+    }
+
     fn loss(
         &self,
         model: &TextToImage,
         device: &Device,
-        positions: Range<u64>,
+        positions: &Range<u64>,
     ) -> (Tensor<1>, Terms) {
         let random = NoiseSource::new(self.seed);
         let indices = examples(self.seed, positions.clone(), self.set.prompts.len());
@@ -270,7 +279,7 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let told: Vec<i32> = told.copied().collect();
         let shape = [indices.len(), told.len() / indices.len().max(1)];
         let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(told, shape), device);
-        let sources: Vec<NoiseSource> = positions.map(|p| noise_of(self.seed, p)).collect();
+        let sources: Vec<NoiseSource> = positions.clone().map(|p| noise_of(self.seed, p)).collect();
         let noise = normal_batch(&sources, FINE_TUNE_STREAM, self.set.shape, device);
         let clean = batch(&self.set.latents, self.set.shape, &indices, device);
         let noised = noised(self.schedule, Prediction::Epsilon, &steps, clean, noise);

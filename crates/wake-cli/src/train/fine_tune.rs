@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use wake_dataset::Folder;
-use wake_train::{FineTuning, StageOptions};
+use wake_train::FineTuning;
 
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
@@ -43,17 +43,12 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options) -> Outcome<()> {
-    let constants = StageOptions {
-        checkpointing: options.thrift.checkpointing,
-        bf16: options.thrift.bf16,
-        ..options.place.paced(&options.pace)?
-    };
     let tuning = FineTuning {
         weights: &options.weights,
         data: &Folder::open(&options.data)?,
         rank: options.rank.map(usize::from),
         snr_gamma: options.snr_gamma,
-        options: constants,
+        options: options.place.paced(&options.pace, &options.thrift)?,
     };
     let screen = Screen::saying(&options.place.out, |_, steps, out| {
         format!("{steps} steps, model in {out}")

@@ -34,6 +34,7 @@ enum Model {
     TextToImage(text_to_image::Options),
     #[command(mut_args(defaults(fine_tune::DEFAULTS)))]
     FineTune(fine_tune::Options),
+    #[command(mut_args(defaults(detector::DEFAULTS)))]
     Detector(detector::Options),
 }
 

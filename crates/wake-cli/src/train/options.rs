@@ -44,12 +44,15 @@ pub(crate) struct Pace {
 /// What spares memory, and some precision.
 #[derive(Args, Clone)]
 pub(crate) struct Thrift {
+    /// Parts of a batch that are computed one after the other, to save memory
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    accumulation: u16,
     /// Keep less for the way back through the model, and compute it again; slower
     #[arg(long)]
-    pub(crate) checkpointing: bool,
+    checkpointing: bool,
     /// Compute losses and gradients in bfloat16, where the device can; weights keep 32 bits
     #[arg(long)]
-    pub(crate) bf16: bool,
+    bf16: bool,
 }
 
 /// Defaults of one subcommand, by the names of its options.
@@ -73,8 +76,11 @@ impl Place {
     }
 
     /// How a stage runs that takes what is usual for it.
-    pub(crate) fn stage(&self) -> Result<StageOptions> {
+    pub(crate) fn stage(&self, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
+            accumulation: usize::from(thrift.accumulation),
+            checkpointing: thrift.checkpointing,
+            bf16: thrift.bf16,
             every: self.every as usize,
             seed: self.seed,
             resume: self.resume,
@@ -84,12 +90,12 @@ impl Place {
     }
 
     /// How a stage runs at a pace.
-    pub(crate) fn paced(&self, pace: &Pace) -> Result<StageOptions> {
+    pub(crate) fn paced(&self, pace: &Pace, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
             steps: Some(pace.steps as usize),
             batch: Some(usize::from(pace.batch)),
             rate: Some(pace.rate),
-            ..self.stage()?
+            ..self.stage(thrift)?
         })
     }
 }

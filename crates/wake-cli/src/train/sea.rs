@@ -9,7 +9,7 @@ use wake_physics::picture::Picture;
 use wake_train::{SeaPatches, SeaTraining};
 use whole_files::fingerprint;
 
-use super::options::{Pace, Place};
+use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
 use crate::exit::{self, Outcome};
 use crate::progress;
@@ -49,10 +49,12 @@ pub(crate) struct Options {
     pace: Pace,
     #[command(flatten)]
     place: Place,
+    #[command(flatten)]
+    thrift: Thrift,
 }
 
 pub(crate) fn run(options: &Options) -> Outcome<()> {
-    let constants = options.place.paced(&options.pace)?;
+    let constants = options.place.paced(&options.pace, &options.thrift)?;
     SeaTraining::check(&constants)?;
     let files = list(&options.images)?;
     let training = SeaTraining {

@@ -6,7 +6,7 @@ use clap::Args;
 use wake_dataset::Recipe;
 use wake_train::{PipelineTraining, TrainingPairs};
 
-use super::options::{Pace, Place};
+use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
 use super::source::{check_memory, folder};
 use crate::exit::Outcome;
@@ -55,10 +55,12 @@ pub(crate) struct Options {
     pace: Pace,
     #[command(flatten)]
     place: Place,
+    #[command(flatten)]
+    thrift: Thrift,
 }
 
 pub(crate) fn run(options: &Options) -> Outcome<()> {
-    let constants = options.place.paced(&options.pace)?;
+    let constants = options.place.paced(&options.pace, &options.thrift)?;
     let pairs = match &options.data {
         Some(path) => TrainingPairs::folder(folder(path)?),
         None => {

@@ -56,9 +56,6 @@ pub(crate) struct Options {
     /// Examples of a batch [default: words 128, mean 32, diffusion 8]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     batch: Option<u16>,
-    /// Parts of a batch that are computed one after the other, to save memory
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
-    accumulation: u16,
     /// Largest step of the optimizer [default: words 1e-3, mean 2e-3, diffusion 1e-3]
     #[arg(long)]
     rate: Option<f64>,
@@ -80,10 +77,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         steps: options.steps.map(|steps| steps as usize),
         batch: options.batch.map(usize::from),
         rate: options.rate,
-        accumulation: usize::from(options.accumulation),
-        checkpointing: options.thrift.checkpointing,
-        bf16: options.thrift.bf16,
-        ..options.place.stage()?
+        ..options.place.stage(&options.thrift)?
     };
     let config = config(options)?;
     let pairs = match stage {

@@ -173,19 +173,23 @@ fn flat_tiny_narrow_and_half_saturated_images_are_searched() {
 fn a_training_run_goes_on_where_it_was() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("run");
-    let train = [
-        "detector", "--images", "32", "--recipe", "painted", "--every", "1",
-    ];
-    done("train", &train, &out);
+    let train = |more: &[&str]| {
+        let train = [
+            "detector", "--steps", "2", "--recipe", "painted", "--every", "1",
+        ];
+        done("train", &[&train, more].concat(), &out);
+    };
+    train(&[]);
     let whole = files(&out);
     // As if the run had been killed after its first step.
-    std::fs::remove_dir_all(out.join("checkpoints/step-00000002")).expect("the last checkpoint");
+    let last = out.join("checkpoints/detector/step-00000002");
+    std::fs::remove_dir_all(last).expect("the last checkpoint");
     std::fs::remove_file(out.join("detector.safetensors")).expect("weights");
-    done("train", &train, &out);
+    train(&["--resume"]);
     let again = files(&out);
     let weights = Path::new("detector.safetensors");
     assert!(whole[weights].is_some() && whole[weights] == again[weights]);
-    let log = std::fs::read_to_string(out.join("train.jsonl")).expect("a log");
+    let log = std::fs::read_to_string(out.join("detector.jsonl")).expect("a log");
     assert_eq!(log.lines().count(), 2, "{log}");
     // The new weights can be used.
     let image = eight_bits(&folder.path().join("a.png"), 100);
@@ -211,7 +215,7 @@ const PRINTING: [&[&str]; 4] = [
     &["detect", "a.png", "--json", "--out", "out"],
     &["evaluate", "detector", "--images", "1", "--out", "out"],
     &[
-        "train", "detector", "--images", "16", "--recipe", "painted", "--out", "out",
+        "train", "detector", "--steps", "1", "--recipe", "painted", "--out", "run",
     ],
 ];
 
@@ -231,7 +235,7 @@ fn a_closed_pipe_is_no_error_for_any_subcommand() {
     for written in [
         "out/a.png.wakes.png",
         "out/report.md",
-        "out/detector.safetensors",
+        "run/detector.safetensors",
     ] {
         assert!(folder.path().join(written).is_file(), "no {written}");
     }

@@ -21,4 +21,4 @@ pub use recipes::Recipe;
 pub use repeated::Repeated;
 pub use sample::Sample;
 pub use targets::FOUND;
-pub use training::{Training, train};
+pub use training::{DetectorBatch, DetectorTask, DetectorTraining};

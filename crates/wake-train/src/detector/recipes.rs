@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
+use burn::tensor::Device;
 use wake_dataset::{Mixture, Recipe as SceneRecipe, Simulated, Source};
 use wake_ldm::{Sampled, WakeSampler};
-use wake_nn::device_named;
 
 use super::cluttered::Cluttered;
 use super::painted::Painted;
 
 /// What the images of a training run, or of an evaluation, show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Recipe {
     /// Painted lines, streaks and blobs, no physics
     Painted,
@@ -27,6 +27,7 @@ pub enum Recipe {
     /// The recipe detector, drawn by the wake model
     Sampled,
     /// Painted and simulated images (detector) in turn
+    #[default]
     Mixed,
     /// Painted and simulated images (cluttered) in turn
     Full,
@@ -107,10 +108,17 @@ impl Recipe {
 
     /// Images of `size` rows and columns.
     ///
+    /// - `device`: what the wake model computes on, for the recipe that it draws
+    ///
     /// # Errors
     ///
     /// Of the recipe or the model; the wake model draws 256 rows and columns alone.
-    pub fn source(self, seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
+    pub fn source(
+        self,
+        seed: u64,
+        size: usize,
+        device: &Device,
+    ) -> wake_dataset::Result<Arc<dyn Source>> {
         let changes: [&[&str]; 3] = match self {
             Self::Plain => [&CALM, &NO_EDGE, &PLAIN],
             Self::Echo => [&CALM, &NO_EDGE, &[]],
@@ -121,12 +129,12 @@ impl Recipe {
             }
             Self::Painted => return Ok(Arc::new(Painted { seed, size })),
             Self::Sampled => {
-                let sampler = WakeSampler::pretrained(&device_named("flex")?)?;
+                let sampler = WakeSampler::pretrained(device)?;
                 let scenes = simulated(&[], seed, size)?;
                 return Ok(Arc::new(Sampled::new(sampler, scenes)?));
             }
-            Self::Mixed => return in_turn([Self::Painted, Self::Detector], seed, size),
-            Self::Full => return in_turn([Self::Painted, Self::Cluttered], seed, size),
+            Self::Mixed => return in_turn([Self::Painted, Self::Detector], seed, size, device),
+            Self::Full => return in_turn([Self::Painted, Self::Cluttered], seed, size, device),
         };
         Ok(Arc::new(simulated(&changes.concat(), seed, size)?))
     }
@@ -148,8 +156,13 @@ impl Recipe {
 }
 
 /// Images of both recipes in turn.
-fn in_turn(recipes: [Recipe; 2], seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
-    let part = |recipe: Recipe| Ok((1.0, recipe.source(seed, size)?));
+fn in_turn(
+    recipes: [Recipe; 2],
+    seed: u64,
+    size: usize,
+    device: &Device,
+) -> wake_dataset::Result<Arc<dyn Source>> {
+    let part = |recipe: Recipe| Ok((1.0, recipe.source(seed, size, device)?));
     let parts = recipes.into_iter().map(part);
     Ok(Arc::new(Mixture::new(
         parts.collect::<wake_dataset::Result<_>>()?,

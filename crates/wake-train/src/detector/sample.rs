@@ -1,6 +1,6 @@
 //! Images to learn from, and where the wakes are in them.
 
-use wake_dataset::{Batch, Pair};
+use wake_dataset::Pair;
 use wake_physics::Scene;
 use wake_physics::labels::{Class, Object};
 
@@ -26,20 +26,6 @@ const LINE: f64 = 16.0;
 const UNSURE: (f32, f32) = (80.0, 3.0);
 
 impl Sample {
-    /// The images of a batch; all are square.
-    pub(crate) fn of_batch(batch: Batch) -> Vec<Self> {
-        let [_, _, size, _] = batch.images.dims();
-        let grey: Vec<f32> = batch.images.into_data().iter::<f32>().collect();
-        let images = grey.chunks_exact((size * size).max(1));
-        let labels = batch.objects.iter().zip(&batch.scenes);
-        let sample = |(grey, (objects, scene)): (&[f32], (&Vec<Object>, &Scene))| Self {
-            size,
-            pixels: grey.iter().map(|g| (127.5 * (g + 1.0)).round()).collect(),
-            wakes: wakes(objects, scene),
-        };
-        images.zip(labels).map(sample).collect()
-    }
-
     /// One image; it is square.
     #[must_use]
     pub fn of_pair(pair: &Pair) -> Self {

@@ -205,6 +205,7 @@ impl Batch {
 }
 
 /// An image ready to be learned from.
+#[derive(Debug)]
 pub(crate) struct Prepared {
     size: usize,
     inputs: Vec<f32>,

@@ -1,200 +1,192 @@
-//! The network learns from a source of images, step by step, and can be stopped and continued.
+//! The network learns from a source of images.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
-use crate::{AdamOptions, Checkpoint, Metrics, Rate, Trainer, TrainerOptions};
-use burn::tensor::Device;
+use burn::tensor::{Device, Tensor};
 use rayon::prelude::*;
-use serde_json::json;
-use wake_dataset::{Batches, Loader, Source};
-use wake_nn::device_named;
+use serde_json::{Value, json};
+use wake_dataset::{Pair, Source};
 use wake_nn::weights::{Layout, Precision, load, save_as};
+use whole_files::fingerprint;
 
 use super::draw::Draw;
 use super::recipes::Recipe;
 use super::repeated::Repeated;
 use super::sample::Sample;
 use super::targets::{Batch, Prepared};
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::folder::RunFolder;
+use crate::progress::Progress;
+use crate::run::{Run, RunOptions, Task, Terms, number};
+use crate::stage::Stage;
+use crate::stage_options::{StageOptions, Usual};
 use wake_detector::network::Network;
 use wake_detector::self_check::self_check;
 
-/// Images of a step.
-const BATCH: usize = 16;
+/// What a run takes where nothing else is asked for.
+const USUAL: Usual = Usual {
+    steps: 2500,
+    batch: 16,
+    rate: 2e-3,
+};
 /// Rows and columns of an image.
 const SIZE: usize = 256;
+/// Name of the stage, its checkpoints and its log.
+const STAGE: &str = "detector";
+/// What is written: averaged weights.
+const WEIGHTS: &str = "detector.safetensors";
+/// Draws of how an image is turned are others than those of the image.
+const TURNED: u64 = 0x5151;
 
-/// What a network learns from, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Training {
-    /// Images to learn from.
-    pub images: usize,
-    /// Different images, which come again when all were seen; without it all are different.
-    pub distinct: Option<usize>,
+/// Learning the maps of images: hills at tips, lines, directions and extents.
+///
+/// An image is mirrored and turned as the geometry of other passes would.
+#[derive(Debug)]
+pub struct DetectorTask {
+    source: Arc<dyn Source>,
+    seed: u64,
+}
+
+impl DetectorTask {
+    /// Learns from square images of a source.
+    ///
+    /// - `seed`: of how they are turned
+    #[must_use]
+    pub fn new(source: Arc<dyn Source>, seed: u64) -> Self {
+        Self { source, seed }
+    }
+
+    /// The pairs at some positions, made by a thread for each core: a source makes one at a time.
+    fn pairs(&self, positions: Range<u64>) -> Result<Vec<Pair>> {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
+        let each = (positions.end - positions.start).div_ceil(threads).max(1) as usize;
+        let begins = positions.clone().step_by(each);
+        let shares = begins.map(|begin| begin..positions.end.min(begin + each as u64));
+        let made: Vec<wake_dataset::Result<Vec<Pair>>> = std::thread::scope(|scope| {
+            let makers: Vec<_> = shares
+                .map(|share| scope.spawn(|| self.source.items(share)))
+                .collect();
+            let join = |maker: std::thread::ScopedJoinHandle<'_, _>| {
+                maker
+                    .join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            };
+            makers.into_iter().map(join).collect()
+        });
+        let made = made.into_iter().collect::<wake_dataset::Result<Vec<_>>>()?;
+        Ok(made.concat())
+    }
+}
+
+/// Images of a part of a step, with the maps that the network should make of them.
+#[derive(Debug)]
+pub struct DetectorBatch(Vec<Prepared>);
+
+impl Task<Network> for DetectorTask {
+    type Batch = DetectorBatch;
+
+    fn batch(&self, positions: Range<u64>) -> Result<DetectorBatch> {
+        let pairs = self.pairs(positions.clone())?;
+        let prepare = |(pair, position): (&Pair, u64)| {
+            let draw = &mut Draw::new(self.seed ^ TURNED, position);
+            Prepared::new(&Sample::of_pair(pair).turned(draw))
+        };
+        let pairs: Vec<(&Pair, u64)> = pairs.iter().zip(positions).collect();
+        Ok(DetectorBatch(pairs.into_par_iter().map(prepare).collect()))
+    }
+
+    fn loss(&self, model: &Network, device: &Device, batch: &DetectorBatch) -> (Tensor<1>, Terms) {
+        let batch = Batch::new(&batch.0, device);
+        let (loss, terms) = batch.loss(model.forward(batch.images.clone()));
+        let names = ["tips", "lines", "directions", "extents"];
+        let terms = names.into_iter().zip(terms);
+        (
+            loss,
+            terms.map(|(name, term)| (name, number(&term))).collect(),
+        )
+    }
+}
+
+/// How a detector is learnt from images made on the fly.
+#[derive(Debug, Clone, Default)]
+pub struct DetectorTraining {
     /// What the images show.
     pub recipe: Recipe,
-    /// Weights to begin with; without them random ones.
+    /// Different images, which come again when all were seen; `None`: all are different.
+    pub distinct: Option<usize>,
+    /// Weights to begin with; `None`: random ones.
     pub weights: Option<PathBuf>,
-    /// Seed of images and first weights.
-    pub seed: u64,
-    /// Largest step of the optimizer.
-    pub rate: f64,
-    /// Steps between checkpoints.
-    pub every: usize,
+    /// How it runs.
+    pub options: StageOptions,
 }
 
-impl Default for Training {
-    fn default() -> Self {
-        Self {
-            images: 40_000,
-            distinct: None,
-            recipe: Recipe::Mixed,
-            weights: None,
-            seed: 7,
-            rate: 2e-3,
-            every: 100,
-        }
-    }
-}
-
-impl Training {
-    /// Steps of the whole run.
-    #[must_use]
-    pub fn steps(&self) -> usize {
-        self.images.div_ceil(BATCH)
-    }
-
-    fn trainer_options(&self) -> TrainerOptions {
-        let steps = self.steps();
-        TrainerOptions {
-            rate: Rate {
-                peak: self.rate,
-                warmup: 100.min(steps),
-                steps,
-            },
-            adam: AdamOptions {
-                weight_decay: 1e-3,
-                ..AdamOptions::default()
-            },
-            largest_norm: 5.0,
-            average_decay: 0.995,
-            ..TrainerOptions::default()
-        }
-    }
-}
-
-/// Trains, and writes `detector.safetensors` (averaged weights, which [`Detector::load`](wake_detector::Detector::load) takes),
-/// `train.jsonl` and `checkpoints/` into a folder, which is made if absent. A run that was killed goes on from its last
-/// checkpoint there.
-///
-/// - `done`: told the number of steps after each
-///
-/// # Errors
-///
-/// [`Error::Model`] for numbers out of range, a folder that cannot be written, checkpoints of another run, and gradients that
-/// stay infinite; [`Error::WrongMaps`] for first weights as [`Detector::load`](crate::Detector::load).
-pub fn train(
-    training: &Training,
-    device: &Device,
-    out: &Path,
-    mut done: impl FnMut(usize),
-) -> Result<()> {
-    let options = training.trainer_options();
-    options.validate()?;
-    let device = device.clone().autodiff();
-    device.seed(training.seed);
-    let steps = training.steps();
-    let network = match &training.weights {
-        Some(file) => {
-            let network = load(Network::new(&device), Layout::Diffusers, file)?;
-            self_check(&network, file, &device)?;
-            network
-        }
-        None => Network::new(&device),
-    };
-    let mut trainer = Trainer::new(network, options, vec![device]);
-    let state = json!({
-        "seed": training.seed, "recipe": training.recipe.name(), "images": training.images, "batch": BATCH,
-        "distinct": training.distinct, "size": SIZE, "rate": training.rate, "weights": training.weights,
-    });
-    let checkpoints = out.join("checkpoints");
-    if let Some(checkpoint) = Checkpoint::newest(&checkpoints)? {
-        trainer.restore(checkpoint, &state)?;
-    }
-    std::fs::create_dir_all(out).map_err(|source| wake_nn::Error::Io {
-        action: "make",
-        path: out.to_owned(),
-        source,
-    })?;
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let source = training.recipe.source(training.seed, SIZE)?;
-    let source: Arc<dyn Source> = match training.distinct {
-        Some(count) => Arc::new(Repeated::new(source, count)),
-        None => source,
-    };
-    let mut batches = Loader::new(source)
-        .batch(BATCH)
-        .threads(threads)
-        .start(trainer.steps() as u64)
-        .on(&device_named("flex")?)?;
-    let mut metrics = Metrics::open(&out.join("train.jsonl"), trainer.steps())?;
-    let mut prepare = |step: usize| prepared(&mut batches, step, training.seed);
-    let mut next = prepare(trainer.steps())?;
-    while trainer.steps() < steps {
-        let samples = std::mem::take(&mut next);
-        let parts = Mutex::new([0.0f32; 4]);
-        // The next images are made while the network learns from these.
-        let (report, following) = {
-            let step = trainer.steps() + 1;
-            std::thread::scope(|scope| {
-                let maker = scope.spawn(|| match step < steps {
-                    true => prepare(step),
-                    false => Ok(Vec::new()),
-                });
-                let report = trainer.step(|model, device, _| {
-                    let batch = Batch::new(&samples, device);
-                    let (loss, terms) = batch.loss(model.forward(batch.images.clone()));
-                    let terms = terms.map(|term| term.inner().into_scalar::<f32>());
-                    *parts.lock().unwrap_or_else(PoisonError::into_inner) = terms;
-                    loss
-                });
-                let following = maker
-                    .join()
-                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-                (report, following)
-            })
+impl DetectorTraining {
+    /// Makes all steps. Writes `detector.safetensors` (averaged weights, which
+    /// [`Detector::load`](wake_detector::Detector::load) takes), a log, and what a [`RunFolder`] has; a run that was killed goes
+    /// on from its last checkpoint.
+    ///
+    /// # Errors
+    ///
+    /// As [`RunOptions::validate`], [`RunFolder::open`] and [`Stage::train`];
+    /// [`wake_detector::Error::WrongMaps`] for first weights as [`Detector::load`](wake_detector::Detector::load).
+    pub fn train(&self, out: &Path, progress: &dyn Fn(Progress)) -> Result<()> {
+        let options = &self.options;
+        let constants = self.constants()?;
+        let device = options.device();
+        let source = self.recipe.source(options.seed, SIZE, &device)?;
+        let source: Arc<dyn Source> = match self.distinct {
+            Some(count) => Arc::new(Repeated::new(source, count)),
+            None => source,
         };
-        trainer.check()?;
-        next = following?;
-        let [tips, lines, directions, extents] =
-            parts.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let more =
-            json!({"tips": tips, "lines": lines, "directions": directions, "extents": extents});
-        metrics.write(trainer.steps(), steps, report, &more)?;
-        done(trainer.steps());
-        if trainer.steps().is_multiple_of(training.every.max(1)) || trainer.steps() == steps {
-            trainer.checkpoint(&state)?.write(&checkpoints)?;
-            save(&trainer.averaged(), &out.join("detector.safetensors"))?;
-        }
+        let task = DetectorTask::new(source, options.seed);
+        let devices = options.learning_devices()?;
+        let begun = match &self.weights {
+            Some(file) => {
+                let network = load(Network::new(&devices[0]), Layout::Diffusers, file)?;
+                self_check(&network, file, &devices[0])?;
+                Some(network)
+            }
+            None => None,
+        };
+        let model = json!({"size": SIZE});
+        let begin = (STAGE, options.resume);
+        let mut folder = RunFolder::open(out, &model, &constants.identity, begin)?;
+        let init = |device: &Device| begun.unwrap_or_else(|| Network::new(device));
+        let run = Run::of(STAGE, &model, init, constants, devices)?;
+        let show = |run: &Run<Network>| -> Result<()> {
+            let file = out.join(WEIGHTS);
+            Ok(save_as(
+                &run.averaged(),
+                Layout::Diffusers,
+                &file,
+                Precision::F16,
+            )?)
+        };
+        let stage = Stage {
+            name: STAGE,
+            resume: options.resume,
+            every: options.every,
+            steps: options.steps(&USUAL),
+            results: &[WEIGHTS],
+        };
+        stage.train(&mut folder, run, &task, progress, show)
     }
-    Ok(())
-}
 
-/// Writes weights as they ship: 16 bits.
-fn save(network: &Network, path: &Path) -> Result<()> {
-    save_as(network, Layout::Diffusers, path, Precision::F16).map_err(Error::from)
-}
-
-/// The images of a step, turned and mirrored as the geometry of other passes would.
-fn prepared(batches: &mut Batches, step: usize, seed: u64) -> Result<Vec<Prepared>> {
-    let Some(batch) = batches.next().transpose()? else {
-        return Ok(Vec::new());
-    };
-    let samples = Sample::of_batch(batch).into_par_iter().enumerate();
-    let prepare = |(k, sample): (usize, Sample)| {
-        let draw = &mut Draw::new(seed ^ 0x5151, (step * BATCH + k) as u64);
-        Prepared::new(&sample.turned(draw))
-    };
-    Ok(samples.map(prepare).collect())
+    /// The run, checked before anything is made.
+    fn constants(&self) -> Result<RunOptions> {
+        let mut constants = self.options.run(&USUAL, Value::Null);
+        let trainer = &mut constants.trainer;
+        trainer.rate.warmup = trainer.rate.warmup.min(trainer.rate.steps);
+        trainer.adam.weight_decay = 1e-3;
+        trainer.largest_norm = 5.0;
+        trainer.average_decay = 0.995;
+        constants.validate(self.options.devices.len())?;
+        let weights = self.weights.as_deref().map(fingerprint).transpose()?;
+        constants.identity = json!({
+            "recipe": self.recipe.name(), "distinct": self.distinct, "weights": weights,
+        });
+        Ok(constants)
+    }
 }

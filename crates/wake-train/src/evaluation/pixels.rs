@@ -86,7 +86,7 @@ impl PixelTally {
             .push(ssim(&planes[0], &planes[1], 1.0, SsimWindow::Gaussian));
         self.psnr.push(psnr(&planes[0], &planes[1], 1.0));
         if let Some(lpips) = lpips {
-            let [a, b] = [reference, image].map(colour);
+            let [a, b] = [reference, image].map(|field| colour(field, lpips.device()));
             self.lpips
                 .extend(lpips.distance(a, b).iter().map(|d| d.total));
         }
@@ -141,9 +141,9 @@ fn deviation(image: &Field) -> f64 {
 }
 
 /// Grey as the three equal channels that a network for photographs takes.
-fn colour(image: &Field) -> Tensor<4> {
+fn colour(image: &Field, device: &Device) -> Tensor<4> {
     let data = TensorData::new(image.values.repeat(3), [1, 3, image.rows, image.columns]);
-    Tensor::from_data(data, &Device::default())
+    Tensor::from_data(data, device)
 }
 
 #[cfg(test)]

@@ -1,64 +1,80 @@
-//! Batches of pairs of a data set, as a latent diffusion model takes them.
-
-use burn::tensor::{Device, Int, Tensor, TensorData};
+//! Pairs of a data set, as a latent diffusion model takes them.
 
 use crate::error::Result;
 use crate::streams;
-use wake_dataset::{Folder, Pair};
-use wake_ldm::pipeline::{PipelineParts, token_ids};
+use wake_dataset::{Folder, Grey, Pair};
+use wake_ldm::pipeline::token_ids;
 use wake_nn::noise::NoiseSource;
+use wake_text::Tokenizer;
 
 /// Part of the pairs whose prompt is left out, for guidance.
-const WITHOUT_PROMPT: f64 = 0.1;
+pub(crate) const WITHOUT_PROMPT: f64 = 0.1;
 
-/// Pairs that are drawn from a folder with a seed, each as likely as every other, a tenth of them without their prompts.
+/// An image beside its prompt in tokens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prompted {
+    /// The image, 0 to 1.
+    pub image: Grey,
+    /// Ids of the prompt, marks and padding included.
+    pub ids: Vec<i32>,
+}
+
+/// Where prompted images come from: a function of the position alone.
+pub trait PromptedSource: Sync {
+    /// The one at a position of a run; all have one size and one number of tokens.
+    ///
+    /// # Errors
+    ///
+    /// Those of what it reads.
+    fn at(&self, position: u64) -> Result<Prompted>;
+}
+
+/// Pairs of a folder's `trainset.txt`, drawn with a seed, each as likely as every other, a tenth of them without their prompts.
 ///
 /// # References
 ///
 /// Ho & Salimans (2021), "Classifier-Free Diffusion Guidance", algorithm 1 (prompts left out).
 #[derive(Debug)]
-pub struct PromptedBatches<'a> {
-    /// At least one pair.
-    pub data: &'a Folder,
-    /// Whose tokenizer reads the prompts, and whose autoencoder takes the images.
-    pub parts: &'a PipelineParts,
-    /// Images of a batch.
-    pub batch: usize,
-    /// Seed of what is drawn.
-    pub seed: u64,
+pub struct PromptedPairs<'a> {
+    data: &'a Folder,
+    positions: Vec<u64>,
+    tokenizer: Option<&'a Tokenizer>,
+    seed: u64,
 }
 
-impl PromptedBatches<'_> {
-    /// The images and the ids of the prompts of a step.
-    ///
-    /// # Shapes
-    ///
-    /// `[batch, image channels, rows, columns]` in −1…1, and `[batch, tokens]`, on `device`
-    ///
-    /// # Errors
-    ///
-    /// As [`Folder::pair`].
-    pub fn of_step(&self, step: usize, device: &Device) -> Result<(Tensor<4>, Tensor<2, Int>)> {
-        let random = NoiseSource::new(self.seed);
-        let tokenizer = self.parts.tokenizer.as_ref();
-        let (mut pixels, mut ids, mut size) = (Vec::new(), Vec::new(), [0, 0]);
-        for position in (step * self.batch..(step + 1) * self.batch).map(|p| p as u64) {
-            let draw = random.uniform(streams::PAIRS, position);
-            let number = (draw * self.data.len() as f64) as u64;
-            let Pair { image, prompt, .. } = self.data.pair(number)?;
-            size = [image.rows, image.columns];
-            pixels.extend(image.pixels.iter().map(|grey| 2.0 * grey - 1.0));
-            let told = random.uniform(streams::UNTOLD, position) >= WITHOUT_PROMPT;
-            ids.extend(token_ids(tokenizer, if told { &prompt } else { "" }));
+impl<'a> PromptedPairs<'a> {
+    /// Those of a folder; a tokenizer of `None` is CLIP's own.
+    #[must_use]
+    pub fn new(data: &'a Folder, tokenizer: Option<&'a Tokenizer>, seed: u64) -> Self {
+        Self {
+            data,
+            positions: data.trainset(),
+            tokenizer,
+            seed,
         }
-        let images = TensorData::new(pixels, [self.batch, 1, size[0], size[1]]);
-        let images: Tensor<4> = Tensor::from_data(images, device);
-        let channels = self.parts.autoencoder.image_channels();
-        let tokens = ids.len() / self.batch.max(1);
-        let ids = TensorData::new(ids, [self.batch, tokens]);
-        Ok((
-            images.repeat_dim(1, channels),
-            Tensor::from_data(ids, device),
-        ))
+    }
+
+    /// Number of pairs that are drawn from.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+}
+
+impl PromptedSource for PromptedPairs<'_> {
+    fn at(&self, position: u64) -> Result<Prompted> {
+        let random = NoiseSource::new(self.seed);
+        let draw = random.uniform(streams::PAIRS, position);
+        let number = self.positions[(draw * self.len() as f64) as usize];
+        let Pair { image, prompt, .. } = self.data.pair(number)?;
+        let told = random.uniform(streams::UNTOLD, position) >= WITHOUT_PROMPT;
+        let ids = token_ids(self.tokenizer, if told { &prompt } else { "" });
+        Ok(Prompted { image, ids })
     }
 }

@@ -3,14 +3,13 @@
 mod batches;
 mod training;
 
-use std::path::{Path, PathBuf};
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use burn::module::Module;
-use burn::tensor::{Device, Int, Tensor, TensorData};
-use serde_json::{Value, json};
+use burn::tensor::{Device, Tensor, TensorData};
 
-use super::checkpoint::Checkpoint;
-use super::trainer::{StepReport, Trainer, TrainerOptions};
+use super::run::{Task, Terms};
 use crate::error::{Error, Result};
 use crate::streams::{self, FINE_TUNE_STREAM};
 use wake_ldm::autoencoder::AutoencoderKl;
@@ -20,261 +19,246 @@ use wake_ldm::streams::POSTERIOR_STREAM;
 use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetInput};
 use wake_nn::noise::{NoiseSource, normal_batch};
-use wake_nn::weights::Layout;
 
-pub use batches::PromptedBatches;
+pub(crate) use batches::WITHOUT_PROMPT;
+pub use batches::{Prompted, PromptedPairs, PromptedSource};
 pub use training::FineTuning;
 
-/// Constants of a [`FineTune`] run.
+/// The parts of the model that do not learn, outside autodiff.
 #[derive(Debug, Clone)]
-pub struct FineTuneOptions {
-    /// What the U-Net predicts.
-    pub prediction: Prediction,
-    /// γ of the min-SNR weights; without it every step counts the same.
-    pub snr_gamma: Option<f64>,
-    /// Seed of everything that is drawn.
-    pub seed: u64,
-    /// What is fitted to what, such as the weights begun with and the manifest of the data set: a checkpoint of another
-    /// is refused.
-    pub identity: Value,
-    /// The loop.
-    pub trainer: TrainerOptions,
-}
-
-/// The parts of the model that do not learn.
-#[derive(Debug)]
 pub struct Frozen {
     /// Words to tokens.
     pub text: ClipText,
     /// Images to latents.
     pub autoencoder: AutoencoderKl,
-    /// How much noise each step has.
-    pub schedule: NoiseSchedule,
 }
 
-/// What learns.
-#[derive(Debug)]
-enum Learning {
-    Whole(Box<Trainer<UNet>>),
-    Changes(Box<Trainer<LowRank>>, Box<UNet>),
+impl Frozen {
+    fn on(&self, device: &Device) -> Self {
+        Self {
+            text: self.text.clone().to_device(device),
+            autoencoder: self.autoencoder.clone().to_device(device),
+        }
+    }
 }
 
-/// A run that fits a latent diffusion model to other images.
+/// Fitting a latent diffusion model to other images: a task for a [`UNet`], and for low-rank changes of one.
 ///
 /// ```text
 /// x = √ᾱₜ x₀ + √(1 − ᾱₜ) n,    loss = w(t) |model(x, t, words) − target|²
 /// ```
 ///
-/// The target is n, or √ᾱₜ n − √(1 − ᾱₜ) x₀; images are encoded and prompts read without gradients.
+/// The target is n, or √ᾱₜ n − √(1 − ᾱₜ) x₀, or x₀; images are encoded and prompts read without gradients.
 ///
 /// # References
 ///
 /// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models", Eq. 2; Salimans & Ho
 /// (2022), appendix D (velocity); Hang et al. (2023), section 3.4 (weights).
 #[derive(Debug)]
-pub struct FineTune {
-    learning: Learning,
-    frozen: Frozen,
-    options: FineTuneOptions,
-    device: Device,
+pub struct FineTuneTask<S> {
+    source: S,
+    schedule: NoiseSchedule,
+    prediction: Prediction,
+    snr_gamma: Option<f64>,
+    seed: u64,
+    places: Vec<OnDevice>,
 }
 
-impl FineTune {
-    /// A run that changes all weights of the U-Net, on an autodiff device.
+/// What does not learn, on one device.
+#[derive(Debug)]
+struct OnDevice {
+    /// In autodiff.
+    device: Device,
+    // Weights are shared by cheap copies, which one thread at a time makes.
+    frozen: Mutex<(Frozen, Option<UNet>)>,
+}
+
+impl<S: PromptedSource> FineTuneTask<S> {
+    /// Fits to images of a source.
+    ///
+    /// - `schedule`: how much noise each step has
+    /// - `prediction`: what the U-Net predicts
+    /// - `devices`: autodiff devices that a run learns on
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Unsupported`] for the prediction of a flow, which mixes noise and image along a line and not with √ᾱ;
-    /// else as [`TrainerOptions::validate`].
-    pub fn whole(
-        unet: UNet,
-        frozen: Frozen,
-        options: FineTuneOptions,
-        device: &Device,
+    /// [`wake_nn::Error::Unsupported`] for the prediction of a flow, which mixes noise and image along a line and not with √ᾱ.
+    pub fn new(
+        source: S,
+        frozen: &Frozen,
+        (schedule, prediction): (NoiseSchedule, Prediction),
+        seed: u64,
+        devices: &[Device],
     ) -> Result<Self> {
-        check(&options)?;
-        let trainer = Trainer::new(unet.train(), options.trainer, vec![device.clone()]);
-        let learning = Learning::Whole(Box::new(trainer));
-        Ok(Self::new(learning, frozen, options, device))
-    }
-
-    /// A run that leaves the U-Net as it is and learns changes of rank `rank` of its attentions, which begin as the seed of the
-    /// options says.
-    ///
-    /// # Errors
-    ///
-    /// As [`whole`](Self::whole) and [`LowRank::of_attentions`].
-    pub fn low_rank(
-        unet: UNet,
-        rank: usize,
-        frozen: Frozen,
-        options: FineTuneOptions,
-        device: &Device,
-    ) -> Result<Self> {
-        check(&options)?;
-        let unet = unet.no_grad().train().fork(device);
-        device.seed(options.seed);
-        let changes = LowRank::of_attentions(&unet, Layout::Diffusers, rank)?;
-        let trainer = Trainer::new(changes, options.trainer, vec![device.clone()]);
-        let learning = Learning::Changes(Box::new(trainer), Box::new(unet));
-        Ok(Self::new(learning, frozen, options, device))
-    }
-
-    fn new(learning: Learning, frozen: Frozen, options: FineTuneOptions, device: &Device) -> Self {
-        Self {
-            learning,
-            frozen,
-            options,
+        if prediction == Prediction::Flow {
+            return Err(Error::Value(wake_nn::Error::Unsupported {
+                option: "prediction of a fine-tuned model".to_owned(),
+                value: "flow".to_owned(),
+                supported: "noise, velocity, sample".to_owned(),
+            }));
+        }
+        let place = |device: &Device| OnDevice {
             device: device.clone(),
-        }
-    }
-
-    /// Steps made so far.
-    pub fn steps(&self) -> usize {
-        match &self.learning {
-            Learning::Whole(trainer) => trainer.steps(),
-            Learning::Changes(trainer, _) => trainer.steps(),
-        }
-    }
-
-    /// Writes a checkpoint of what learns.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Diverged`] for weights that are no finite numbers, else as [`Checkpoint::write`].
-    pub fn checkpoint(&self, folder: &Path) -> Result<PathBuf> {
-        let checkpoint = match &self.learning {
-            Learning::Whole(trainer) => trainer.checkpoint(&self.state())?,
-            Learning::Changes(trainer, _) => trainer.checkpoint(&self.state())?,
+            frozen: Mutex::new((frozen.on(&device.clone().inner()), None)),
         };
-        checkpoint.write(folder)
-    }
-
-    /// Goes on where a checkpoint left off, on the same curve if the batches are the same.
-    ///
-    /// # Errors
-    ///
-    /// [`wake_nn::Error::InvalidOption`] with the first value in which the checkpoint's run differs from this one.
-    pub fn resume(&mut self, checkpoint: Checkpoint) -> Result<()> {
-        let state = self.state();
-        match &mut self.learning {
-            Learning::Whole(trainer) => trainer.restore(checkpoint, &state),
-            Learning::Changes(trainer, _) => trainer.restore(checkpoint, &state),
-        }
-    }
-
-    /// What two runs must have in common for one to go on from the other.
-    fn state(&self) -> Value {
-        json!({
-            "part": "fine-tune",
-            "prediction": format!("{:?}", self.options.prediction),
-            "snr_gamma": self.options.snr_gamma,
-            "seed": self.options.seed,
-            "identity": self.options.identity,
-            "trainer": self.options.trainer.state(),
-            "low_rank": matches!(self.learning, Learning::Changes(..)),
+        Ok(Self {
+            source,
+            schedule,
+            prediction,
+            snr_gamma: None,
+            seed,
+            places: devices.iter().map(place).collect(),
         })
     }
 
-    /// The U-Net with averaged weights, or with averaged changes merged into it.
-    pub fn unet(&self) -> UNet {
-        match &self.learning {
-            Learning::Whole(trainer) => trainer.averaged(),
-            Learning::Changes(trainer, unet) => trainer.averaged().merged(unet.valid()),
-        }
+    /// Weighs steps by their signal-to-noise ratio, no more than γ; without it every step counts the same.
+    #[must_use]
+    pub fn with_snr_gamma(mut self, gamma: Option<f64>) -> Self {
+        self.snr_gamma = gamma;
+        self
     }
 
-    /// The averaged changes of a low-rank run.
-    pub fn changes(&self) -> Option<LowRank> {
-        match &self.learning {
-            Learning::Whole(_) => None,
-            Learning::Changes(trainer, _) => Some(trainer.averaged()),
+    /// Learns low-rank changes of this U-Net, which stays as it is.
+    #[must_use]
+    pub fn with_base(self, unet: &UNet) -> Self {
+        for place in &self.places {
+            let unet = unet.clone().no_grad().train().fork(&place.device);
+            lock(&place.frozen).1 = Some(unet);
         }
+        self
     }
 
-    /// One step.
-    ///
-    /// # Shapes
-    ///
-    /// - `images`: `[batch, image channels, rows, columns]` in −1…1
-    /// - `ids`: `[batch, tokens]`
-    ///
-    /// both outside autodiff.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Diverged`] when many steps in a row, or all of the run, had no finite loss and gradient.
-    pub fn step(&mut self, images: Tensor<4>, ids: Tensor<2, Int>) -> Result<StepReport> {
-        let task = self.task(images, ids);
-        match &mut self.learning {
-            Learning::Whole(trainer) => {
-                let report = trainer.step(|unet, _, _| task.loss(unet));
-                trainer.check().map(|()| report)
-            }
-            Learning::Changes(trainer, unet) => {
-                let unet = std::sync::Mutex::new(unet.clone());
-                let report = trainer.step(|changes, _, _| {
-                    let unet = unet
-                        .lock()
-                        .unwrap_or_else(std::sync::PoisonError::into_inner);
-                    task.loss(&changes.merged((**unet).clone()))
-                });
-                trainer.check().map(|()| report)
-            }
-        }
+    /// The models that do not learn, where a loss is computed.
+    fn frozen_on(&self, device: &Device) -> (Frozen, Option<UNet>) {
+        let mut places = self.places.iter();
+        let there = places.find(|place| place.device == *device);
+        let there = there.expect("a run learns on the devices that its task was made for");
+        lock(&there.frozen).clone()
     }
 
-    /// What the next step asks the model.
-    fn task(&self, images: Tensor<4>, ids: Tensor<2, Int>) -> Task {
-        let [batch, ..] = images.dims();
-        let first = (self.steps() * batch) as u64;
-        let random = NoiseSource::new(self.options.seed);
-        let autoencoder = &self.frozen.autoencoder;
-        let posterior = autoencoder.encode(images);
+    /// What a batch asks the model.
+    fn question(&self, frozen: &Frozen, batch: &PromptedBatch, device: &Device) -> Question {
+        let inner = device.clone().inner();
+        let (positions, count) = (batch.positions.clone(), batch.steps.len());
+        let images = Tensor::<4>::from_data(batch.images.clone(), &inner);
+        let images = images.repeat_dim(1, frozen.autoencoder.image_channels());
+        let posterior = frozen.autoencoder.encode(images);
         let [_, channels, rows, columns] = posterior.mode().dims();
-        let sources: Vec<NoiseSource> = (0..batch as u64)
-            .map(|i| NoiseSource::new(self.options.seed.wrapping_add((first + i) << 16)))
+        let sources: Vec<NoiseSource> = positions
+            .map(|position| NoiseSource::new(self.seed.wrapping_add(position << 16)))
             .collect();
-        let inner = self.device.clone().inner();
         let draw = |stream| normal_batch(&sources, stream, [channels, rows, columns], &inner);
-        let clean = autoencoder.to_latents(posterior.sample(draw(POSTERIOR_STREAM)));
+        let clean = frozen
+            .autoencoder
+            .to_latents(posterior.sample(draw(POSTERIOR_STREAM)));
         let noise = draw(FINE_TUNE_STREAM);
-        let count = self.frozen.schedule.steps() as f64;
-        let steps: Vec<usize> = (0..batch as u64)
-            .map(|i| (random.uniform(streams::STEPS, first + i) * count) as usize)
-            .collect();
-        let context = self.frozen.text.last_hidden_state(ids);
-        self.mixed(&steps, clean, noise, context)
+        let ids = Tensor::from_data(batch.ids.clone(), &inner);
+        let context = frozen.text.last_hidden_state(ids);
+        let noised = noised(&self.schedule, self.prediction, &batch.steps, clean, noise);
+        let levels = batch.steps.iter().map(|&t| self.schedule.noise_level(t));
+        let snr: Vec<f64> = levels.map(|l| (l.signal / l.noise).powi(2)).collect();
+        let weights = self.snr_gamma.map_or_else(
+            || vec![1.0; count],
+            |gamma| min_snr_weights(&snr, gamma, self.prediction),
+        );
+        Question {
+            input: UNetInput {
+                sample: Tensor::from_inner(noised.sample),
+                timesteps: Tensor::from_inner(noised.timesteps),
+                context: Some(Tensor::from_inner(context)),
+                condition: None,
+            },
+            target: Tensor::from_inner(noised.target),
+            weights: Tensor::from_inner(each(weights, &inner)),
+        }
     }
 
-    fn mixed(
-        &self,
-        steps: &[usize],
-        clean: Tensor<4>,
-        noise: Tensor<4>,
-        context: Tensor<3>,
-    ) -> Task {
-        let noised = noised(
-            &self.frozen.schedule,
-            self.options.prediction,
-            steps,
-            clean,
-            noise,
-        );
-        let levels = steps.iter().map(|&t| self.frozen.schedule.noise_level(t));
-        let snr: Vec<f64> = levels.map(|l| (l.signal / l.noise).powi(2)).collect();
-        let weights = self.options.snr_gamma.map_or_else(
-            || vec![1.0; steps.len()],
-            |gamma| min_snr_weights(&snr, gamma, self.options.prediction),
-        );
-        let device = noised.sample.device();
-        Task {
-            sample: Tensor::from_inner(noised.sample),
-            timesteps: Tensor::from_inner(noised.timesteps),
-            context: Tensor::from_inner(context),
-            target: Tensor::from_inner(noised.target),
-            weights: Tensor::from_inner(each(weights, &device)),
+    fn batch_at(&self, positions: Range<u64>) -> Result<PromptedBatch> {
+        let random = NoiseSource::new(self.seed);
+        let count = (positions.end - positions.start) as usize;
+        let (mut pixels, mut ids, mut size) = (Vec::new(), Vec::new(), [0, 0]);
+        for position in positions.clone() {
+            let pair = self.source.at(position)?;
+            size = [pair.image.rows, pair.image.columns];
+            pixels.extend(pair.image.pixels.iter().map(|grey| 2.0 * grey - 1.0));
+            ids.extend(pair.ids);
         }
+        let tokens = ids.len() / count.max(1);
+        let levels = self.schedule.steps() as f64;
+        let step = |position| (random.uniform(streams::STEPS, position) * levels) as usize;
+        Ok(PromptedBatch {
+            images: TensorData::new(pixels, [count, 1, size[0], size[1]]),
+            ids: TensorData::new(ids, [count, tokens]),
+            steps: positions.clone().map(step).collect(),
+            positions,
+        })
+    }
+}
+
+/// Images and prompts at some positions of a run.
+#[derive(Debug)]
+pub struct PromptedBatch {
+    /// `[batch, 1, rows, columns]` in −1…1.
+    images: TensorData,
+    /// `[batch, tokens]`
+    ids: TensorData,
+    /// The step of the schedule of each.
+    steps: Vec<usize>,
+    positions: Range<u64>,
+}
+
+impl<S: PromptedSource> Task<UNet> for FineTuneTask<S> {
+    type Batch = PromptedBatch;
+
+    fn batch(&self, positions: Range<u64>) -> Result<PromptedBatch> {
+        self.batch_at(positions)
+    }
+
+    fn loss(&self, unet: &UNet, device: &Device, batch: &PromptedBatch) -> (Tensor<1>, Terms) {
+        let (frozen, _) = self.frozen_on(device);
+        let question = self.question(&frozen, batch, device);
+        (question.loss(unet), Terms::new())
+    }
+}
+
+impl<S: PromptedSource> Task<LowRank> for FineTuneTask<S> {
+    type Batch = PromptedBatch;
+
+    fn batch(&self, positions: Range<u64>) -> Result<PromptedBatch> {
+        self.batch_at(positions)
+    }
+
+    /// # Panics
+    ///
+    /// Without [`with_base`](FineTuneTask::with_base).
+    fn loss(
+        &self,
+        changes: &LowRank,
+        device: &Device,
+        batch: &PromptedBatch,
+    ) -> (Tensor<1>, Terms) {
+        let (frozen, unet) = self.frozen_on(device);
+        let unet = unet.expect("changes are learnt of a U-Net");
+        let question = self.question(&frozen, batch, device);
+        (question.loss(&changes.merged(unet)), Terms::new())
+    }
+}
+
+fn lock<T>(value: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    value.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What a batch asks the model, and the answer.
+struct Question {
+    input: UNetInput,
+    target: Tensor<4>,
+    weights: Tensor<4>,
+}
+
+impl Question {
+    fn loss(self, unet: &UNet) -> Tensor<1> {
+        let error = unet.forward(self.input) - self.target;
+        (error.square() * self.weights).mean()
     }
 }
 
@@ -321,18 +305,6 @@ fn each(values: Vec<f64>, device: &Device) -> Tensor<4> {
     Tensor::from_data(TensorData::new(numbers, [count, 1, 1, 1]), device)
 }
 
-/// Refuses what no step can be made with.
-fn check(options: &FineTuneOptions) -> Result<()> {
-    if options.prediction == Prediction::Flow {
-        return Err(Error::Value(wake_nn::Error::Unsupported {
-            option: "prediction of a fine-tuned model".to_owned(),
-            value: "flow".to_owned(),
-            supported: "noise, velocity, sample".to_owned(),
-        }));
-    }
-    options.trainer.validate()
-}
-
 /// Weights of the squared error at each signal-to-noise ratio.
 ///
 /// ```text
@@ -352,28 +324,6 @@ fn min_snr_weights(snr: &[f64], gamma: f64, prediction: Prediction) -> Vec<f64> 
         _ => gamma / snr,
     };
     snr.iter().map(weight).collect()
-}
-
-/// A batch of noisy latents and what the model should say of them.
-struct Task {
-    sample: Tensor<4>,
-    timesteps: Tensor<1>,
-    context: Tensor<3>,
-    target: Tensor<4>,
-    weights: Tensor<4>,
-}
-
-impl Task {
-    fn loss(&self, unet: &UNet) -> Tensor<1> {
-        let input = UNetInput {
-            sample: self.sample.clone(),
-            timesteps: self.timesteps.clone(),
-            context: Some(self.context.clone()),
-            condition: None,
-        };
-        let error = unet.forward(input) - self.target.clone();
-        (error.square() * self.weights.clone()).mean()
-    }
 }
 
 #[cfg(all(test, feature = "flex"))]

@@ -3,15 +3,18 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use burn::module::Module;
-use burn::tensor::{Device, Int, Tensor};
+use burn::tensor::{Device, Tensor};
+use serde_json::{Value, json};
+use wake_dataset::Grey;
 
 use super::*;
 use crate::tensors::values;
-use crate::{Rate, TrainerOptions};
+use crate::{Checkpoint, Rate, Run, RunOptions, TrainerOptions};
 use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::scheduler::{BetaCurve, NoiseSchedule, Prediction, TerminalSnr};
 use wake_ldm::text::ClipTextConfig;
-use wake_ldm::unet::{UNet, UNetConfig};
+use wake_ldm::unet::UNetConfig;
+use wake_nn::weights::Layout;
 
 const BATCH: usize = 4;
 
@@ -26,7 +29,6 @@ fn unet(device: &Device) -> UNet {
 }
 
 fn frozen(device: &Device) -> Frozen {
-    let curve = BetaCurve::ScaledLinear(0.00085, 0.012);
     let text = ClipTextConfig::new()
         .with_vocab_size(16)
         .with_hidden_size(8)
@@ -39,14 +41,38 @@ fn frozen(device: &Device) -> Frozen {
             .with_block_out_channels(vec![8, 8])
             .with_norm_groups(4)
             .init(device),
-        schedule: NoiseSchedule::new(&curve, 1000, TerminalSnr::Zero).unwrap(),
     }
 }
 
-fn options(prediction: Prediction, peak: f64) -> FineTuneOptions {
-    FineTuneOptions {
-        prediction,
-        snr_gamma: Some(5.0),
+fn schedule() -> NoiseSchedule {
+    let curve = BetaCurve::ScaledLinear(0.00085, 0.012);
+    NoiseSchedule::new(&curve, 1000, TerminalSnr::Zero).unwrap()
+}
+
+/// Four waves, again and again, each with words of its own.
+#[derive(Debug)]
+struct Waves;
+
+impl PromptedSource for Waves {
+    fn at(&self, position: u64) -> Result<Prompted> {
+        let number = position % BATCH as u64;
+        let wave = (0..1024u64).map(|n| 0.5 + 0.5 * (0.37 * (1024 * number + n) as f32).sin());
+        let ids = (0..4).map(|n| (4 * number + n) as i32);
+        let image = Grey {
+            rows: 32,
+            columns: 32,
+            pixels: wave.collect(),
+        };
+        Ok(Prompted {
+            image,
+            ids: ids.collect(),
+        })
+    }
+}
+
+fn options(peak: f64, accumulation: usize) -> RunOptions {
+    RunOptions {
+        batch: BATCH,
         seed: 1,
         identity: Value::Null,
         trainer: TrainerOptions {
@@ -55,22 +81,44 @@ fn options(prediction: Prediction, peak: f64) -> FineTuneOptions {
                 warmup: 2,
                 steps: 100,
             },
+            accumulation,
             ..TrainerOptions::default()
         },
     }
 }
 
-fn batch(device: &Device) -> (Tensor<4>, Tensor<2, Int>) {
-    let x = Tensor::<1, Int>::arange(0..(BATCH * 1024) as i64, device).float();
-    let images = (x * 0.37).sin().reshape([BATCH, 1, 32, 32]);
-    let ids = Tensor::<1, Int>::arange(0..(BATCH * 4) as i64, device).reshape([BATCH, 4]);
-    (images, ids)
+fn learning(workers: usize) -> Vec<Device> {
+    vec![Device::flex().autodiff(); workers]
 }
 
-fn losses(run: &mut FineTune, steps: usize) -> Vec<f64> {
+fn task(prediction: Prediction, frozen: &Frozen) -> FineTuneTask<Waves> {
+    let task = FineTuneTask::new(Waves, frozen, (schedule(), prediction), 1, &learning(1));
+    task.unwrap().with_snr_gamma(Some(5.0))
+}
+
+fn whole(unet: &UNet, options: RunOptions, workers: usize) -> Run<UNet> {
+    let unet = unet.clone();
+    Run::of(
+        "whole",
+        &json!({}),
+        |_| unet.train(),
+        options,
+        learning(workers),
+    )
+    .unwrap()
+}
+
+fn low_rank(unet: &UNet, options: RunOptions) -> Run<LowRank> {
+    let devices = learning(1);
+    devices[0].seed(options.seed);
+    let base = unet.clone().no_grad().train().fork(&devices[0]);
+    let changes = LowRank::of_attentions(&base, Layout::Diffusers, 2).unwrap();
+    Run::of("changes", &json!({}), |_| changes, options, devices).unwrap()
+}
+
+fn losses<M: Module>(run: &mut Run<M>, task: &impl Task<M>, steps: usize) -> Vec<f64> {
     let step = |_| {
-        let (images, ids) = batch(&Device::flex());
-        let report = run.step(images, ids).unwrap();
+        let (report, _) = run.step(task).unwrap();
         assert!(report.applied && report.loss.is_finite());
         report.loss
     };
@@ -81,18 +129,10 @@ fn losses(run: &mut FineTune, steps: usize) -> Vec<f64> {
 fn noise_and_velocity_are_learnt() {
     let device = Device::flex();
     for prediction in [Prediction::Epsilon, Prediction::Velocity] {
-        let (unet, parts) = (unet(&device), frozen(&device));
-        let run = |peak: f64| {
-            let parts = Frozen {
-                text: parts.text.clone(),
-                autoencoder: parts.autoencoder.clone(),
-                schedule: parts.schedule.clone(),
-            };
-            let options = options(prediction, peak);
-            FineTune::whole(unet.clone(), parts, options, &device.clone().autodiff()).unwrap()
-        };
+        let (unet, task) = (unet(&device), task(prediction, &frozen(&device)));
+        let of = |peak: f64| losses(&mut whole(&unet, options(peak, 1), 1), &task, 100);
         // Both see the same draws, one of them with steps too small to learn: step by step, only what is learnt differs.
-        let (learning, idle) = (losses(&mut run(5e-3), 100), losses(&mut run(1e-12), 100));
+        let (learning, idle) = (of(5e-3), of(1e-12));
         let gains: Vec<f64> = idle
             .iter()
             .zip(&learning)
@@ -110,21 +150,17 @@ fn noise_and_velocity_are_learnt() {
 #[test]
 fn low_rank_changes_leave_the_model_as_it_is() {
     let device = Device::flex();
-    let autodiff = device.clone().autodiff();
     let base = unet(&device);
-    let options = options(Prediction::Epsilon, 2e-2);
-    let mut run = FineTune::low_rank(base.clone(), 2, frozen(&device), options, &autodiff).unwrap();
+    let task = task(Prediction::Epsilon, &frozen(&device)).with_base(&base);
+    let mut run = low_rank(&base, options(2e-2, 1));
     let before = values(&base);
-    for _ in 0..4 {
-        let (images, ids) = batch(&device);
-        assert!(run.step(images, ids).unwrap().norm > 0.0);
-    }
-    let changed = run.changes().unwrap();
+    losses(&mut run, &task, 4);
+    let changed = run.averaged();
     assert!(changed.num_params() < base.num_params() / 4);
     let differ = |a: &Tensor<1>, b: &Tensor<1>| {
         (a.clone() - b.clone()).abs().max().into_scalar::<f32>() > 0.0
     };
-    let after = values(&run.unet());
+    let after = values(&changed.merged(base));
     let different = before
         .iter()
         .zip(&after)
@@ -133,47 +169,101 @@ fn low_rank_changes_leave_the_model_as_it_is() {
     assert_eq!(different, changed.layers().len());
 }
 
+/// Losses and lengths of the gradient of three steps.
+fn curve<M: Module>(mut run: Run<M>, task: &impl Task<M>) -> Vec<f64> {
+    let step = |_| {
+        let (report, _) = run.step(task).unwrap();
+        [report.loss, report.norm]
+    };
+    (0..3).flat_map(step).collect()
+}
+
+/// Four images at once, one after the other, and on two devices.
+#[test]
+fn parts_of_a_batch_make_the_step_of_the_whole() {
+    let device = Device::flex();
+    let (base, frozen) = (unet(&device), frozen(&device));
+    let task = task(Prediction::Epsilon, &frozen).with_base(&base);
+    let near = |one: &[f64], other: &[f64]| {
+        for (a, b) in one.iter().zip(other) {
+            // Sums of f32 over another order of some thousand terms, with cancellation.
+            assert!((a - b).abs() < 1e-4 * a, "{one:?} {other:?}");
+        }
+    };
+    let of = |workers, parts| curve(whole(&base, options(1e-3, parts), workers), &task);
+    let one = of(1, 1);
+    for (workers, parts) in [(1, 4), (2, 1), (2, 2)] {
+        near(&one, &of(workers, parts));
+    }
+    let [one, other] = [1, 4].map(|parts| curve(low_rank(&base, options(1e-3, parts)), &task));
+    near(&one, &other);
+}
+
+/// What one part is computed from is that part alone: memory falls with the number of parts.
+#[test]
+fn a_part_holds_its_own_images_alone() {
+    let frozen = frozen(&Device::flex());
+    let task = task(Prediction::Epsilon, &frozen);
+    let whole: PromptedBatch = Task::<UNet>::batch(&task, 0..4).unwrap();
+    let part = Task::<UNet>::batch(&task, 2..3).unwrap();
+    assert_eq!(part.steps.len(), 1);
+    assert_eq!((whole.steps.len(), part.steps[0]), (4, whole.steps[2]));
+    let pixels: Vec<f32> = whole
+        .images
+        .iter::<f32>()
+        .skip(2 * 1024)
+        .take(1024)
+        .collect();
+    assert_eq!(part.images.iter::<f32>().collect::<Vec<_>>(), pixels);
+}
+
+/// Of a set whose images are all for validation but one, that one is drawn.
+#[test]
+fn pairs_for_validation_are_not_learnt_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = wake_dataset::Recipe::default();
+    let recipe = recipe.with_assignments(&["scene.grid.rows = 32", "scene.grid.columns = 32"]);
+    let manifest = wake_dataset::Manifest::new(recipe.unwrap(), 3, 4).unwrap();
+    let manifest = manifest.with_val_share(0.75).unwrap();
+    let source = manifest.source().unwrap();
+    wake_dataset::write(folder.path(), &manifest, &source, 1, |_| ()).unwrap();
+    let folder = wake_dataset::Folder::open(folder.path()).unwrap();
+    let [position] = folder.trainset()[..] else {
+        panic!("{:?}", folder.trainset());
+    };
+    let learnt = folder.pair(position).unwrap().image;
+    let pairs = PromptedPairs::new(&folder, None, 5);
+    assert!((0..32).all(|position| pairs.at(position).unwrap().image == learnt));
+}
+
 #[test]
 fn a_killed_run_goes_on_to_the_bit() {
     let device = Device::flex();
-    let autodiff = device.clone().autodiff();
-    let (base, parts) = (unet(&device), frozen(&device));
-    for rank in [None, Some(2)] {
-        let run = |seed: u64| {
-            let parts = Frozen {
-                text: parts.text.clone(),
-                autoencoder: parts.autoencoder.clone(),
-                schedule: parts.schedule.clone(),
-            };
-            let options = FineTuneOptions {
-                seed,
-                ..options(Prediction::Epsilon, 1e-2)
-            };
-            let unet = base.clone();
-            match rank {
-                None => FineTune::whole(unet, parts, options, &autodiff).unwrap(),
-                Some(rank) => FineTune::low_rank(unet, rank, parts, options, &autodiff).unwrap(),
-            }
-        };
-        let folder = tempfile::tempdir().unwrap();
-        let mut whole = run(1);
-        losses(&mut whole, 2);
-        whole.checkpoint(folder.path()).unwrap();
-        let newest = || Checkpoint::newest(folder.path()).unwrap().unwrap();
-        let mut second = run(1);
-        second.resume(newest()).unwrap();
-        assert_eq!(second.steps(), 2);
-        assert_eq!(
-            losses(&mut whole, 3),
-            losses(&mut second, 3),
-            "rank {rank:?}"
-        );
-        let refused = run(2).resume(newest()).unwrap_err().to_string();
-        assert!(
-            refused.contains("seed = 1") && refused.contains("expected 2"),
-            "{refused}"
-        );
-    }
+    let (base, frozen) = (unet(&device), frozen(&device));
+    let task = task(Prediction::Epsilon, &frozen).with_base(&base);
+    let seeded = |seed| RunOptions {
+        seed,
+        ..options(1e-2, 1)
+    };
+    goes_on(&task, |seed| whole(&base, seeded(seed), 1));
+    goes_on(&task, |seed| low_rank(&base, seeded(seed)));
+}
+
+fn goes_on<M: Module>(task: &impl Task<M>, run: impl Fn(u64) -> Run<M>) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut whole = run(1);
+    losses(&mut whole, task, 2);
+    whole.checkpoint(folder.path()).unwrap();
+    let newest = || Checkpoint::newest(folder.path()).unwrap().unwrap();
+    let mut second = run(1);
+    second.resume(newest()).unwrap();
+    assert_eq!(second.steps(), 2);
+    assert_eq!(losses(&mut whole, task, 3), losses(&mut second, task, 3));
+    let refused = run(2).resume(newest()).unwrap_err().to_string();
+    assert!(
+        refused.contains("seed = 1") && refused.contains("expected 2"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -203,21 +293,23 @@ fn weights_at_each_signal_to_noise_ratio_are_the_closed_form() {
 
 /// √ᾱ mixes noise in, which is not the straight line that a flow is the slope of.
 #[test]
-fn the_prediction_of_a_flow_and_useless_rates_are_refused() {
-    let device = Device::flex();
-    for (prediction, peak, word) in [
-        (Prediction::Flow, 1e-3, "flow"),
-        (Prediction::Epsilon, 0.0, "rate is 0"),
-        (Prediction::Epsilon, f64::NAN, "rate is NaN"),
-        (Prediction::Epsilon, 1e300, "rate is 1"),
+fn the_prediction_of_a_flow_is_refused() {
+    let (frozen, how) = (frozen(&Device::flex()), (schedule(), Prediction::Flow));
+    let refused = FineTuneTask::new(Waves, &frozen, how, 1, &learning(1));
+    let refused = refused.expect_err("a refusal").to_string();
+    assert!(refused.contains("flow"), "{refused}");
+}
+
+#[test]
+fn useless_rates_are_refused() {
+    let base = unet(&Device::flex());
+    for (peak, word) in [
+        (0.0, "rate is 0"),
+        (f64::NAN, "rate is NaN"),
+        (1e300, "rate is 1"),
     ] {
-        let learning = device.clone().autodiff();
-        let run = FineTune::whole(
-            unet(&device),
-            frozen(&device),
-            options(prediction, peak),
-            &learning,
-        );
+        let init = |_: &Device| base.clone().train();
+        let run = Run::of("whole", &json!({}), init, options(peak, 1), learning(1));
         let refused = run.expect_err("a refusal").to_string();
         assert!(refused.contains(word), "{refused}");
     }

@@ -203,6 +203,12 @@ impl Lpips {
         })
     }
 
+    /// Where it computes: images must lie there.
+    #[must_use]
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
     /// Distance of each pair.
     ///
     /// # Shapes

@@ -158,7 +158,7 @@ fn the_prompt_says_which_image() {
     let model = run.averaged();
     let loss = |set, batch: u64| {
         let positions = 10_000 + 8 * batch..10_008 + 8 * batch;
-        number(&task(set).loss(&model, &device, positions).0)
+        number(&task(set).loss(&model, &device, &positions).0)
     };
     let costs: Vec<f64> = (0..32)
         .map(|batch| loss(&swapped, batch) - loss(&right, batch))

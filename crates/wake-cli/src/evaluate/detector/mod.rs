@@ -120,7 +120,7 @@ fn simulated(
     options: &Options,
     report: &mut Report,
 ) -> Outcome<String> {
-    let source = recipe.source(HELD_OUT, SIZE)?;
+    let source = recipe.source(HELD_OUT, SIZE, &wake_nn::device_named(&options.device)?)?;
     let count = u64::from(options.images);
     let bar = progress::bar(count, recipe.name());
     let mut pictures: Vec<RgbImage> = Vec::new();
