@@ -50,7 +50,7 @@ fn wrong_recipes_shares_and_numbers_are_named() {
     refused_by(
         "dataset",
         &["--merge"],
-        &["shard-0", "missing", "--shard 0/n"],
+        &["shard-0", "missing", "make it too"],
     );
     cannot_write("dataset", &["--count", "1"]);
 }

@@ -44,7 +44,7 @@ fn wrong_data_devices_and_folders_are_named() {
         refused_by(
             "train wake-model",
             &[stage, "--resume"],
-            &["--resume", "no checkpoint"],
+            &["resume is asked for", "no checkpoint"],
         );
     }
     let weights = [
@@ -186,7 +186,7 @@ fn a_folder_belongs_to_one_run() {
     let out = toys.path("run");
     toys.refused(
         &["words", "--steps", "2"],
-        &["stage words has made 3 steps", "--resume"],
+        &["stage words has made 3 steps", "resume goes on"],
     );
     toys.refused(
         &["words", "--steps", "4", "--resume", "--rate", "1e-2"],
