@@ -96,11 +96,11 @@ mod simulate;
 pub mod measure;
 
 pub use error::{Error, Result};
-pub use labels::labels_of;
+pub use labels::{Labels, labels_of};
 pub use memory::available as available_memory;
 pub use plan::{Cost, Plan, PlannedTerm, Sizes};
 pub use raster::{Field, Raster};
-pub use scene::Scene;
+pub use scene::{Grid, Radar, Scene, Sea, Ship, Term};
 pub use simulate::{
     Accuracy, DirectPixels, LinearSea, Method, Reached, SarImage, Seconds, Simulation, Simulator,
     direct_intensity, expected_intensity, simulate, simulate_with, unit_speckle,

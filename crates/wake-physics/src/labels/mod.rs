@@ -11,6 +11,7 @@ mod short_waves;
 mod visibility;
 
 use crate::kelvin::half_angle;
+use crate::models::Models;
 use crate::raster::Raster;
 use crate::sar::geometry::{azimuth_displacement, direction, ship_radial_velocity};
 use crate::scene::{Scene, Ship};
@@ -170,9 +171,14 @@ pub struct WakeLabel {
 /// displacement over a wave is zero in linear theory.
 #[must_use]
 pub fn labels_of(scene: &Scene) -> Labels {
+    labels_with(scene, &Models::new(scene))
+}
+
+/// Labels of a valid scene whose models are already built; see [`labels_of`].
+pub(crate) fn labels_with(scene: &Scene, models: &Models) -> Labels {
     let grid = &scene.grid;
     let raster = Raster::image(grid.rows, grid.columns, grid.spacing);
-    let (sea, wakes) = Background::new(scene);
+    let (sea, wakes) = Background::new(scene, models);
     let ships = scene.ships.iter().zip(&wakes).map(|(ship, wake)| {
         let heading = ship.heading_at(scene.sea.time);
         let frame = Frame::new(wake.kelvin.track.position, heading, &raster);

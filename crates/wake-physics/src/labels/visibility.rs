@@ -109,8 +109,10 @@ pub(super) struct Background {
 
 impl Background {
     /// The open sea of a scene, `None` if the image is dark, and the wakes of its ships.
-    pub(super) fn new(scene: &Scene) -> (Option<Self>, Vec<Wake>) {
-        let mut models = Models::new(scene);
+    ///
+    /// - `models`: the models of the scene
+    pub(super) fn new(scene: &Scene, models: &Models) -> (Option<Self>, Vec<Wake>) {
+        let mut models = models.clone();
         let wakes = std::mem::take(&mut models.wakes);
         let drawn = |term| scene.model.terms.allow(term);
         let survey = Survey::new(scene, &models);

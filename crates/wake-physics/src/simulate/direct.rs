@@ -1,6 +1,7 @@
 //! The oracles of all stages at some pixels of an image that is too large for them as a whole.
 
 use super::clock::{Clock, Seconds};
+use super::prepared::Prepared;
 use super::simulation::Method;
 use super::stages::{Backdrop, Stages};
 use super::strip::Strip;
@@ -8,13 +9,10 @@ use super::surface_fields::{SurfaceFields, Wanted};
 use crate::computed::Parts;
 use crate::error::{Error, Result};
 use crate::kelvin::fade_at;
-use crate::models::Models;
-use crate::plan::Plan;
 use crate::raster::Field;
 use crate::sar::direct::{DirectImage, reaching};
 use crate::scene::{Scene, Term};
 use crate::surface::Surface;
-use crate::survey::Survey;
 use crate::waves::{PlaneWaves, harmonic_sum};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
@@ -57,8 +55,7 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
             }
         }
     }
-    let models = Models::new(scene);
-    let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
+    let Prepared { models, plan, .. } = Prepared::new(scene)?;
     if models.response.is_some() {
         return Err(Error::Conflict {
             name: "radar".to_owned(),

@@ -11,6 +11,7 @@ mod accuracy;
 mod clock;
 mod direct;
 mod linear_sea;
+mod prepared;
 mod radar;
 mod simulation;
 mod speckling;
@@ -27,15 +28,14 @@ pub use simulation::{Method, SarImage, Simulation};
 pub use speckling::unit_speckle;
 
 use crate::error::Result;
-use crate::labels::labels_of;
 use crate::models::Models;
 use crate::plan::Plan;
 use crate::raster::Field;
 use crate::scattering::BackscatterTable;
 use crate::scene::{Scene, Term};
-use crate::survey::Survey;
 use crate::workspace::Workspace;
 use clock::Clock;
+use prepared::Prepared;
 use speckling::{Exposure, Speckling};
 use surface_fields::Wanted;
 
@@ -82,18 +82,17 @@ impl Simulator {
     ///
     /// As [`Self::simulate`].
     pub fn simulate_with(&mut self, scene: &Scene, method: Method) -> Result<Simulation> {
-        scene.validate()?;
         let mut clock = Clock::start();
         let mut seconds = Seconds::default();
-        let models = Models::new(scene);
-        let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
+        let prepared = Prepared::new(scene)?;
+        let Prepared { models, plan, .. } = &prepared;
         seconds.plan = clock.lap();
-        let what = (scene, &models, &plan);
+        let what = (scene, models, plan);
         let how = (method, Wanted::Fields);
         let (drawn, exposure) = self.draw(what, how, (&mut clock, &mut seconds));
         let mut speckled = self.workspace.field(&models.delivered);
         speckled.values.copy_from_slice(&drawn.intensity.values);
-        let speckling = Speckling::of(scene, &models, exposure);
+        let speckling = Speckling::of(scene, models, exposure);
         let slc = if plan.uses(Term::Speckle) {
             speckling.apply(&mut speckled)
         } else {
@@ -104,10 +103,10 @@ impl Simulator {
             .into_iter()
             .for_each(|field| self.workspace.give(field));
         seconds.speckle = clock.lap();
-        let labels = labels_of(scene);
+        let labels = prepared.labels();
         let fields = drawn.fields;
         let mut simulation = Simulation {
-            raster: models.delivered,
+            raster: prepared.models.delivered,
             elevation: fields.elevation,
             slope_x: fields.slope_x,
             slope_y: fields.slope_y,
@@ -121,7 +120,7 @@ impl Simulator {
             slc,
             labels,
             accuracy: drawn.accuracy,
-            plan,
+            plan: prepared.plan,
             seconds,
             method,
             scene: scene.clone(),
@@ -137,18 +136,17 @@ impl Simulator {
     ///
     /// As [`Self::simulate`].
     pub fn image(&mut self, scene: &Scene) -> Result<SarImage> {
-        scene.validate()?;
-        let models = Models::new(scene);
-        let plan = Plan::of(scene, &models, &Survey::new(scene, &models))?;
-        let (intensity, exposure, accuracy) = self.intensity(scene, &models, &plan);
+        let prepared = Prepared::new(scene)?;
+        let Prepared { models, plan, .. } = &prepared;
+        let (intensity, exposure, accuracy) = self.intensity(scene, models, plan);
         let speckling = match plan.uses(Term::Speckle) {
-            true => Speckling::of(scene, &models, exposure),
+            true => Speckling::of(scene, models, exposure),
             false => Speckling::Without,
         };
         Ok(SarImage {
             intensity,
-            labels: labels_of(scene),
-            plan,
+            labels: prepared.labels(),
+            plan: prepared.plan,
             accuracy,
             speckling,
         })
@@ -160,10 +158,12 @@ impl Simulator {
     ///
     /// As [`Self::simulate`].
     pub fn expected_intensity(&mut self, scene: &Scene) -> Result<Field> {
-        scene.validate()?;
-        let mut models = Models::new(scene);
-        let survey = Survey::new(scene, &models);
-        let mut plan = Plan::of(scene, &models, &survey)?;
+        let Prepared {
+            mut models,
+            survey,
+            mut plan,
+            ..
+        } = Prepared::new(scene)?;
         if plan.uses(Term::Sea) || plan.uses(Term::Swell) {
             let (slopes, velocity) = survey.resolved_sea();
             models.average_over(&slopes, velocity);

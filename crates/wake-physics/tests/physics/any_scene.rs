@@ -105,9 +105,9 @@ prop_compose! {
             echo,
             filter_depth,
             edge,
-            edge_time,
-            edge_outflow,
-            roll,
+            edge_time: edge_time.filter(|_| edge),
+            edge_outflow: if edge { edge_outflow } else { 0.0 },
+            roll: if echo { roll } else { 0.0 },
         }
     }
 }
@@ -137,6 +137,7 @@ prop_compose! {
         relaxation_rate in maybe(decades(0.01, 100.0)),
     ) -> Radar {
         let responds = range_resolution.is_some();
+        let ambiguity = ambiguity.filter(|_| responds);
         Radar {
             sensor: None,
             frequency,
@@ -150,8 +151,8 @@ prop_compose! {
             looks,
             look_overlap: look_overlap.filter(|_| responds),
             noise_floor,
-            ambiguity: ambiguity.filter(|_| responds),
-            pulse_rate: Some(pulse_rate),
+            ambiguity,
+            pulse_rate: ambiguity.map(|_| pulse_rate),
             relaxation_rate,
         }
     }
