@@ -72,6 +72,10 @@ fn is_failure(error: &(dyn Error + 'static)) -> bool {
             _ => false,
         };
     }
+    #[cfg(feature = "locate")]
+    if let Some(error) = error.downcast_ref::<wake_geo::Error>() {
+        return matches!(error, wake_geo::Error::Unwritable { .. });
+    }
     #[cfg(feature = "simulate")]
     if let Some(wake_physics::Error::File { action, .. }) = error.downcast_ref() {
         return is_of_writing(action);

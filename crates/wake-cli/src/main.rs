@@ -5,6 +5,9 @@ mod exit;
 #[cfg(any(feature = "simulate", feature = "detect"))]
 mod progress;
 
+#[cfg(feature = "locate")]
+mod locate;
+
 #[cfg(feature = "simulate")]
 mod simulate;
 
@@ -64,6 +67,8 @@ enum Command {
     Train(train::Arguments),
     #[cfg(feature = "detect")]
     Detect(detect::Arguments),
+    #[cfg(feature = "locate")]
+    Locate(locate::Arguments),
     #[cfg(feature = "train")]
     Evaluate(evaluate::Arguments),
     #[cfg(feature = "bench")]
@@ -89,6 +94,8 @@ fn main() -> ExitCode {
         Command::Train(arguments) => train::run(&arguments),
         #[cfg(feature = "detect")]
         Command::Detect(arguments) => detect::run(&arguments),
+        #[cfg(feature = "locate")]
+        Command::Locate(arguments) => locate::run(&arguments),
         #[cfg(feature = "train")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         #[cfg(feature = "bench")]

@@ -1,6 +1,6 @@
 //! What is known of single pixels.
 
-use crate::error::Result;
+use crate::error::{Result, check_range};
 use crate::product::Product;
 
 /// What a product says of one pixel: place, calibration, σ⁰.
@@ -39,9 +39,12 @@ pub fn locate(
     digital_number: Option<f64>,
 ) -> Result<Located> {
     let (at_line, at_pixel) = (line as f64, pixel as f64);
+    let (lines, pixels) = product.size();
+    check_range("line", at_line, 0.0, lines as f64 - 1.0)?;
+    check_range("pixel", at_pixel, 0.0, pixels as f64 - 1.0)?;
     let place = product.place(at_line, at_pixel)?;
     if let Some(number) = digital_number {
-        crate::error::check_range("digital number", number, 0.0, 1e9)?;
+        check_range("digital number", number, 0.0, 1e9)?;
     }
     let sentinel1 = product.sentinel1();
     let calibration = sentinel1.map(|product| product.calibration(at_line, at_pixel));

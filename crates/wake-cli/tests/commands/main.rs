@@ -13,6 +13,8 @@ mod evaluate;
 mod faults;
 #[cfg(feature = "generate")]
 mod generate;
+#[cfg(feature = "locate")]
+mod locate;
 #[cfg(feature = "train")]
 mod sea;
 mod shell;
