@@ -68,7 +68,7 @@ impl PartialScene {
     fn set(&self, scene: &mut Scene) {
         if self.ship == Some(false) {
             scene.ships.clear();
-        } else if self.ship.is_some() || self.ship_speed.or(self.ship_heading).is_some() {
+        } else if self.says_of_ships().is_some() {
             if scene.ships.is_empty() {
                 scene.ships.push(Ship::default());
             }
@@ -81,6 +81,29 @@ impl PartialScene {
         sea.wind_toward = self.wind_toward.unwrap_or(sea.wind_toward);
         sea.fetch = self.fetch.unwrap_or(sea.fetch);
         radar.incidence = self.incidence.unwrap_or(radar.incidence);
+    }
+
+    /// These values, and those of `other` where they leave one open; without a ship there are no values of one.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        let ship = self.says_of_ships().or(other.ship);
+        let there = ship != Some(false);
+        let either = |ours: Option<f64>, theirs: Option<f64>| ours.or(theirs).filter(|_| there);
+        Self {
+            ship,
+            ship_speed: either(self.ship_speed, other.ship_speed),
+            ship_heading: either(self.ship_heading, other.ship_heading),
+            wind_speed: self.wind_speed.or(other.wind_speed),
+            wind_toward: self.wind_toward.or(other.wind_toward),
+            fetch: self.fetch.or(other.fetch),
+            incidence: self.incidence.or(other.incidence),
+        }
+    }
+
+    /// Whether there is a ship; a stated speed or heading is one of a ship.
+    pub fn says_of_ships(&self) -> Option<bool> {
+        let moves = self.ship_speed.or(self.ship_heading).is_some();
+        self.ship.or(moves.then_some(true))
     }
 
     /// Whether nothing is stated.
@@ -360,5 +383,24 @@ mod tests {
             ..PartialScene::default()
         };
         assert!(matches!(said.onto(&Scene::default()), Err(Error::Scene(_))));
+    }
+
+    #[test]
+    fn what_is_open_comes_from_the_other() {
+        let some = PartialScene {
+            wind_speed: Some(7.0),
+            ..PartialScene::default()
+        };
+        let full = PartialScene::of(&Scene::default());
+        let both = some.or(full);
+        assert_eq!(both.wind_speed, Some(7.0));
+        assert_eq!(both.incidence, full.incidence);
+        let open_sea = PartialScene {
+            ship: Some(false),
+            ..PartialScene::default()
+        };
+        let sea = open_sea.or(full);
+        assert_eq!((sea.ship, sea.wind_toward), (Some(false), full.wind_toward));
+        assert_eq!((sea.ship_speed, sea.ship_heading), (None, None));
     }
 }

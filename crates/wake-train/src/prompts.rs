@@ -3,7 +3,6 @@
 use crate::error::Result;
 use crate::streams;
 use wake_dataset::Simulated;
-use wake_ldm::conditioning::Conditions;
 use wake_nn::noise::NoiseSource;
 use wake_text::{PartialScene, Wording};
 
@@ -31,7 +30,7 @@ impl Prompts {
     /// # Errors
     ///
     /// [`Error::Text`](crate::Error::Text) for a scene that no prompt can state.
-    pub fn prompt(&self, position: u64) -> Result<(String, Conditions)> {
+    pub fn prompt(&self, position: u64) -> Result<(String, PartialScene)> {
         let random = NoiseSource::new(self.scenes.seed());
         let draw = |i: u64| random.uniform(streams::PROMPTS, position * DRAWS + i);
         let wording = Wording::ALL[(draw(0) * Wording::ALL.len() as f64) as usize];
@@ -41,10 +40,8 @@ impl Prompts {
         } else {
             text
         };
-        Ok((
-            text.clone(),
-            Conditions::of_prompt(&PartialScene::read(&text)?),
-        ))
+        let said = PartialScene::read(&text)?;
+        Ok((text, said))
     }
 }
 
@@ -80,7 +77,7 @@ mod tests {
         for position in 0..200 {
             let (text, said) = prompts.prompt(position).unwrap();
             assert_eq!(prompts.prompt(position).unwrap(), (text.clone(), said));
-            let again = Conditions::of_prompt(&PartialScene::read(&text).unwrap());
+            let again = PartialScene::read(&text).unwrap();
             assert_eq!(again, said, "{text}");
             gaps += usize::from(said.incidence.is_none());
             texts.insert(text);

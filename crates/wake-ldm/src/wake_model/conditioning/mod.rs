@@ -10,17 +10,14 @@
 //! Whatever is not known is left out: a number that no prompt states has the flag 0 and no value, and without
 //! speed, heading and place of the ship the maps are empty.
 
-mod conditions;
 mod features;
 mod position_maps;
 mod statement;
 mod vocabulary;
 
-pub use conditions::Conditions;
 pub use features::{FEATURES, features};
 pub use position_maps::MapGrid;
 pub use position_maps::WEDGE;
 pub use position_maps::{PATCH, PLACES, places};
-pub use statement::QUANTITIES;
-pub use statement::statement;
+pub use statement::{QUANTITIES, said, statement};
 pub use vocabulary::{Vocabulary, tokens};

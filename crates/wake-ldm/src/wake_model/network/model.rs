@@ -9,7 +9,8 @@ use super::known::Known;
 use super::patches::PatchTransform;
 use super::prior::{Expected, Prior};
 use super::prompt_parser::{PromptParser, windows};
-use crate::wake_model::conditioning::{Conditions, QUANTITIES, Vocabulary, tokens};
+use crate::wake_model::conditioning::{QUANTITIES, Vocabulary, said, tokens};
+use wake_text::PartialScene;
 
 /// A latent diffusion model of radar images of wakes.
 ///
@@ -90,15 +91,12 @@ impl WakeModel {
         prompts: &[&str],
         vocabulary: &Vocabulary,
         device: &Device,
-    ) -> Vec<Conditions> {
+    ) -> Vec<PartialScene> {
         let ids: Vec<Vec<u32>> = prompts.iter().map(|prompt| tokens(prompt)).collect();
         let (windows, tokens) = windows(&ids, vocabulary, device);
         let read = self.parser.forward(windows, tokens).into_data();
         let numbers: Vec<f32> = read.iter::<f32>().collect();
-        numbers
-            .chunks(3 * QUANTITIES)
-            .map(Conditions::of_statement)
-            .collect()
+        numbers.chunks(3 * QUANTITIES).map(said).collect()
     }
 
     /// The image of latents, grey 0…1, `[batch, 1, rows, columns]`.

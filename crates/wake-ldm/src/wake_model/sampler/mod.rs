@@ -11,13 +11,13 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
-use wake_physics::{Field, Scene, labels_of};
-use wake_text::{Reading, Unread, Wording};
+use wake_physics::{Field, Scene, Ship, labels_of};
+use wake_text::{PartialScene, Reading, Unread, Wording};
 
 use crate::error::{Error, Result};
 #[cfg(feature = "flex")]
 use crate::self_check::check_once;
-use crate::wake_model::conditioning::{Conditions, Vocabulary};
+use crate::wake_model::conditioning::Vocabulary;
 use crate::wake_model::network::{
     ChannelWindows, Expected, Known, SeaFields, WakeModel, WakeModelConfig, expected_greys,
     images_of, slope_of,
@@ -183,9 +183,12 @@ impl WakeSampler {
             let mut scene = reading.scene.onto(&self.base_scene())?;
             scene.seed = seed.wrapping_add(k);
             Ok(Input {
-                known: Conditions::of_prompt(&reading.scene),
+                unread: reading
+                    .unread
+                    .iter()
+                    .any(Unread::is_of_the_field)
+                    .then_some(reading.scene),
                 words: (*prompt).to_owned(),
-                unread: reading.unread.iter().any(Unread::is_of_the_field),
                 scene,
             })
         };
@@ -228,9 +231,11 @@ impl WakeSampler {
         let input = |scene: &Scene| {
             self.config.check_scene(scene)?;
             Ok(Input {
-                known: Conditions::of_scene(scene),
-                words: Wording::Paper.prompt(scene)?,
-                unread: false,
+                unread: None,
+                words: match self.conditioning {
+                    Conditioning::Words => Wording::Paper.prompt(scene)?,
+                    _ => String::new(),
+                },
                 scene: scene.clone(),
             })
         };
@@ -306,13 +311,11 @@ impl WakeSampler {
         })
     }
 
-    /// The scenes that are drawn: what is told, in the place of the input's own values; of what is told of none, those
-    /// of the base scene.
+    /// The scenes that are drawn: as they are given, or with what the model reads in words that the grammar did not understand.
     fn resolved(&self, inputs: &[Input]) -> Result<Vec<Scene>> {
-        let base = Conditions::of_scene(&self.base_scene());
-        // Of words that are all understood the model would only add what they do not say.
         let asked = |input: &Input| match self.conditioning {
-            Conditioning::Both => input.unread,
+            // Of words that are all understood the model would only add what they do not say.
+            Conditioning::Both => input.unread.is_some(),
             Conditioning::Words => true,
             Conditioning::Numbers => false,
         };
@@ -323,21 +326,38 @@ impl WakeSampler {
             false => self.model.read(&prompts, &self.vocabulary, &self.device),
         }
         .into_iter();
-        let mut read = |input: &Input| match asked(input) {
-            true => answers.next().unwrap_or_default(),
-            false => Conditions::default(),
-        };
         let scene = |input: &Input| {
-            let read = read(input);
-            let told = match self.conditioning {
-                Conditioning::Words => read,
-                _ => input.known.or(read),
+            let Some(read) = asked(input).then(|| answers.next()).flatten() else {
+                return Ok(input.scene.clone());
             };
-            let scene = told.or(base).onto(&input.scene);
-            scene.validate()?;
-            Ok(scene)
+            let (stated, base) = match self.conditioning {
+                Conditioning::Words => (PartialScene::default(), self.unspoken(&input.scene)),
+                _ => (input.unread.unwrap_or_default(), input.scene.clone()),
+            };
+            Ok(stated.or(read).onto(&base)?)
         };
         inputs.iter().map(scene).collect()
+    }
+
+    /// A scene whose ship, wind, depth and incidence are those of the base scene: what words alone are put into.
+    fn unspoken(&self, scene: &Scene) -> Scene {
+        let (mut scene, base) = (scene.clone(), self.base_scene());
+        match base.ships.first() {
+            None => scene.ships.clear(),
+            Some(told) => {
+                if scene.ships.is_empty() {
+                    scene.ships.push(Ship::default());
+                }
+                let ship = &mut scene.ships[0];
+                (ship.speed, ship.heading) = (told.speed, told.heading);
+                (ship.position, ship.length) = (told.position, told.length);
+            }
+        }
+        let (sea, told) = (&mut scene.sea, &base.sea);
+        (sea.wind_speed, sea.wind_toward) = (told.wind_speed, told.wind_toward);
+        (sea.fetch, sea.depth) = (told.fetch, told.depth);
+        scene.radar.incidence = base.radar.incidence;
+        scene
     }
 
     /// Euler's steps along the flow, from noise to latents.
@@ -363,12 +383,11 @@ fn levels(steps: usize) -> impl Iterator<Item = [f64; 2]> {
 
 /// What an image is drawn from.
 struct Input {
-    known: Conditions,
-    words: String,
-    /// Whether some of the words were not understood that may state a value.
-    unread: bool,
-    /// What the numbers are put into, and its seed.
+    /// The scene that is given, or that the prompt states.
     scene: Scene,
+    words: String,
+    /// What the prompt states, where some of its words were not understood that may state a value.
+    unread: Option<PartialScene>,
 }
 
 /// Images as they come from the model.

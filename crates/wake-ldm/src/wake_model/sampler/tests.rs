@@ -267,6 +267,26 @@ fn image_labels_and_scene_are_one() {
     }
 }
 
+/// A scene that is given comes back as it is: without wind, with its direction, and with a second ship.
+#[test]
+fn a_given_scene_is_drawn_untouched() {
+    let sampler = sampler();
+    let mut calm = sampler.base_scene();
+    (calm.sea.wind_speed, calm.sea.wind_toward) = (0.0, 77.0);
+    let mut two = sampler.base_scene();
+    (two.seed, two.sea.wind_toward) = (3, 12.34567);
+    two.ships.push(two.ships[0].clone());
+    two.ships[1].position = [120.0, 250.0];
+    for scene in [calm, two] {
+        let input = [Input {
+            unread: None,
+            words: String::new(),
+            scene: scene.clone(),
+        }];
+        assert_eq!(sampler.resolved(&input).unwrap(), [scene]);
+    }
+}
+
 /// With words alone the parser says whether there is a ship, and labels and image follow it.
 #[test]
 fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
@@ -274,8 +294,7 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
     let mut scene = sampler.base_scene();
     scene.ships.clear();
     let mut told = Input {
-        unread: true,
-        known: Conditions::of_scene(&sampler.base_scene()),
+        unread: None,
         words: Wording::Paper.prompt(&scene).unwrap(),
         scene: sampler.base_scene(),
     };
@@ -288,9 +307,8 @@ fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
     assert!(open.scene.ships.is_empty());
     assert_eq!(open.labels, labels_of(&open.scene));
     told = Input {
-        known: Conditions::default(),
         words: PROMPT.to_owned(),
-        unread: true,
+        unread: None,
         scene,
     };
     let with_ship = sampler
