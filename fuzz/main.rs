@@ -25,7 +25,7 @@ use wake_ldm::unet::UNetConfig;
 use wake_nn::weights::{Layout, load};
 use wake_physics::Scene;
 use wake_text::{PartialScene, TOKENS, Tokenizer};
-use wake_train::{Checkpoint, Metrics};
+use wake_train::{Checkpoint, TrainLog};
 use whole_files::{checksum, sealed};
 
 /// Text as a file may hold it; what is no Unicode is refused before it is read.
@@ -173,7 +173,7 @@ fn states_of_runs() {
             std::fs::remove_file(path).expect("a file that was written");
         });
         with_file(folder.path(), "log.jsonl", input, |path| {
-            said(Metrics::open(path, 3))
+            said(TrainLog::open(path, 3))
         });
     });
 }

@@ -46,8 +46,8 @@ pub use fine_tune::{
 };
 pub use folder::RunFolder;
 pub use latents::{Example, LatentSet, fit_patches};
-pub use log::Metrics;
-pub use optimizer::{AdamOptions, Rate};
+pub use log::TrainLog;
+pub use optimizer::{AdamOptions, LrSchedule};
 pub use pairs::TrainingPairs;
 pub use progress::Progress;
 pub use prompts::Prompts;
@@ -56,13 +56,13 @@ pub use sea::{SeaPatches, SeaTask};
 pub use sea_training::SeaTraining;
 pub use small_pipeline::PipelineTraining;
 pub use stage::Stage;
-pub use stage_options::{StageOptions, Usual};
+pub use stage_options::{StageDefaults, StageOptions};
 pub use tasks::{FlowBatch, FlowTask, PriorTask, WordsTask};
 pub use text_to_image::{
     AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
 };
 pub use trainer::{StepReport, Trainer, TrainerOptions};
-pub use two_sample::{TwoSample, TwoSampleOptions, two_sample};
+pub use two_sample::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
 pub use wake_model::{WakeStage, WakeTraining};
 
 #[cfg(all(test, feature = "flex"))]

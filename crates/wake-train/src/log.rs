@@ -12,14 +12,14 @@ use crate::error::{Error, Result};
 
 /// The log of a run.
 #[derive(Debug)]
-pub struct Metrics {
+pub struct TrainLog {
     file: File,
     path: PathBuf,
     begin: Instant,
     first: usize,
 }
 
-impl Metrics {
+impl TrainLog {
     /// Opens a log to go on after `step` steps; lines of later steps, which a killed run wrote after its last
     /// checkpoint, are dropped.
     ///
@@ -136,7 +136,7 @@ mod tests {
             rate: 1e-3,
             applied: true,
         };
-        let mut metrics = Metrics::open(&path, 0).unwrap();
+        let mut metrics = TrainLog::open(&path, 0).unwrap();
         for step in 1..=5 {
             metrics
                 .write(step, 8, report, &json!({"grey": 0.5}))
@@ -144,7 +144,7 @@ mod tests {
         }
         // A killed run leaves half a line.
         metrics.file.write_all(b"{\"step\": 6, \"lo").unwrap();
-        let mut metrics = Metrics::open(&path, 3).unwrap();
+        let mut metrics = TrainLog::open(&path, 3).unwrap();
         metrics.write(4, 8, report, &json!({})).unwrap();
         let text = fs::read_to_string(&path).unwrap();
         let steps: Vec<u64> = text
@@ -165,7 +165,7 @@ mod tests {
         for bad in [&b"{\"step\": \xff}"[..], b"nonsense", b"[]"] {
             let text = [b"{\"step\": 1}\n", bad, b"\n{\"step\": 2}\n"].concat();
             fs::write(&path, &text).unwrap();
-            let refused = Metrics::open(&path, 5).unwrap_err().to_string();
+            let refused = TrainLog::open(&path, 5).unwrap_err().to_string();
             assert!(refused.contains("words.jsonl, line 2"), "{refused}");
             assert_eq!(fs::read(&path).unwrap(), text);
         }

@@ -14,7 +14,7 @@ use burn::tensor::Tensor;
 ///
 /// Loshchilov & Hutter (2017), "SGDR: Stochastic Gradient Descent with Warm Restarts", Eq. 5.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rate {
+pub struct LrSchedule {
     /// The largest step.
     pub peak: f64,
     /// Steps of the warm-up.
@@ -23,7 +23,7 @@ pub struct Rate {
     pub steps: usize,
 }
 
-impl Rate {
+impl LrSchedule {
     /// The rate of step number `step`, counted from 0.
     pub fn at(&self, step: usize) -> f64 {
         if step < self.warmup {
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn rises_to_the_peak_and_falls_to_a_tenth() {
-        let rate = Rate {
+        let rate = LrSchedule {
             peak: 2.0,
             warmup: 4,
             steps: 104,

@@ -79,7 +79,7 @@ impl RunOptions {
     /// As [`TrainerOptions::validate`], and [`wake_nn::Error::InvalidOption`] for a batch that cannot be cut evenly.
     pub fn validate(&self, devices: usize) -> Result<()> {
         self.trainer.validate()?;
-        let parts = devices * self.trainer.accumulation;
+        let parts = devices * self.trainer.grad_accumulation_steps;
         if parts > 0 && self.batch > 0 && self.batch.is_multiple_of(parts) {
             return Ok(());
         }

@@ -161,7 +161,7 @@ impl Task<SeaFlow> for SeaTask<'_> {
 mod tests {
     use wake_physics::Field;
 
-    use super::super::{Checkpoint, Rate, Run, RunOptions, Tensors, TrainerOptions};
+    use super::super::{Checkpoint, LrSchedule, Run, RunOptions, Tensors, TrainerOptions};
     use super::*;
     use wake_ldm::sea_texture::SeaTexture;
 
@@ -189,12 +189,12 @@ mod tests {
             seed: 5,
             identity: serde_json::Value::Null,
             trainer: TrainerOptions {
-                rate: Rate {
+                rate: LrSchedule {
                     peak: 3e-3,
                     warmup: 5,
                     steps,
                 },
-                average_decay: 0.95,
+                ema_decay: 0.95,
                 ..TrainerOptions::default()
             },
         }

@@ -9,21 +9,21 @@ use super::progress::Progress;
 use super::run::{Run, RunOptions};
 use super::sea::{SeaPatches, SeaTask};
 use super::stage::Stage;
-use super::stage_options::{StageOptions, Usual};
+use super::stage_options::{StageDefaults, StageOptions};
 use crate::error::{Error, Result};
 use wake_ldm::sea_texture::{SeaFlow, SeaTexture};
 
 /// Name of the stage, its checkpoints and its log.
 const STAGE: &str = "sea";
 /// What it takes where nothing else is asked for.
-const USUAL: Usual = Usual {
+const DEFAULTS: StageDefaults = StageDefaults {
     steps: 1200,
     batch: 16,
     rate: 1e-3,
 };
 /// Steps over which the rate rises to its largest, and decay of the averaged weights: less than a longer run takes.
 const WARMUP: usize = 50;
-const AVERAGE_DECAY: f64 = 0.995;
+const EMA_DECAY: f64 = 0.995;
 /// What is written: the sea, and the picture of it that the caller draws.
 const WEIGHTS: &str = "sea.safetensors";
 const SHEET: &str = "sea.png";
@@ -89,7 +89,7 @@ impl SeaTraining<'_> {
             name: STAGE,
             resume: options.resume,
             every: options.every,
-            steps: options.steps(&USUAL),
+            steps: options.steps(&DEFAULTS),
             results: &[WEIGHTS, SHEET],
         };
         stage.train(&mut folder, run, &task, progress, show)
@@ -97,8 +97,8 @@ impl SeaTraining<'_> {
 }
 
 fn constants(options: &StageOptions, identity: Value) -> RunOptions {
-    let mut constants = options.run(&USUAL, identity);
+    let mut constants = options.run(&DEFAULTS, identity);
     constants.trainer.rate.warmup = WARMUP;
-    constants.trainer.average_decay = AVERAGE_DECAY;
+    constants.trainer.ema_decay = EMA_DECAY;
     constants
 }

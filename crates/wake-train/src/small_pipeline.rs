@@ -12,7 +12,7 @@ use super::progress::{Progress, counted};
 use super::run::Run;
 use super::sheet::write_sheet;
 use super::stage::Stage;
-use super::stage_options::{StageOptions, Usual};
+use super::stage_options::{StageDefaults, StageOptions};
 use super::text_to_image::{
     AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
 };
@@ -29,14 +29,14 @@ use whole_files::fingerprint;
 /// Names of the two stages, and what they take where nothing else is asked for.
 const AUTOENCODER: &str = "autoencoder-kl";
 const MODEL: &str = "text-to-image";
-const USUAL: Usual = Usual {
+const DEFAULTS: StageDefaults = StageDefaults {
     steps: 5000,
     batch: 16,
     rate: 5e-4,
 };
-const USUAL_AUTOENCODER: Usual = Usual {
+const AUTOENCODER_DEFAULTS: StageDefaults = StageDefaults {
     steps: 2000,
-    ..USUAL
+    ..DEFAULTS
 };
 /// What the stages write.
 const VAE: &str = "vae/diffusion_pytorch_model.safetensors";
@@ -69,7 +69,7 @@ impl PipelineTraining<'_> {
     /// As [`RunOptions::validate`](super::RunOptions::validate), and [`wake_nn::Error::InvalidOption`] for images that the models cannot
     /// halve as often as they do.
     pub fn check(&self) -> Result<()> {
-        let constants = self.options.run(&USUAL, Value::Null);
+        let constants = self.options.run(&DEFAULTS, Value::Null);
         constants.validate(self.options.devices.len())?;
         let [rows, columns] = self.pairs.source().size();
         let multiple = 4 * autoencoder().downsampling();
@@ -132,7 +132,13 @@ impl PipelineTraining<'_> {
             text_encoder: text().init(device),
             unet: unet().init(device),
         };
-        let run = Run::of(MODEL, &model, init, options.run(&USUAL, identity), learning)?;
+        let run = Run::of(
+            MODEL,
+            &model,
+            init,
+            options.run(&DEFAULTS, identity),
+            learning,
+        )?;
         let scheduler = SchedulerConfig::stable_diffusion("ddim")?;
         let task = TextToImageTask {
             set: &set,
@@ -147,7 +153,7 @@ impl PipelineTraining<'_> {
             Ok(pipeline.save(out, Precision::F16)?)
         };
         let results = ["model_index.json", SHEET];
-        let stage = self.stage(MODEL, options.steps(&USUAL), &results, &folder);
+        let stage = self.stage(MODEL, options.steps(&DEFAULTS), &results, &folder);
         stage.train(&mut folder, run, &task, progress, show)
     }
 
@@ -164,7 +170,7 @@ impl PipelineTraining<'_> {
             steps: self.autoencoder_steps,
             ..self.options.clone()
         };
-        let constants = options.run(&USUAL_AUTOENCODER, self.pairs.identity());
+        let constants = options.run(&AUTOENCODER_DEFAULTS, self.pairs.identity());
         let init = |device: &Device| autoencoder().init(device);
         let run = Run::of(AUTOENCODER, &model["vae"], init, constants, learning)?;
         let task = AutoencoderTask {
@@ -183,7 +189,7 @@ impl PipelineTraining<'_> {
                 precision,
             )?)
         };
-        let steps = options.steps(&USUAL_AUTOENCODER);
+        let steps = options.steps(&AUTOENCODER_DEFAULTS);
         let stage = self.stage(AUTOENCODER, steps, &[VAE], folder);
         stage.train(folder, run, &task, progress, show)
     }

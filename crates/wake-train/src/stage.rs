@@ -4,7 +4,7 @@ use burn::module::Module;
 use serde_json::{Map, Value, json};
 
 use super::folder::RunFolder;
-use super::log::Metrics;
+use super::log::TrainLog;
 use super::progress::Progress;
 use super::run::{Run, Task, Terms};
 use super::trainer::StepReport;
@@ -55,7 +55,7 @@ impl Stage<'_> {
             folder.note(name, run.steps(), steps)?;
         }
         let log = folder.path().join(format!("{name}.jsonl"));
-        let mut metrics = Metrics::open(&log, run.steps())?;
+        let mut metrics = TrainLog::open(&log, run.steps())?;
         let mut ready = Vec::new();
         while run.steps() < steps {
             let (report, terms) = step_ahead(&mut run, task, &mut ready, steps)?;

@@ -3,7 +3,7 @@
 use burn::tensor::{DType, Device};
 use serde_json::Value;
 
-use super::optimizer::Rate;
+use super::optimizer::LrSchedule;
 use super::run::RunOptions;
 use super::trainer::TrainerOptions;
 use crate::error::{Error, Result};
@@ -13,7 +13,7 @@ const WARMUP: usize = 100;
 
 /// What a stage takes where nothing else is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Usual {
+pub struct StageDefaults {
     /// Steps in all.
     pub steps: usize,
     /// Examples of a batch.
@@ -25,14 +25,14 @@ pub struct Usual {
 /// How a stage of training runs.
 #[derive(Debug, Clone)]
 pub struct StageOptions {
-    /// Steps in all; `None`: the [`Usual`] number.
+    /// Steps in all; `None`: the [`StageDefaults`] number.
     pub steps: Option<usize>,
     /// Examples of a batch; `None`: the usual number.
     pub batch: Option<usize>,
     /// Largest step of the optimizer; `None`: the usual one.
     pub rate: Option<f64>,
     /// Parts of a batch that a device takes one after the other, to save memory.
-    pub accumulation: usize,
+    pub grad_accumulation_steps: usize,
     /// Steps between checkpoints, at least 1.
     pub every: usize,
     /// Seed of everything that is drawn.
@@ -53,7 +53,7 @@ impl Default for StageOptions {
             steps: None,
             batch: None,
             rate: None,
-            accumulation: 1,
+            grad_accumulation_steps: 1,
             every: 500,
             seed: 7,
             resume: false,
@@ -67,7 +67,7 @@ impl Default for StageOptions {
 impl StageOptions {
     /// Steps in all.
     #[must_use]
-    pub fn steps(&self, usual: &Usual) -> usize {
+    pub fn steps(&self, usual: &StageDefaults) -> usize {
         self.steps.unwrap_or(usual.steps)
     }
 
@@ -75,18 +75,18 @@ impl StageOptions {
     ///
     /// - `identity`: what it learns from, see [`RunOptions::identity`]
     #[must_use]
-    pub fn run(&self, usual: &Usual, identity: Value) -> RunOptions {
+    pub fn run(&self, usual: &StageDefaults, identity: Value) -> RunOptions {
         RunOptions {
             batch: self.batch.unwrap_or(usual.batch),
             seed: self.seed,
             identity,
             trainer: TrainerOptions {
-                rate: Rate {
+                rate: LrSchedule {
                     peak: self.rate.unwrap_or(usual.rate),
                     warmup: WARMUP,
                     steps: self.steps(usual),
                 },
-                accumulation: self.accumulation,
+                grad_accumulation_steps: self.grad_accumulation_steps,
                 bf16: self.bf16,
                 ..TrainerOptions::default()
             },
@@ -144,7 +144,7 @@ mod tests {
 
     use super::*;
 
-    const USUAL: Usual = Usual {
+    const DEFAULTS: StageDefaults = StageDefaults {
         steps: 40,
         batch: 8,
         rate: 1e-3,
@@ -157,7 +157,7 @@ mod tests {
             rate: Some(5e-4),
             ..StageOptions::default()
         };
-        let run = options.run(&USUAL, Value::Null);
+        let run = options.run(&DEFAULTS, Value::Null);
         let rate = run.trainer.rate;
         assert!((rate.peak - 5e-4).abs() < 1e-15);
         assert_eq!((rate.steps, run.batch), (40, 8));

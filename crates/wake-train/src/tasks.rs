@@ -239,7 +239,7 @@ impl Task<Flow> for FlowTask<'_> {
         let indices = examples(self.seed, positions.clone(), self.set.len());
         let levels = positions.clone().map(|p| noise_level(random, p) as f32);
         let scenes = indices.iter().map(|&i| &self.set.example(i).scene);
-        let pairs: Vec<(&Scene, u64)> = scenes.zip(positions.clone()).collect();
+        let pairs: Vec<(&Scene, u64)> = scenes.zip(positions).collect();
         let windows = ChannelWindows::new(self.patches);
         let noise = pairs.par_iter().map(|&(scene, position)| {
             let (scenes, sources) = (std::slice::from_ref(scene), [noise_of(self.seed, position)]);

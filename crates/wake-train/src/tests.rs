@@ -67,12 +67,12 @@ fn options(accumulation: usize) -> RunOptions {
         seed: 5,
         identity: Value::Null,
         trainer: TrainerOptions {
-            rate: Rate {
+            rate: LrSchedule {
                 peak: 3e-3,
                 warmup: 3,
                 steps: 40,
             },
-            accumulation,
+            grad_accumulation_steps: accumulation,
             ..TrainerOptions::default()
         },
     }
@@ -318,7 +318,7 @@ fn of_a_plane(steps: usize) -> Trainer<burn::nn::Linear> {
         .with_bias(false)
         .init(&device);
     let options = TrainerOptions {
-        rate: Rate {
+        rate: LrSchedule {
             peak: 1e-2,
             warmup: 0,
             steps,

@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use serde_json::{Value, json};
 
 use super::checkpoint::{Checkpoint, Tensors};
-use super::optimizer::{Adam, AdamOptions, Average, Rate};
+use super::optimizer::{Adam, AdamOptions, Average, LrSchedule};
 use super::tensors::{gradients, names, replaced, rounded, values};
 use crate::error::{Error, Result};
 use wake_nn::check_range;
@@ -19,15 +19,15 @@ const LOST: usize = 20;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainerOptions {
     /// Size of the steps.
-    pub rate: Rate,
+    pub rate: LrSchedule,
     /// Constants of the optimizer.
     pub adam: AdamOptions,
     /// The largest norm of all gradients together; longer ones are shortened to it.
-    pub largest_norm: f64,
+    pub max_grad_norm: f64,
     /// Decay of the averaged weights.
-    pub average_decay: f64,
+    pub ema_decay: f64,
     /// Parts of a batch that one device takes after the other.
-    pub accumulation: usize,
+    pub grad_accumulation_steps: usize,
     /// Whether losses and gradients are computed with weights of type `bfloat16`, where the device has it; weights,
     /// averages and steps are 32 bits all the same (Micikevicius et al. 2018, "Mixed Precision Training", section 3.1).
     pub bf16: bool,
@@ -36,15 +36,15 @@ pub struct TrainerOptions {
 impl Default for TrainerOptions {
     fn default() -> Self {
         Self {
-            rate: Rate {
+            rate: LrSchedule {
                 peak: 1e-3,
                 warmup: 200,
                 steps: 10_000,
             },
             adam: AdamOptions::default(),
-            largest_norm: 1.0,
-            average_decay: 0.999,
-            accumulation: 1,
+            max_grad_norm: 1.0,
+            ema_decay: 0.999,
+            grad_accumulation_steps: 1,
             bf16: false,
         }
     }
@@ -68,18 +68,18 @@ impl TrainerOptions {
         check_range("beta_2", beta_2, 0.0, 0.999999)?;
         check_range("epsilon", epsilon, 1e-16, 1.0)?;
         check_range("weight_decay", weight_decay, 0.0, 1.0)?;
-        check_range("largest_norm", self.largest_norm, 1e-6, 1e6)?;
-        check_range("average_decay", self.average_decay, 0.0, 0.999999)?;
+        check_range("max_grad_norm", self.max_grad_norm, 1e-6, 1e6)?;
+        check_range("ema_decay", self.ema_decay, 0.0, 0.999999)?;
         Ok(check_range(
-            "accumulation",
-            self.accumulation as f64,
+            "grad_accumulation_steps",
+            self.grad_accumulation_steps as f64,
             1.0,
             65536.0,
         )?)
     }
 
     /// What two runs must have in common for one to go on from the other; more steps may be asked of the second, and
-    /// `accumulation` changes no result.
+    /// `grad_accumulation_steps` changes no result.
     pub(super) fn state(&self) -> Value {
         let AdamOptions {
             beta_1,
@@ -89,8 +89,8 @@ impl TrainerOptions {
         } = self.adam;
         json!({
             "rate": self.rate.peak, "warmup": self.rate.warmup, "beta_1": beta_1, "beta_2": beta_2,
-            "epsilon": epsilon, "weight_decay": weight_decay, "largest_norm": self.largest_norm,
-            "average_decay": self.average_decay, "bf16": self.bf16,
+            "epsilon": epsilon, "weight_decay": weight_decay, "max_grad_norm": self.max_grad_norm,
+            "ema_decay": self.ema_decay, "bf16": self.bf16,
         })
     }
 }
@@ -138,7 +138,7 @@ impl<M: Module> Trainer<M> {
         let weights = values(&model);
         Self {
             adam: Adam::new(options.adam, weights.len()),
-            average: Average::new(weights, options.average_decay),
+            average: Average::new(weights, options.ema_decay),
             model,
             options,
             devices,
@@ -172,7 +172,7 @@ impl<M: Module> Trainer<M> {
 
     /// Parts that a batch is cut into.
     pub fn parts(&self) -> usize {
-        self.devices.len() * self.options.accumulation
+        self.devices.len() * self.options.grad_accumulation_steps
     }
 
     /// Whether the run still learns.
@@ -203,7 +203,7 @@ impl<M: Module> Trainer<M> {
         let rate = self.options.rate.at(self.step);
         let applied = norm.is_finite() && loss.is_finite();
         if applied {
-            let scale = (self.options.largest_norm / (norm + 1e-6)).min(1.0);
+            let scale = (self.options.max_grad_norm / (norm + 1e-6)).min(1.0);
             let weights = self.adam.step(values(&self.model), gradients, rate, scale);
             self.applied += 1;
             self.average.update(&weights, self.applied);
@@ -226,7 +226,7 @@ impl<M: Module> Trainer<M> {
         &self,
         loss: &(impl Fn(&M, &Device, usize) -> Tensor<1> + Sync),
     ) -> (Vec<Tensor<1>>, f64) {
-        let accumulation = self.options.accumulation;
+        let accumulation = self.options.grad_accumulation_steps;
         let bf16 = self.options.bf16;
         let work = |model: M, device: &Device, worker: usize| {
             let model = match bf16 {
@@ -355,7 +355,7 @@ impl<M: Module> Trainer<M> {
         let state = [group(a)?, group(b)?, group(c)?, group(d)?];
         let [weights, average, first, second] = state;
         self.model = replaced(self.model.clone(), weights);
-        self.average = Average::new(average, self.options.average_decay);
+        self.average = Average::new(average, self.options.ema_decay);
         self.adam = Adam::resumed(self.options.adam, [first, second], checkpoint.applied);
         (self.step, self.applied, self.lost) = (checkpoint.step, checkpoint.applied, 0);
         Ok(())

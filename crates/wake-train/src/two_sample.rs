@@ -5,7 +5,7 @@ use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor, TensorData};
 use wake_physics::Field;
 
-use super::optimizer::Rate;
+use super::optimizer::LrSchedule;
 use super::trainer::{Trainer, TrainerOptions};
 use crate::error::{Error, Result};
 use crate::streams::PLACES;
@@ -87,7 +87,7 @@ pub struct TwoSample {
 /// # References
 ///
 /// Lopez-Paz & Oquab (2017), "Revisiting Classifier Two-Sample Tests".
-pub fn two_sample(
+pub fn classifier_two_sample_test(
     first: &[Field],
     second: &[Field],
     options: &TwoSampleOptions,
@@ -97,12 +97,12 @@ pub fn two_sample(
     let learning = device.clone().autodiff();
     learning.seed(options.seed);
     let trainer_options = TrainerOptions {
-        rate: Rate {
+        rate: LrSchedule {
             peak: RATE,
             warmup: 20.min(options.steps),
             steps: options.steps,
         },
-        average_decay: 0.98,
+        ema_decay: 0.98,
         ..TrainerOptions::default()
     };
     let mut trainer = Trainer::new(Network::new(&learning), trainer_options, vec![learning]);
@@ -362,17 +362,20 @@ mod tests {
     fn what_differs_is_told_apart_and_what_does_not_is_not() {
         let device = Device::flex();
         let white = images(16, 100, false);
-        let same = two_sample(&white, &images(16, 300, false), &OPTIONS, &device).unwrap();
+        let same =
+            classifier_two_sample_test(&white, &images(16, 300, false), &OPTIONS, &device).unwrap();
         assert_eq!(same.images, 16);
         let tolerance = 2.0 * same.half_width.max(0.05);
         assert!((same.accuracy - 0.5).abs() < tolerance, "{same:?}");
         // 64 patches of each kind: a mean is known to 1/8 of a deviation, the difference of two to √2/8, and four of these.
         assert!(same.distance.abs() < 4.0 * 2f64.sqrt() / 8.0, "{same:?}");
-        let other = two_sample(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();
+        let other =
+            classifier_two_sample_test(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();
         assert!(other.accuracy > 0.95, "{other:?}");
         // Two normal kinds of which 95 of 100 lie on their side of the middle are 2 · 1.645 deviations apart.
         assert!(other.distance > 3.29, "{other:?}");
-        let again = two_sample(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();
+        let again =
+            classifier_two_sample_test(&white, &images(16, 300, true), &OPTIONS, &device).unwrap();
         assert_eq!(other, again);
     }
 
@@ -398,7 +401,7 @@ mod tests {
         let device = Device::flex();
         let white = images(4, 1, false);
         let refused = |options: &TwoSampleOptions, second: &[Field]| {
-            two_sample(&white, second, options, &device)
+            classifier_two_sample_test(&white, second, options, &device)
                 .unwrap_err()
                 .to_string()
         };

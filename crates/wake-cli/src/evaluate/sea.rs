@@ -9,7 +9,7 @@ use wake_nn::device_named;
 use wake_physics::Field;
 use wake_physics::picture::Picture;
 use wake_train::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
-use wake_train::{TwoSampleOptions, two_sample};
+use wake_train::{TwoSampleOptions, classifier_two_sample_test};
 
 use super::sea_report;
 use crate::exit::{self, Outcome};
@@ -83,7 +83,8 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     let spectrum = mean_spectrum(&right);
     let mut rows = vec![SeaRow::of("real, right halves", &right, &spectrum, None)];
     for (name, fields) in &kinds {
-        let told = two_sample(&right, fields, &TwoSampleOptions::default(), &device)?;
+        let told =
+            classifier_two_sample_test(&right, fields, &TwoSampleOptions::default(), &device)?;
         rows.push(SeaRow::of(name, fields, &spectrum, Some(told)));
         bar.inc(1);
     }

@@ -78,7 +78,7 @@ impl Place {
     /// How a stage runs that takes what is usual for it.
     pub(crate) fn stage(&self, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
-            accumulation: usize::from(thrift.accumulation),
+            grad_accumulation_steps: usize::from(thrift.accumulation),
             checkpointing: thrift.checkpointing,
             bf16: thrift.bf16,
             every: self.every as usize,

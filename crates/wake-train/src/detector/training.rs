@@ -21,12 +21,12 @@ use crate::folder::RunFolder;
 use crate::progress::Progress;
 use crate::run::{Run, RunOptions, Task, Terms, number};
 use crate::stage::Stage;
-use crate::stage_options::{StageOptions, Usual};
+use crate::stage_options::{StageDefaults, StageOptions};
 use wake_detector::network::Network;
 use wake_detector::self_check::self_check;
 
 /// What a run takes where nothing else is asked for.
-const USUAL: Usual = Usual {
+const DEFAULTS: StageDefaults = StageDefaults {
     steps: 2500,
     batch: 16,
     rate: 2e-3,
@@ -168,7 +168,7 @@ impl DetectorTraining {
             name: STAGE,
             resume: options.resume,
             every: options.every,
-            steps: options.steps(&USUAL),
+            steps: options.steps(&DEFAULTS),
             results: &[WEIGHTS],
         };
         stage.train(&mut folder, run, &task, progress, show)
@@ -176,12 +176,12 @@ impl DetectorTraining {
 
     /// The run, checked before anything is made.
     fn constants(&self) -> Result<RunOptions> {
-        let mut constants = self.options.run(&USUAL, Value::Null);
+        let mut constants = self.options.run(&DEFAULTS, Value::Null);
         let trainer = &mut constants.trainer;
         trainer.rate.warmup = trainer.rate.warmup.min(trainer.rate.steps);
         trainer.adam.weight_decay = 1e-3;
-        trainer.largest_norm = 5.0;
-        trainer.average_decay = 0.995;
+        trainer.max_grad_norm = 5.0;
+        trainer.ema_decay = 0.995;
         constants.validate(self.options.devices.len())?;
         let weights = self.weights.as_deref().map(fingerprint).transpose()?;
         constants.identity = json!({

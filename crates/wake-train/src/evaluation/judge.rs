@@ -4,7 +4,7 @@ use burn::tensor::Device;
 use wake_physics::Field;
 
 use crate::error::Result;
-use crate::{TwoSample, TwoSampleOptions, two_sample};
+use crate::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
 
 /// Networks that are trained to tell two kinds of images apart, if those before were right less often than [`FOUND`]: one that
 /// finds nothing proves little.
@@ -12,14 +12,14 @@ const NETWORKS: u64 = 3;
 const FOUND: f64 = 0.9;
 
 /// What the network that tells two kinds of images apart best says of them, the best of up to three
-/// [`two_sample`] tests of their default options with seeds of their own; `None` of less than four images.
+/// [`classifier_two_sample_test`] tests of their default options with seeds of their own; `None` of less than four images.
 ///
 /// - `first`, `second`: images of one size, as many of both kinds; image k of both may show the same scene
 /// - `device`: one that holds no gradients
 ///
 /// # Errors
 ///
-/// As [`two_sample`].
+/// As [`classifier_two_sample_test`].
 pub fn told_apart(first: &[Field], second: &[Field], device: &Device) -> Result<Option<TwoSample>> {
     let mut best: Option<TwoSample> = None;
     if first.len() < 4 {
@@ -30,7 +30,7 @@ pub fn told_apart(first: &[Field], second: &[Field], device: &Device) -> Result<
             seed,
             ..TwoSampleOptions::default()
         };
-        let told = two_sample(first, second, &options, device)?;
+        let told = classifier_two_sample_test(first, second, &options, device)?;
         best = best
             .filter(|best| best.accuracy >= told.accuracy)
             .or(Some(told));

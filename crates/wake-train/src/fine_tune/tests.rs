@@ -9,7 +9,7 @@ use wake_dataset::Grey;
 
 use super::*;
 use crate::tensors::values;
-use crate::{Checkpoint, Rate, Run, RunOptions, TrainerOptions};
+use crate::{Checkpoint, LrSchedule, Run, RunOptions, TrainerOptions};
 use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::scheduler::{BetaCurve, NoiseSchedule, Prediction, TerminalSnr};
 use wake_ldm::text::ClipTextConfig;
@@ -76,12 +76,12 @@ fn options(peak: f64, accumulation: usize) -> RunOptions {
         seed: 1,
         identity: Value::Null,
         trainer: TrainerOptions {
-            rate: Rate {
+            rate: LrSchedule {
                 peak,
                 warmup: 2,
                 steps: 100,
             },
-            accumulation,
+            grad_accumulation_steps: accumulation,
             ..TrainerOptions::default()
         },
     }

@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 
 use super::super::folder::RunFolder;
 use super::super::progress::Progress;
-use super::super::run::{Run, RunOptions, Task};
+use super::super::run::{Run, RunOptions};
 use super::super::stage::Stage;
-use super::super::stage_options::{StageOptions, Usual};
+use super::super::stage_options::{StageDefaults, StageOptions};
 use super::{FineTuneTask, Frozen, PromptedPairs};
 use crate::error::{Error, Result};
 use wake_dataset::Folder;
@@ -22,7 +22,7 @@ use wake_nn::weights::{Layout, Precision};
 use whole_files::fingerprint;
 
 /// The paper's recipe: batch 16, rate 1e-5.
-const USUAL: Usual = Usual {
+const DEFAULTS: StageDefaults = StageDefaults {
     steps: 1000,
     batch: 16,
     rate: 1e-5,
@@ -73,7 +73,7 @@ impl FineTuning<'_> {
             "prediction": format!("{prediction:?}"),
         });
         let begin = (STAGE, self.options.resume);
-        let folder = RunFolder::open(out, &model, &constants.identity, begin)?;
+        let mut folder = RunFolder::open(out, &model, &constants.identity, begin)?;
         let frozen = Frozen {
             text: parts.text_encoder.clone(),
             autoencoder: parts.autoencoder.clone(),
@@ -89,13 +89,20 @@ impl FineTuning<'_> {
             };
             Ok(Pipeline::new(parts, &device)?.save(out, Precision::F32)?)
         };
+        let stage = |results| Stage {
+            name: STAGE,
+            resume: self.options.resume,
+            every: self.options.every,
+            steps: self.options.steps(&DEFAULTS),
+            results,
+        };
         let unet = parts.unet.clone();
         match self.rank {
             None => {
                 let init = |_: &_| unet.train();
                 let run = Run::of(STAGE, &model, init, constants, devices)?;
                 let show = |run: &Run<UNet>| save(run.averaged());
-                self.make(folder, run, &task, &[INDEX, UNET], progress, show)
+                stage(&[INDEX, UNET]).train(&mut folder, run, &task, progress, show)
             }
             Some(rank) => {
                 let task = task.with_base(&unet);
@@ -108,33 +115,14 @@ impl FineTuning<'_> {
                     save(changes.merged(unet.clone()))?;
                     Ok(changes.save("unet", &out.join(CHANGES))?)
                 };
-                self.make(folder, run, &task, &[INDEX, UNET, CHANGES], progress, show)
+                stage(&[INDEX, UNET, CHANGES]).train(&mut folder, run, &task, progress, show)
             }
         }
     }
 
-    fn make<M: Module, T: Task<M>>(
-        &self,
-        mut folder: RunFolder,
-        run: Run<M>,
-        task: &T,
-        results: &[&str],
-        progress: &dyn Fn(Progress),
-        show: impl Fn(&Run<M>) -> Result<()>,
-    ) -> Result<()> {
-        let stage = Stage {
-            name: STAGE,
-            resume: self.options.resume,
-            every: self.options.every,
-            steps: self.options.steps(&USUAL),
-            results,
-        };
-        stage.train(&mut folder, run, task, progress, show)
-    }
-
     /// The run, checked before anything is read but the files that it learns from.
     fn constants(&self) -> Result<RunOptions> {
-        let mut constants = self.options.run(&USUAL, Value::Null);
+        let mut constants = self.options.run(&DEFAULTS, Value::Null);
         constants.trainer.rate.warmup = WARMUP;
         constants.validate(self.options.devices.len())?;
         constants.identity = self.identity()?;

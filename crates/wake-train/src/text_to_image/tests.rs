@@ -6,7 +6,7 @@ use burn::tensor::Device;
 use serde_json::Value;
 
 use super::*;
-use crate::{Rate, Run, RunOptions, TrainerOptions};
+use crate::{LrSchedule, Run, RunOptions, TrainerOptions};
 use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::scheduler::{BetaCurve, TerminalSnr};
 use wake_ldm::text::ClipTextConfig;
@@ -18,12 +18,12 @@ fn options(batch: usize, peak: f64, steps: usize) -> RunOptions {
         seed: 3,
         identity: Value::Null,
         trainer: TrainerOptions {
-            rate: Rate {
+            rate: LrSchedule {
                 peak,
                 warmup: 5,
                 steps,
             },
-            average_decay: 0.9,
+            ema_decay: 0.9,
             ..TrainerOptions::default()
         },
     }

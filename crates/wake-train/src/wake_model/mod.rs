@@ -17,7 +17,7 @@ use super::latents::LatentSet;
 use super::pairs::TrainingPairs;
 use super::progress::{Progress, counted};
 use super::stage::Stage;
-use super::stage_options::{StageOptions, Usual};
+use super::stage_options::{StageDefaults, StageOptions};
 use crate::error::{Error, Result};
 use wake_ldm::network::{PatchTransform, WakeModelConfig};
 use wake_nn::weights::{Layout, Precision, load, save_as};
@@ -59,14 +59,14 @@ impl WakeStage {
 
     /// What it takes where nothing else is asked for; the autoencoder takes no steps.
     #[must_use]
-    pub fn usual(self) -> Usual {
+    pub fn usual(self) -> StageDefaults {
         let (steps, batch, rate) = match self {
             Self::Autoencoder => (1, 1, 1e-3),
             Self::Words => (4000, 128, 1e-3),
             Self::Mean => (6000, 32, 2e-3),
             Self::Diffusion => (6000, 8, 1e-3),
         };
-        Usual { steps, batch, rate }
+        StageDefaults { steps, batch, rate }
     }
 
     /// What is there when it is done.

@@ -11,7 +11,7 @@ use wake_nn::device_named;
 use wake_physics::Field;
 use wake_train::detector::Recipe;
 use wake_train::detector::judging::{Tile, paired_windows};
-use wake_train::{TwoSampleOptions, two_sample};
+use wake_train::{TwoSampleOptions, classifier_two_sample_test};
 
 use super::HELD_OUT;
 use crate::exit::Outcome;
@@ -73,7 +73,8 @@ pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
         ),
     ];
     let row = |(name, first, second): (&str, &[Field], Vec<Field>)| {
-        let found = two_sample(first, &second, &TwoSampleOptions::default(), &device)?;
+        let found =
+            classifier_two_sample_test(first, &second, &TwoSampleOptions::default(), &device)?;
         Ok(json!({
             "kinds": name, "accuracy": found.accuracy, "half_width": found.half_width, "images": found.images,
         }))
