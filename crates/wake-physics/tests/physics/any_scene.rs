@@ -105,9 +105,9 @@ prop_compose! {
             echo,
             filter_depth,
             edge,
-            edge_time,
-            edge_outflow,
-            roll,
+            edge_time: edge_time.filter(|_| edge),
+            edge_outflow: if edge { edge_outflow } else { 0.0 },
+            roll: if echo { roll } else { 0.0 },
         }
     }
 }
@@ -151,7 +151,7 @@ prop_compose! {
             look_overlap: look_overlap.filter(|_| responds),
             noise_floor,
             ambiguity: ambiguity.filter(|_| responds),
-            pulse_rate: Some(pulse_rate),
+            pulse_rate: ambiguity.filter(|_| responds).map(|_| pulse_rate),
             relaxation_rate,
         }
     }
