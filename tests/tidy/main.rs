@@ -17,7 +17,7 @@ use imports::{Crate, Names};
 use picture::Column;
 
 /// The crates, in the order in which they import each other.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 9] = [
     "whole-files",
     "wake-physics",
     "wake-text",
@@ -27,7 +27,6 @@ const CRATES: [&str; 10] = [
     "wake-detector",
     "wake-train",
     "wake-geo",
-    "wake-cli",
 ];
 
 /// Longest source file [lines]: tests are not counted.

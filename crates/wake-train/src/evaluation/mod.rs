@@ -21,7 +21,7 @@
 //! let images = Baseline::Gaussian.draw(&scenes, Told::Both)?;
 //! let reading = Reading::of(&images[0], &scenes[0])?;
 //! println!("error of the wind speed {:?} m/s", reading.error(Quantity::WindSpeed, &scenes[0]));
-//! # Ok::<(), wake_ldm::Error>(())
+//! # Ok::<(), wake_train::Error>(())
 //! ```
 
 // What is judged, and what beside it.

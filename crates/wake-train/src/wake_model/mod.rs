@@ -95,7 +95,7 @@ impl WakeStage {
 /// let stage = (WakeStage::Diffusion, StageOptions::default());
 /// let mut training = WakeTraining::open("out/train".into(), stage, config, Some(pairs), &|_| {})?;
 /// training.diffusion()?;
-/// # Ok::<(), wake_ldm::Error>(())
+/// # Ok::<(), wake_train::Error>(())
 /// ```
 pub struct WakeTraining<'a> {
     folder: RunFolder,
