@@ -29,7 +29,8 @@ impl Folder {
             return Err(broken(path, 0, message));
         };
         let metadata = Layout(path).metadata();
-        let text = std::fs::read(&metadata).map_err(|e| cannot("read", &metadata, e))?;
+        let text =
+            whole_files::read_regular(&metadata).map_err(|e| cannot("read", &metadata, e))?;
         let rows = parse(&metadata, &text, &manifest)?;
         let expected = manifest.indices().end - manifest.indices().start;
         if rows.len() as u64 != expected {

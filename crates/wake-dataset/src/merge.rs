@@ -51,7 +51,7 @@ fn merged_before(folder: &Path) -> Result<Option<Manifest>> {
         return Ok(None);
     };
     let last = Layout(folder).yolo();
-    let metadata = std::fs::read(Layout(folder).metadata()).unwrap_or_default();
+    let metadata = whole_files::read_regular(&Layout(folder).metadata()).unwrap_or_default();
     let lines = metadata.iter().filter(|&&b| b == b'\n').count();
     let finished = last.is_file() && lines as u64 == whole.count;
     Ok((finished && whole.shard.is_none()).then_some(whole))
@@ -98,7 +98,7 @@ fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
 /// The lines of a shard and their rows, all of them, with every file here or already moved, and as it was written.
 fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec<u8>, Rows)> {
     let metadata = Layout(path).metadata();
-    let text = std::fs::read(&metadata).map_err(|e| cannot("read", &metadata, e))?;
+    let text = whole_files::read_regular(&metadata).map_err(|e| cannot("read", &metadata, e))?;
     let rows = parse(&metadata, &text, manifest)?;
     let unfinished = |what: String| {
         let message = format!("{what}; make the same shard again to finish it");

@@ -58,7 +58,7 @@ impl Row {
     ///
     /// [`Error::Dataset`](crate::Error::Dataset) if the file is not the one that was written with this row.
     pub(super) fn image_bytes(&self, path: &Path, line: usize) -> Result<Vec<u8>> {
-        let bytes = std::fs::read(path).map_err(|e| cannot("read", path, e))?;
+        let bytes = whole_files::read_regular(path).map_err(|e| cannot("read", path, e))?;
         let found = checksum(&bytes);
         if found == self.image_crc32 {
             return Ok(bytes);
@@ -96,7 +96,9 @@ impl Row {
     ) -> Result<()> {
         self.image_bytes(image, line)?;
         for (path, text) in labels.iter().zip(self.labels(size)) {
-            if std::fs::read(path).map_err(|e| cannot("read", path, e))? != text.as_bytes() {
+            if whole_files::read_regular(path).map_err(|e| cannot("read", path, e))?
+                != text.as_bytes()
+            {
                 let message = format!(
                     "changed: not the labels of line {line} of metadata.jsonl; remove the file and run `wake dataset` again \
                      to make it anew"
@@ -183,7 +185,7 @@ impl Log {
         let mut options = OpenOptions::new();
         let open = options.read(true).write(true).create(true).truncate(false);
         let mut file = open.open(&path).map_err(failed)?;
-        let text = std::fs::read(&path).map_err(failed)?;
+        let text = whole_files::read_regular(&path).map_err(failed)?;
         let whole = text.iter().rposition(|&b| b == b'\n').map_or(0, |n| n + 1);
         let rows = parse(&path, &text[..whole], manifest)?;
         check(&path, &text[..whole], &rows, manifest)?;

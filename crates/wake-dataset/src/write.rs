@@ -127,7 +127,7 @@ pub(super) fn claim(folder: &Path, manifest: &str, shard: Option<Shard>) -> Resu
 
 /// Whether a file has exactly this content.
 pub(super) fn is_text(path: &Path, text: &str) -> bool {
-    std::fs::read(path).is_ok_and(|found| found == text.as_bytes())
+    whole_files::read_regular(path).is_ok_and(|found| found == text.as_bytes())
 }
 
 /// Whether a folder holds nothing but what a run may have left before its `dataset.json`: shards, the note of its own

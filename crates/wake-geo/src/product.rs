@@ -1,6 +1,5 @@
 //! One type for every raster with places.
 
-use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -69,7 +68,7 @@ impl Product {
         if path.is_dir() {
             return Self::open_sentinel1(path, polarization);
         }
-        let mut file = File::open(path).map_err(|e| Error::io(path, e))?;
+        let mut file = whole_files::open_regular(path).map_err(|e| Error::io(path, e))?;
         let mut magic = Vec::new();
         let start = (&mut file).take(4).read_to_end(&mut magic);
         start.map_err(|e| Error::io(path, e))?;

@@ -47,6 +47,25 @@ fn says(sentence: &str, parts: &[&str]) {
     }
 }
 
+/// Opening a pipe would wait for somebody to write into it.
+#[test]
+fn pipes_are_no_products() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("scene.tif");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.expect("mkfifo").success());
+    says(&sentence(&pipe), &["scene.tif", "no regular file"]);
+    let files = files();
+    let (_kept, safe) = common::folder_of(NAME, &files);
+    let measurement = safe.join(&files[MEASUREMENT].0);
+    std::fs::remove_file(&measurement).expect("a measurement");
+    let made = std::process::Command::new("mkfifo")
+        .arg(&measurement)
+        .status();
+    assert!(made.expect("mkfifo").success());
+    says(&sentence(&safe), &["no regular file"]);
+}
+
 #[test]
 fn missing_files_are_named() {
     says(

@@ -10,7 +10,7 @@ use tokenizers::models::bpe::{Merges, Vocab};
 
 /// Reads a text file.
 pub(crate) fn read(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|e| Error::File {
+    let bytes = whole_files::read_regular(path).map_err(|e| Error::File {
         path: path.to_owned(),
         message: e.to_string(),
     })?;

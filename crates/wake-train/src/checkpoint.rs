@@ -146,7 +146,7 @@ impl Checkpoint {
             if file.file_name() != Some(name.as_ref()) {
                 return Err(damaged(&file));
             }
-            let bytes = fs::read(&file).map_err(|source| match source.kind() {
+            let bytes = whole_files::read_regular(&file).map_err(|source| match source.kind() {
                 ErrorKind::NotFound => damaged(&file),
                 _ => io("read", &file, source),
             })?;

@@ -92,7 +92,7 @@ pub(super) fn unreadable(path: &Path, source: std::io::Error) -> Error {
 
 /// The lines of the first `step` steps; half a line at the end, which a kill left, is dropped.
 fn kept_lines(path: &Path, step: usize) -> Result<String> {
-    let bytes = match fs::read(path) {
+    let bytes = match whole_files::read_regular(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
         Err(source) => return Err(unreadable(path, source)),

@@ -12,6 +12,6 @@ mod read;
 pub use checksum::{checksum, sealed, unsealed};
 pub use error::{Error, Result};
 pub use folder::{FolderLock, lock_folder, make_folder, sweep};
-pub use read::{fingerprint, read_bytes, read_text};
+pub use read::{fingerprint, open_regular, read_bytes, read_regular, read_text};
 pub use text::{quoted, sentence};
 pub use write::{is_temporary, write_atomically, write_json, write_synced, write_with};

@@ -2,7 +2,7 @@
 
 use crate::error::{Result, failed};
 use std::fs::{self, File};
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// No text file that is read as a whole is longer than this \[bytes\].
@@ -15,13 +15,12 @@ const LONGEST_TEXT: u64 = 16 << 20;
 /// [`Error`](crate::Error) if it is longer, no regular file, no UTF-8, or cannot be read.
 pub fn read_text(path: &Path) -> Result<String> {
     let io = |source| failed("read", path, source);
-    check_regular(path)?;
     let mut text = String::new();
-    let mut file = File::open(path).map_err(io)?.take(LONGEST_TEXT + 1);
+    let mut file = open_regular(path).map_err(io)?.take(LONGEST_TEXT + 1);
     file.read_to_string(&mut text).map_err(io)?;
     if text.len() as u64 > LONGEST_TEXT {
         let message = "longer than 16 MiB";
-        return Err(io(std::io::Error::other(message)));
+        return Err(io(io::Error::other(message)));
     }
     Ok(text)
 }
@@ -32,17 +31,30 @@ pub fn read_text(path: &Path) -> Result<String> {
 ///
 /// [`Error`](crate::Error) if it is no regular file or cannot be read.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    check_regular(path)?;
-    fs::read(path).map_err(|source| failed("read", path, source))
+    read_regular(path).map_err(|source| failed("read", path, source))
 }
 
-/// Refuses what is no regular file: opening a pipe would wait for somebody to write into it.
-fn check_regular(path: &Path) -> Result<()> {
-    let io = |source| failed("read", path, source);
-    match fs::metadata(path).map_err(io)?.is_file() {
-        true => Ok(()),
-        false => Err(io(std::io::Error::other("no regular file"))),
+/// Opens a regular file: opening a pipe would wait for somebody to write into it.
+///
+/// # Errors
+///
+/// If it is no regular file or cannot be opened.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    match fs::metadata(path)?.is_file() {
+        true => File::open(path),
+        false => Err(io::Error::other("no regular file")),
     }
+}
+
+/// The bytes of a regular file, as [`open_regular`] opens it.
+///
+/// # Errors
+///
+/// If it is no regular file or cannot be read.
+pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open_regular(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// A short name of the content of a file, which is read piece by piece: FNV-1a of 64 bits.
@@ -56,8 +68,7 @@ fn check_regular(path: &Path) -> Result<()> {
 /// Fowler, Noll & Vo, "The FNV Non-Cryptographic Hash Algorithm".
 pub fn fingerprint(path: &Path) -> Result<String> {
     let io = |source| failed("read", path, source);
-    check_regular(path)?;
-    let mut file = File::open(path).map_err(io)?;
+    let mut file = open_regular(path).map_err(io)?;
     let mut piece = vec![0; 1 << 20];
     let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
     loop {

@@ -31,6 +31,29 @@ fn told(files: &Tree) -> [Result<(), String>; 2] {
     [continued, read()].map(|told| told.map_err(|error| error.to_string()))
 }
 
+/// A pipe in the place of a file is refused: opening it would wait for somebody to write into it.
+#[test]
+fn pipes_are_no_files_of_a_set() {
+    let whole = whole();
+    for name in ["metadata.jsonl", "images/000001.png"] {
+        let folder = TempDir::new().unwrap();
+        plant(folder.path(), &whole);
+        let file = folder.path().join(name);
+        fs::remove_file(&file).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(&file).status();
+        assert!(made.unwrap().success());
+        let read = || -> Result<()> {
+            let set = Folder::open(folder.path())?;
+            (0..COUNT).try_for_each(|index| set.pair(index).map(drop))
+        };
+        let refused = read().unwrap_err().to_string();
+        assert!(
+            refused.contains("no regular file") && refused.contains(name),
+            "{refused}"
+        );
+    }
+}
+
 fn changed(files: &Tree, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> Tree {
     let mut files = files.clone();
     change(files.get_mut(Path::new(name)).unwrap());

@@ -7,7 +7,6 @@ mod lzw;
 mod sample;
 mod writer;
 
-use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -51,7 +50,7 @@ impl GeoTiff {
     /// # Errors
     /// A file that cannot be read, is no TIFF, is truncated, is beyond the limits, or uses what is not supported.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, e))?;
+        let file = whole_files::open_regular(path).map_err(|e| Error::io(path, e))?;
         Self::from_source(&quoted(&path.to_string_lossy()), Arc::new(file))
     }
 

@@ -125,7 +125,7 @@ impl Archive {
         match &self.kind {
             Kind::Folder => {
                 let path = self.path.join(name);
-                let file = File::open(&path).map_err(|e| Error::io(&path, e))?;
+                let file = whole_files::open_regular(&path).map_err(|e| Error::io(&path, e))?;
                 let mut file = file.take(XML_BYTES + 1);
                 file.read_to_end(&mut bytes)
                     .map_err(|e| Error::io(&path, e))?;
@@ -155,7 +155,7 @@ impl Archive {
     pub(crate) fn pixels(&self, name: &str, most: u64) -> Result<Arc<dyn ReadAt>> {
         let Kind::Zip { prefix } = &self.kind else {
             let path = self.path.join(name);
-            let file = File::open(&path).map_err(|e| Error::io(&path, e))?;
+            let file = whole_files::open_regular(&path).map_err(|e| Error::io(&path, e))?;
             return Ok(Arc::new(file));
         };
         let mut archive = zip_at(&self.path)?;
@@ -168,7 +168,8 @@ impl Archive {
             (entry.compression(), entry.encrypted(), start)
         {
             drop(entry);
-            let file = File::open(&self.path).map_err(|e| Error::io(&self.path, e))?;
+            let file =
+                whole_files::open_regular(&self.path).map_err(|e| Error::io(&self.path, e))?;
             return Ok(Arc::new(Section { file, start, size }));
         }
         let folder = std::env::temp_dir();
@@ -186,7 +187,7 @@ impl Archive {
 }
 
 fn zip_at(path: &Path) -> Result<ZipArchive<File>> {
-    let file = File::open(path).map_err(|e| Error::io(path, e))?;
+    let file = whole_files::open_regular(path).map_err(|e| Error::io(path, e))?;
     ZipArchive::new(file)
         .map_err(|e| Error::unreadable(path, format!("no readable zip archive: {e}")))
 }
