@@ -75,7 +75,7 @@ impl SeaFields {
     ///
     /// # Errors
     ///
-    /// As [`SeaNoise::new`].
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that is not valid or does not fit in memory.
     pub fn new(
         scenes: &[Scene],
         sources: &[NoiseSource],
