@@ -109,7 +109,7 @@ impl Checkpoint {
     ///
     /// # Errors
     ///
-    /// [`Error::Value`] with the file whose checksum does not fit, [`wake_nn::Error::Io`] or [`wake_nn::Error::InvalidSafetensors`] for a
+    /// [`Error::Data`] with the file whose checksum does not fit, [`wake_nn::Error::Io`] or [`wake_nn::Error::InvalidSafetensors`] for a
     /// checkpoint that cannot be read.
     pub fn newest(folder: &Path) -> Result<Option<Self>> {
         match checkpoints(folder)?.pop() {

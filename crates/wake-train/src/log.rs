@@ -25,7 +25,7 @@ impl TrainLog {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`] when the file cannot be read or written, [`Error::Value`] with the number of a line that is none
+    /// [`wake_nn::Error::Io`] when the file cannot be read or written, [`Error::Data`] with the number of a line that is none
     /// of a log.
     pub fn open(path: &Path, step: usize) -> Result<Self> {
         let io = |source| {
