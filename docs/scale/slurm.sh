@@ -9,7 +9,7 @@
 #SBATCH --requeue
 set -euo pipefail
 program=${PROGRAM:-target/release/wake}
-out=${OUT:-out/make_dataset}
+out=${OUT:-out/dataset}
 if [ "${1:-}" = merge ]; then
   exec "$program" dataset --merge --out "$out"
 fi

@@ -1,7 +1,7 @@
 """Reads a folder of make_dataset with the libraries that it is made for.
 
     pip install datasets pillow pycocotools
-    python tests/foreign/read_dataset.py out/make_dataset
+    python tests/foreign/read_dataset.py out/dataset
 """
 
 import json

@@ -94,7 +94,7 @@ pub enum Error {
         why: &'static str,
     },
 
-    /// What loading weights, making images and training find wrong.
+    /// An error of weights or devices.
     #[error(transparent)]
     Model(#[from] wake_nn::Error),
 }

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 
 /// Endings of files that are read.
 const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
-/// What the name of a picture of wakes adds to the name of its image.
+/// Suffix of pictures of wakes, after the name of the image.
 const PICTURE: &str = ".wakes.png";
 
 /// Name of an image in results, unique among those of [`image_files`]: its file name, with bytes that are no UTF-8 as `\xFF`.

@@ -41,7 +41,7 @@ pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<
     }
 }
 
-/// What is wrong with the maps, `[OUTPUTS, rows, columns]`.
+/// First fault of the maps `[OUTPUTS, rows, columns]`; `None` for good ones.
 fn fault(values: &[f32]) -> Option<&'static str> {
     if !values.iter().all(|x| x.is_finite()) {
         return Some("not finite");

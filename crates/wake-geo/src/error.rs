@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use whole_files::sentence;
+
 /// Result of the fallible functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -119,7 +121,7 @@ impl Error {
     pub(crate) fn unreadable(path: &Path, why: impl std::fmt::Display) -> Self {
         Self::Unreadable {
             path: path.to_owned(),
-            why: quoted(&why.to_string()),
+            why: sentence(&why.to_string()),
         }
     }
 
@@ -133,18 +135,7 @@ impl Error {
 
 /// A path in a sentence, without control characters.
 fn shown(path: &Path) -> String {
-    quoted(&path.to_string_lossy())
-}
-
-/// Foreign text in a sentence: shortened, control characters replaced.
-pub(crate) fn quoted(text: &str) -> String {
-    const LONGEST: usize = 300;
-    let clean = |c: char| if c.is_control() { '?' } else { c };
-    let mut short: String = text.chars().take(LONGEST).map(clean).collect();
-    if text.chars().nth(LONGEST).is_some() {
-        short.push('…');
-    }
-    short
+    sentence(&path.to_string_lossy())
 }
 
 /// Checks a number against a closed range; NaN lies outside.

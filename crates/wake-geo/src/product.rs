@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::error::{Error, Result, check_range, quoted};
+use crate::error::{Error, Result, check_range};
 use crate::geodesic::track;
 use crate::geolocation::Geolocation;
 use crate::geotiff::GeoTiff;
@@ -13,6 +13,7 @@ use crate::picture::Picture;
 use crate::place::{PixelAxes, Place};
 use crate::safe::{Polarization, Sentinel1};
 use crate::window::{Window, check_window};
+use whole_files::sentence;
 
 /// Raster of pixels, and where they lie on Earth: a Sentinel-1 GRD product, a GeoTIFF, or an image without places.
 ///
@@ -81,7 +82,7 @@ impl Product {
                 ));
             }
             b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+" => {
-                let name = quoted(&path.to_string_lossy());
+                let name = sentence(&path.to_string_lossy());
                 Kind::GeoTiff(Box::new(GeoTiff::from_source(&name, Arc::new(file))?))
             }
             b"\x89PNG" | [0xff, 0xd8, 0xff, _] => {
@@ -218,7 +219,7 @@ impl Product {
                 _ => format!("line {line}, pixel {pixel} lies beyond its map projection"),
             };
             Error::NoPlaces {
-                file: quoted(&self.path.to_string_lossy()),
+                file: sentence(&self.path.to_string_lossy()),
                 why,
             }
         })

@@ -3,8 +3,9 @@
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
-use crate::error::{Error, Result, quoted};
+use crate::error::{Error, Result};
 use crate::limits::{NUMBERS, XML_BYTES, XML_DEPTH, XML_ELEMENTS};
+use whole_files::sentence;
 
 /// Element of an XML file: name without prefix, text, children. Attributes are not kept.
 #[derive(Debug, Default)]
@@ -35,7 +36,7 @@ impl Document {
     /// Text that is no well-formed XML, has a document type (entities could multiply it), or is beyond the limits.
     pub(crate) fn parse(file: &str, text: &str) -> Result<Self> {
         check_limit(file, "the size in bytes", text.len() as u64, XML_BYTES)?;
-        let damaged = |why: String| Error::damaged(file, quoted(&why));
+        let damaged = |why: String| Error::damaged(file, sentence(&why));
         let mut reader = Reader::from_str(text);
         let mut open = vec![Element::default()];
         let mut elements = 0;
@@ -136,7 +137,7 @@ fn check_limit(file: &str, what: &'static str, value: u64, limit: u64) -> Result
 impl<'a> Node<'a> {
     /// Error about this file.
     pub(crate) fn error(self, why: impl AsRef<str>) -> Error {
-        Error::damaged(self.file, quoted(why.as_ref()))
+        Error::damaged(self.file, sentence(why.as_ref()))
     }
 
     /// Name of the element, without prefix.

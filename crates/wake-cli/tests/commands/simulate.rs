@@ -82,7 +82,7 @@ fn an_unwritable_folder_is_named_and_nothing_is_written() {
     cannot_write("simulate", &small);
 }
 
-/// What a good run writes, and the report it prints.
+/// A run writes its four files and prints a report.
 #[test]
 fn a_scene_gives_four_files_and_a_report() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -110,7 +110,7 @@ fn a_scene_gives_four_files_and_a_report() {
     );
 }
 
-/// What is asked for beside them.
+/// Optional files are written under the names that were asked for.
 #[test]
 fn a_drawn_picture_and_fields_for_other_tools_are_written_where_asked_for() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -15,7 +15,7 @@ fn whole() -> Tree {
     tree(folder.path())
 }
 
-/// What a run that continues the set says of it, and what a training that reads all of it says.
+/// Messages of a run that continues the set, and of a reader of all its pairs.
 fn told(files: &Tree) -> [Result<(), String>; 2] {
     let folder = TempDir::new().unwrap();
     plant(folder.path(), files);

@@ -7,9 +7,10 @@ use tiff::tags::{
 use tiff::{TiffError, TiffResult};
 
 use super::sample::{Encoding, SampleType};
-use crate::error::{Error, Result, quoted};
+use crate::error::{Error, Result};
 use crate::limits::{CHUNK_BYTES, IMAGE_PIXELS, IMAGE_SIDE};
 use crate::read_at::Reader;
+use whole_files::sentence;
 
 /// Most samples of a pixel.
 const MOST_BANDS: u16 = 64;
@@ -85,7 +86,7 @@ impl Tags {
     pub(super) fn encoding(&self, file: &str) -> Result<Encoding> {
         let unsupported = |what: String| Error::Unsupported {
             file: file.to_owned(),
-            what: quoted(&what),
+            what: sentence(&what),
             remedy: CONVERT,
         };
         let known = matches!(
@@ -185,9 +186,9 @@ pub(super) fn failed(file: &str, error: &TiffError) -> Error {
     match error {
         TiffError::UnsupportedError(what) => Error::Unsupported {
             file: file.to_owned(),
-            what: quoted(&format!("a feature of this TIFF ({what})")),
+            what: sentence(&format!("a feature of this TIFF ({what})")),
             remedy: CONVERT,
         },
-        other => Error::damaged(file, quoted(&format!("no readable TIFF ({other})"))),
+        other => Error::damaged(file, sentence(&format!("no readable TIFF ({other})"))),
     }
 }

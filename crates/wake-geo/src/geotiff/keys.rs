@@ -3,10 +3,10 @@
 use tiff::decoder::ifd::Value;
 
 use super::chunks::Chunks;
-use crate::error::quoted;
 use crate::geolocation::{Affine, Geolocation, Grid, GridPoint};
 use crate::place::Place;
 use crate::projection::Projection;
+use whole_files::sentence;
 
 pub(crate) const PIXEL_SCALE: u16 = 33550;
 pub(crate) const TIEPOINTS: u16 = 33922;
@@ -27,7 +27,7 @@ pub(crate) const PIXEL_IS_POINT: u16 = 2;
 pub(crate) fn geolocation(file: &str, chunks: &Chunks) -> Geolocation {
     match read(file, chunks) {
         Ok(geolocation) => geolocation,
-        Err(why) => Geolocation::Unknown(quoted(&why)),
+        Err(why) => Geolocation::Unknown(sentence(&why)),
     }
 }
 

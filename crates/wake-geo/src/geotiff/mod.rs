@@ -16,9 +16,10 @@ pub use writer::{Compression, GeoTiffLayout, Placement, TiffSample, write_geotif
 
 use chunks::Chunks;
 
-use crate::error::{Error, Result, quoted};
+use crate::error::{Error, Result};
 use crate::geolocation::Geolocation;
 use crate::read_at::ReadAt;
+use whole_files::sentence;
 
 /// First image of a TIFF file, of which windows are read. Of several bands the first is read.
 ///
@@ -51,7 +52,7 @@ impl GeoTiff {
     /// A file that cannot be read, is no TIFF, is truncated, is beyond the limits, or uses what is not supported.
     pub fn open(path: &Path) -> Result<Self> {
         let file = whole_files::open_regular(path).map_err(|e| Error::io(path, e))?;
-        Self::from_source(&quoted(&path.to_string_lossy()), Arc::new(file))
+        Self::from_source(&sentence(&path.to_string_lossy()), Arc::new(file))
     }
 
     pub(crate) fn from_source(name: &str, source: Arc<dyn ReadAt>) -> Result<Self> {

@@ -12,10 +12,11 @@ use tiff::tags::Tag;
 
 use super::keys;
 use super::sample::SampleType;
-use crate::error::{Error, Result, quoted};
+use crate::error::{Error, Result};
 use crate::geolocation::{Affine, GridPoint};
 use crate::limits::{GRID_POINTS, IMAGE_PIXELS, IMAGE_SIDE};
 use crate::projection::is_geographic;
+use whole_files::sentence;
 
 /// Sample of a file that is written.
 pub trait TiffSample: Copy + Default {
@@ -165,7 +166,7 @@ fn write<T: TiffSample, K: TiffKind, W: Write + Seek>(
 ) -> Result<()> {
     let failed = |e: tiff::TiffError| Error::Unwritable {
         path: path.to_owned(),
-        why: quoted(&e.to_string()),
+        why: sentence(&e.to_string()),
     };
     let mut encoder = encoder.map_err(failed)?;
     let mut directory = encoder.image_directory().map_err(failed)?;

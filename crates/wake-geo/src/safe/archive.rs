@@ -10,6 +10,7 @@ use zip::{CompressionMethod, ZipArchive};
 use crate::error::{Error, Result};
 use crate::limits::{ARCHIVE_FILES, XML_BYTES};
 use crate::read_at::{ReadAt, Section};
+use whole_files::sentence;
 
 /// Files of a product, by their paths below the `.SAFE` folder, with `/` between folders.
 #[derive(Debug)]
@@ -196,7 +197,7 @@ fn check_count(path: &Path, count: usize) -> Result<()> {
     match count <= ARCHIVE_FILES {
         true => Ok(()),
         false => Err(Error::TooLarge {
-            file: crate::error::quoted(&path.to_string_lossy()),
+            file: sentence(&path.to_string_lossy()),
             what: "the number of files",
             value: count as u64,
             limit: ARCHIVE_FILES as u64,
@@ -219,8 +220,5 @@ fn check_size(name: &str, value: u64, limit: u64) -> Result<()> {
 }
 
 fn damaged_entry(name: &str, error: &dyn std::fmt::Display) -> Error {
-    Error::damaged(
-        name,
-        crate::error::quoted(&format!("it cannot be unpacked ({error})")),
-    )
+    Error::damaged(name, sentence(&format!("it cannot be unpacked ({error})")))
 }

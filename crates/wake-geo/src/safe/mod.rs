@@ -19,11 +19,12 @@ use calibration::Calibration;
 use noise::Noise;
 use sigma::{Calibrator, sigma_nought};
 
-use crate::error::{Error, Result, quoted};
+use crate::error::{Error, Result};
 use crate::geotiff::{GeoTiff, SampleType};
 use crate::limits::MEASUREMENT_EXTRA_BYTES;
 use crate::window::Window;
 use crate::xml::Document;
+use whole_files::sentence;
 
 /// One polarization of a Sentinel-1 Level-1 GRD product.
 ///
@@ -213,7 +214,7 @@ fn stems(archive: &Archive) -> Result<Vec<(Polarization, String)>> {
         let mut parts = stem.split('-').skip(2);
         match (parts.next(), parts.next().and_then(Polarization::from_name)) {
             (Some("grd"), Some(polarization)) => found.push((polarization, stem.to_owned())),
-            (Some(kind), _) if other.is_none() => other = Some(quoted(kind).to_uppercase()),
+            (Some(kind), _) if other.is_none() => other = Some(sentence(kind).to_uppercase()),
             _ => {}
         }
     }
@@ -230,7 +231,7 @@ fn stems(archive: &Archive) -> Result<Vec<(Polarization, String)>> {
         .filter(|kind| kind.len() >= 3);
     let by_name = from_name
         .filter(|_| archive.folder_name().starts_with("S1"))
-        .map(quoted);
+        .map(sentence);
     let no_xml = archive
         .names_in("measurement")
         .any(|name| name.ends_with(".nc"));
@@ -263,7 +264,7 @@ fn read_files(
     if kind != "GRD" {
         return Err(Error::ProductType {
             path: archive.path().to_owned(),
-            found: quoted(kind),
+            found: sentence(kind),
         });
     }
     let annotation = Annotation::read(&name, &document)?;
