@@ -12,7 +12,7 @@ use crate::survey::Survey;
 
 /// Tolerance below which sums of waves are transformed in double precision: of the order of `f32`'s rounding over the share
 /// that a sum has.
-const PRECISE: f64 = 1e-3;
+const PRECISE: f64 = 5e-4;
 
 /// Accelerations of the fastest pixels over their standard deviation, and columns that a thread sums at once.
 const FARTHEST_MOVED: f64 = 5.0;
@@ -64,7 +64,7 @@ mod seconds {
     pub(super) const PIXEL: f64 = 6e-8;
     pub(super) const TAP: f64 = 3e-10;
     /// A pixel steeper than the table of σ⁰.
-    pub(super) const STEEP: f64 = 1e-4;
+    pub(super) const STEEP: f64 = 2e-4;
     /// A point of the sea's lattice, all fields.
     pub(super) const LATTICE: f64 = 5e-8;
     /// A pixel of the fields of one sum of waves; the same in double precision.
@@ -107,7 +107,7 @@ mod bytes {
     /// A wave of a ring, one that is kept, and one of those spread at once.
     pub(super) const RING: f64 = 18.0;
     pub(super) const KEPT: f64 = 40.0;
-    pub(super) const SPREAD: [f64; 2] = [400.0, 640.0];
+    pub(super) const SPREAD: [f64; 2] = [560.0, 900.0];
 }
 
 impl Work {
