@@ -164,11 +164,10 @@ fn states_of_runs() {
                 said(Checkpoint::newest(folder.path()))
             });
         }
-        let files = json!({"tensors-000.safetensors": checksum(input)});
-        let state = json!({"step": 1, "applied": 1, "state": {}, "files": files});
+        let state = json!({"step": 1, "applied": 1, "state": {}, "tensors": checksum(input)});
         let state = sealed(&state.to_string()) + "\n";
         with_file(&step, "state.json", state.as_bytes(), |_| ());
-        with_file(&step, "tensors-000.safetensors", input, |path| {
+        with_file(&step, "tensors.safetensors", input, |path| {
             said(Checkpoint::newest(folder.path()));
             std::fs::remove_file(path).expect("a file that was written");
         });

@@ -8,6 +8,6 @@ for shard in 0 1; do
 done
 "$wake" dataset --merge --out "$scratch/set"
 made "$scratch"/set/{metadata.jsonl,coco.json,data.yaml,dataset.json,images/000023.png,labels/000023.txt}
-"$wake" train wake-model mean --data "$scratch/set" --steps 10 --batch 4 --out "$scratch/model"
+"$wake" train wake-model prior --data "$scratch/set" --steps 10 --batch 4 --out "$scratch/model"
 made "$scratch"/model/{config.json,prior.safetensors,mean.jsonl}
 echo "ml_engineer: a data set and ten steps"

@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use serde_json::{Map, Value, json};
 use wake_detector::drawing::Drawing;
 use wake_detector::{
-    Detection, Detector, Finder, GreyImage, image_files, image_name, picture_name,
+    Detection, Detector, Finder, GreyImage, Radon, image_files, image_name, picture_name,
 };
 use whole_files::make_folder;
 
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let finder = finder(arguments)?;
     let bar = progress::bar(files.len() as u64, "images");
     let mut told = Told::default();
-    let searched = search(&files, &finder, arguments, &mut told, &bar);
+    let searched = search(&files, finder.as_ref(), arguments, &mut told, &bar);
     bar.finish_and_clear();
     // Also when the search ended early: what was found until then is told.
     if arguments.json && !told.images.is_empty() {
@@ -73,13 +73,13 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     }
 }
 
-fn finder(arguments: &Arguments) -> Outcome<Finder> {
+fn finder(arguments: &Arguments) -> Outcome<Box<dyn Finder>> {
     match arguments.method {
-        Method::Radon => Ok(Finder::Radon),
+        Method::Radon => Ok(Box::new(Radon)),
         Method::Network => {
             let weights = arguments.weights.as_deref();
             let detector = named::network(weights, &arguments.device, arguments.least_score)?;
-            Ok(Finder::from(match arguments.spacing {
+            Ok(Box::new(match arguments.spacing {
                 Some(metres) => detector.with_spacing(metres)?,
                 None => detector,
             }))
@@ -99,7 +99,7 @@ struct Told {
 /// Searches and draws all files that can be read. A single one that cannot is an error, one of several is noted.
 fn search(
     files: &[PathBuf],
-    finder: &Finder,
+    finder: &dyn Finder,
     arguments: &Arguments,
     told: &mut Told,
     bar: &ProgressBar,

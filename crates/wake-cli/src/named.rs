@@ -7,16 +7,19 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use wake_detector::Detector;
 use wake_nn::device_named;
 #[cfg(feature = "train")]
-use wake_train::detector::Recipe;
+use wake_train::detector::ImageRecipe;
 
 use crate::exit::Outcome;
 
 #[cfg(feature = "train")]
 /// Reads the name of a recipe; `--help` tells what each shows.
-pub(crate) fn recipe() -> impl TypedValueParser<Value = Recipe> {
-    let names = Recipe::ALL.map(|recipe| PossibleValue::new(recipe.name()).help(recipe.about()));
+pub(crate) fn recipe() -> impl TypedValueParser<Value = ImageRecipe> {
+    let names =
+        ImageRecipe::ALL.map(|recipe| PossibleValue::new(recipe.name()).help(recipe.about()));
     PossibleValuesParser::new(names).try_map(|name| {
-        let found = Recipe::ALL.into_iter().find(|recipe| recipe.name() == name);
+        let found = ImageRecipe::ALL
+            .into_iter()
+            .find(|recipe| recipe.name() == name);
         found.ok_or("no such recipe")
     })
 }

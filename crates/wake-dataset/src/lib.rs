@@ -32,20 +32,23 @@ mod source;
 
 mod mixture;
 
-// Pairs → tensors.
-#[cfg(feature = "burn")]
-mod finite;
-#[cfg(feature = "burn")]
+// Pairs → batches.
 mod loader;
 
+#[cfg(feature = "burn")]
+mod batch;
+#[cfg(feature = "burn")]
+mod finite;
+
+#[cfg(feature = "burn")]
+pub use batch::{Batch, Batches, ToBatch};
 pub use draws::Draws;
 pub use error::{Error, Result};
 #[cfg(feature = "burn")]
 pub use finite::Finite;
 pub use folder::{Epochs, Folder};
 pub use layout::{Manifest, Shard};
-#[cfg(feature = "burn")]
-pub use loader::{Batch, Batches, Loader, ToBatch};
+pub use loader::Loader;
 pub use merge::{merge, shard_folder};
 pub use mixture::Mixture;
 pub use pair::{Grey, Pair};

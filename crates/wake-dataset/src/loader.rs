@@ -1,91 +1,9 @@
-//! Pairs as tensors, batch by batch.
-//!
-//! ```
-//! use burn::tensor::Device;
-//! use wake_dataset::{Loader, Recipe, Simulated};
-//!
-//! let recipe = Recipe::default().with_assignments(&["scene.grid.rows = 32", "scene.grid.columns = 32"])?;
-//! let source = Simulated::new(recipe, 7)?;
-//! let mut batches = Loader::new(source).batch(2).threads(2).on(&Device::default())?;
-//! let batch = batches.next().expect("there is always a next one")?;
-//! assert_eq!(batch.images.dims(), [2, 1, 32, 32]);
-//! println!("{:?}, {:?}", batch.scenes[0].ships, batch.objects[0]);
-//! # Ok::<(), wake_dataset::Error>(())
-//! ```
+//! Pairs batch by batch, made on other threads.
 
 use super::ordered::Ordered;
 use super::pair::Pair;
 use super::source::Source;
 use crate::error::Result;
-use burn::data::dataloader::batcher::Batcher;
-use burn::tensor::{Device, Tensor, TensorData};
-use wake_physics::Scene;
-use wake_physics::labels::Object;
-
-/// Some images as one tensor, with what is in them.
-#[derive(Debug, Clone)]
-pub struct Batch {
-    /// Grey scaled to −1…1, `[batch, 1, rows, columns]`.
-    pub images: Tensor<4>,
-    /// What a detector is to find in each image.
-    pub objects: Vec<Vec<Object>>,
-    /// The scene of each image.
-    pub scenes: Vec<Scene>,
-    /// Each scene in words.
-    pub prompts: Vec<String>,
-}
-
-/// Makes a [`Batch`] of pairs of the same size; also for burn's own data loaders.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct ToBatch;
-
-impl Batcher<Pair, Batch> for ToBatch {
-    fn batch(&self, pairs: Vec<Pair>, device: &Device) -> Batch {
-        Parts::of(pairs).onto(device)
-    }
-}
-
-/// A batch that is not on its device yet.
-#[derive(Debug)]
-struct Parts {
-    images: TensorData,
-    objects: Vec<Vec<Object>>,
-    scenes: Vec<Scene>,
-    prompts: Vec<String>,
-}
-
-impl Parts {
-    /// Pairs of one size, as a [`Source`] gives them.
-    fn of(pairs: Vec<Pair>) -> Self {
-        let count = pairs.len();
-        let [rows, columns] = pairs
-            .first()
-            .map_or([0, 0], |pair| [pair.image.rows, pair.image.columns]);
-        let mut values = Vec::with_capacity(count * rows * columns);
-        let (mut objects, mut scenes, mut prompts) = (Vec::new(), Vec::new(), Vec::new());
-        for pair in pairs {
-            values.extend(pair.image.pixels.iter().map(|grey| 2.0 * grey - 1.0));
-            objects.push(pair.labels.objects());
-            scenes.push(pair.scene);
-            prompts.push(pair.prompt);
-        }
-        Self {
-            images: TensorData::new(values, [count, 1, rows, columns]),
-            objects,
-            scenes,
-            prompts,
-        }
-    }
-
-    fn onto(self, device: &Device) -> Batch {
-        Batch {
-            images: Tensor::from_data(self.images, device),
-            objects: self.objects,
-            scenes: self.scenes,
-            prompts: self.prompts,
-        }
-    }
-}
 
 /// Makes the batches of a source on other threads, in order: `Loader::new(source).batch(16).threads(4).on(&device)`.
 ///
@@ -134,189 +52,42 @@ impl<S: Source> Loader<S> {
         }
     }
 
-    /// Starts the threads; the tensors of the batches lie on `device`.
+    /// Starts the threads; each batch comes as its pairs, without end, for loops that make their own tensors.
     ///
     /// # Errors
     ///
-    /// [`Error::Threads`](crate::Error::Threads) if the system gives no thread.
-    pub fn on(self, device: &Device) -> Result<Batches> {
+    /// As [`on`](Self::on); each batch those of [`Source::items`].
+    pub fn pairs(self) -> Result<impl Iterator<Item = Result<Vec<Pair>>>> {
+        self.each(|pairs| pairs)
+    }
+
+    /// What is made of the pairs of each batch, on the threads, in order.
+    pub(super) fn each<T: Send + 'static>(self, make: fn(Vec<Pair>) -> T) -> Result<Ordered<T>> {
         let (source, batch) = (self.source, self.batch as u64);
         let steps = self.start..u64::MAX / batch;
-        let parts = Ordered::new(steps, self.threads, move |step| {
-            let pairs = source.items(step * batch..(step + 1) * batch)?;
-            Ok(Parts::of(pairs))
-        })?;
-        Ok(Batches {
-            parts,
-            device: device.clone(),
+        Ordered::new(steps, self.threads, move |step| {
+            Ok(make(source.items(step * batch..(step + 1) * batch)?))
         })
-    }
-}
-
-/// The batches of a [`Loader`], without end: each thread is up to four ahead.
-#[derive(Debug)]
-pub struct Batches {
-    parts: Ordered<Parts>,
-    device: Device,
-}
-
-impl Iterator for Batches {
-    type Item = Result<Batch>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let parts = self.parts.next()?;
-        Some(parts.map(|parts| parts.onto(&self.device)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Epochs, Finite, Folder, Manifest, Mixture, Recipe, Simulated, write};
-    use burn::data::dataloader::DataLoaderBuilder;
-    use burn::data::dataset::Dataset;
-    use std::collections::BTreeSet;
-    use std::sync::Arc;
+    use crate::{Recipe, Simulated};
 
-    fn source() -> Simulated {
-        let changes = [
-            "scene.grid.rows = 16",
-            "scene.grid.columns = 24",
-            "scene.grid.spacing = 20",
-        ];
-        Simulated::new(Recipe::default().with_assignments(&changes).unwrap(), 5).unwrap()
-    }
-
-    /// Seeds of the scenes, numbers of objects, and pixels.
-    type Told = (Vec<u64>, Vec<usize>, Vec<f32>);
-
-    fn told(batch: Batch) -> Told {
-        assert_eq!(batch.images.dims(), [3, 1, 16, 24]);
-        let seeds = batch.scenes.iter().map(|scene| scene.seed).collect();
-        let objects = batch.objects.iter().map(Vec::len).collect();
-        (
-            seeds,
-            objects,
-            batch.images.into_data().try_to_vec().unwrap(),
-        )
-    }
-
-    /// The first batches.
-    fn first(source: impl Source, threads: usize, start: u64, steps: usize) -> Vec<Told> {
-        let loader = Loader::new(source).batch(3).threads(threads).start(start);
-        let batches = loader.on(&Device::default()).unwrap();
-        batches
-            .take(steps)
-            .map(|batch| told(batch.unwrap()))
-            .collect()
-    }
-
-    fn folder(count: u64) -> (tempfile::TempDir, Folder) {
-        let path = tempfile::tempdir().unwrap();
-        let manifest = Manifest::new(source().recipe().clone(), 5, count).unwrap();
-        let source = manifest.source().unwrap();
-        write(path.path(), &manifest, &source, 2, |_| ()).unwrap();
-        let folder = Folder::open(path.path()).unwrap();
-        (path, folder)
-    }
-
+    /// Whatever the number of threads, a batch holds the pairs of its step.
     #[test]
-    fn batches_do_not_depend_on_the_threads_and_start_at_any_step() {
-        let (_path, folder) = folder(6);
-        let sources: [Arc<dyn Source>; 4] = [
-            Arc::new(source()),
-            Arc::new(folder.clone()),
-            Arc::new(Epochs::new(folder.clone(), 3)),
-            Arc::new(
-                Mixture::new(vec![(2.0, Arc::new(source())), (1.0, Arc::new(folder))]).unwrap(),
-            ),
-        ];
-        for source in sources {
-            let one = first(Arc::clone(&source), 1, 0, 5);
-            for threads in [2, 3] {
-                assert_eq!(first(Arc::clone(&source), threads, 0, 5), one);
-            }
-            assert_eq!(first(Arc::clone(&source), 2, 3, 2), one[3..]);
+    fn pairs_come_in_order_from_any_step() {
+        let size = ["scene.grid.rows = 16", "scene.grid.columns = 16"];
+        let recipe = Recipe::default().with_assignments(&size).unwrap();
+        let source = Simulated::new(recipe, 5).unwrap();
+        let expected = source.items(2..6).unwrap();
+        for threads in [1, 3] {
+            let loader = Loader::new(source.clone()).batch(2).threads(threads);
+            let batches = loader.start(1).pairs().unwrap().take(2);
+            let pairs: Vec<Vec<Pair>> = batches.map(Result::unwrap).collect();
+            assert_eq!(pairs.concat(), expected);
         }
-    }
-
-    #[test]
-    fn images_are_the_grey_of_the_pairs_and_objects_those_of_their_labels() {
-        let (seeds, objects, pixels) = first(source(), 2, 0, 1).remove(0);
-        let pairs = source().items(0..3).unwrap();
-        let greys = pairs.iter().flat_map(|pair| &pair.image.pixels);
-        let expected: Vec<f32> = greys.map(|grey| 2.0 * grey - 1.0).collect();
-        assert_eq!(pixels, expected);
-        let distinct = pixels.iter().any(|v| (v - pixels[0]).abs() > 0.01);
-        assert!(distinct, "a picture, not one grey");
-        let scenes: Vec<u64> = pairs.iter().map(|pair| pair.scene.seed).collect();
-        assert_eq!(seeds, scenes);
-        let found: Vec<usize> = pairs.iter().map(|p| p.labels.objects().len()).collect();
-        assert_eq!(objects, found);
-    }
-
-    /// The same pairs through the data loader of burn, in its own order.
-    #[test]
-    fn burn_loads_them_too() {
-        let loader = DataLoaderBuilder::new(ToBatch)
-            .batch_size(3)
-            .num_workers(2)
-            .set_device(Device::default())
-            .build(Finite {
-                source: source(),
-                length: 6,
-            });
-        let mut batches: Vec<Told> = loader.iter().map(|batch| told(batch.unwrap())).collect();
-        batches.sort_by(|a, b| a.0.cmp(&b.0));
-        let mut expected = first(source(), 1, 0, 2);
-        expected.sort_by(|a, b| a.0.cmp(&b.0));
-        assert_eq!(batches, expected);
-    }
-
-    /// burn's shuffle gives every pair of the chosen length once, in an order of its seed.
-    #[test]
-    fn burn_shuffles_them() {
-        let seeds = |shuffle: u64| -> Vec<u64> {
-            let loader = DataLoaderBuilder::new(ToBatch)
-                .batch_size(3)
-                .shuffle(shuffle)
-                .set_device(Device::default())
-                .build(Finite {
-                    source: source(),
-                    length: 12,
-                });
-            let batches = loader.iter().map(|batch| told(batch.unwrap()).0);
-            batches.flatten().collect()
-        };
-        let all: BTreeSet<u64> = (0..12)
-            .map(|i| source().pair(i).unwrap().scene.seed)
-            .collect();
-        assert_eq!(seeds(1).into_iter().collect::<BTreeSet<u64>>(), all);
-        assert_eq!(seeds(1), seeds(1));
-        assert_ne!(seeds(1), seeds(2));
-        let beyond = Finite {
-            source: source(),
-            length: 2,
-        };
-        assert!(beyond.get(2).unwrap_err().to_string().contains("no pair 2"));
-    }
-
-    #[test]
-    fn a_folder_is_walked_in_order_or_in_another_one_each_epoch() {
-        let (_path, folder) = folder(6);
-        assert_eq!(Dataset::len(&folder), 6);
-        assert_eq!(folder.get(2).unwrap().index, 2);
-        let walk = |source: &dyn Source| -> Vec<u64> {
-            let pairs = source.items(0..18).unwrap();
-            pairs.iter().map(|pair| pair.index).collect()
-        };
-        assert_eq!(walk(&folder), [0, 1, 2, 3, 4, 5].repeat(3));
-        let walked = walk(&Epochs::new(folder, 9));
-        for epoch in walked.chunks(6) {
-            let mut sorted = epoch.to_vec();
-            sorted.sort_unstable();
-            assert_eq!(sorted, [0, 1, 2, 3, 4, 5]);
-        }
-        assert_ne!(walked[..6], walked[6..12]);
     }
 }

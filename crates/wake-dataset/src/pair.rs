@@ -5,6 +5,7 @@ use crate::error::Result;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
+use wake_physics::measure::median;
 use wake_physics::{Field, Scene, Simulator, labels_of};
 
 /// A picture in grey 0…1.
@@ -127,12 +128,7 @@ impl Grey {
     /// `offset`, which no amplitude undoes.
     pub fn quick_look(power: &Field, gain: f64, offset: f64) -> (Self, Option<[f64; 2]>) {
         let mut pixels: Vec<f32> = power.values.iter().map(|&p| p.max(0.0).sqrt()).collect();
-        let mut sorted = pixels.clone();
-        let middle = sorted.len() / 2;
-        let median = match sorted.is_empty() {
-            true => 0.0,
-            false => *sorted.select_nth_unstable_by(middle, f32::total_cmp).1,
-        };
+        let median = median(&pixels);
         let factor = if median > 0.0 {
             gain as f32 / median
         } else {

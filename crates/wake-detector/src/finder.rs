@@ -1,4 +1,4 @@
-//! Either way of finding wakes.
+//! What finds wakes in images: the trained network, the classical transform, or a method of your own.
 
 use crate::detector::Detector;
 use crate::image::GreyImage;
@@ -6,27 +6,40 @@ use crate::radon;
 use crate::wake::Detection;
 
 /// Something that finds wakes.
-#[derive(Debug)]
-pub enum Finder {
-    /// The trained network.
-    Network(Box<Detector>),
-    /// The classical transform, see [`radon::find`].
-    Radon,
+///
+/// ```
+/// use wake_detector::{Detection, Finder, GreyImage, Radon};
+///
+/// /// The surest wake alone.
+/// struct Surest<F>(F);
+///
+/// impl<F: Finder> Finder for Surest<F> {
+///     fn find(&self, image: &GreyImage) -> Vec<Detection> {
+///         self.0.find(image).into_iter().take(1).collect()
+///     }
+/// }
+///
+/// let image = GreyImage::eight_bits(64, 64, vec![90; 64 * 64])?;
+/// assert!(Surest(Radon).find(&image).is_empty());
+/// # Ok::<(), wake_detector::Error>(())
+/// ```
+pub trait Finder: Sync {
+    /// The wakes of an image, the surest first.
+    fn find(&self, image: &GreyImage) -> Vec<Detection>;
 }
 
-impl Finder {
-    /// The wakes of an image, the surest first.
-    #[must_use]
-    pub fn find(&self, image: &GreyImage) -> Vec<Detection> {
-        match self {
-            Self::Network(detector) => detector.find(image),
-            Self::Radon => radon::find(image),
-        }
+impl Finder for Detector {
+    fn find(&self, image: &GreyImage) -> Vec<Detection> {
+        Self::find(self, image)
     }
 }
 
-impl From<Detector> for Finder {
-    fn from(detector: Detector) -> Self {
-        Self::Network(Box::new(detector))
+/// The classical method, see [`radon::find`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Radon;
+
+impl Finder for Radon {
+    fn find(&self, image: &GreyImage) -> Vec<Detection> {
+        radon::find(image)
     }
 }

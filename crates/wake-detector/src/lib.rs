@@ -26,6 +26,6 @@ pub use burn;
 pub use detector::Detector;
 pub use error::{Error, Result};
 pub use files::{image_files, image_name, picture_name};
-pub use finder::Finder;
+pub use finder::{Finder, Radon};
 pub use image::GreyImage;
 pub use wake::{Detection, Wake, angle_of, direction};

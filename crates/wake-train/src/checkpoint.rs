@@ -2,25 +2,28 @@
 //!
 //! ```text
 //! FOLDER/step-00001200/state.json
-//! FOLDER/step-00001200/tensors-000.safetensors, tensors-001.safetensors, …
+//! FOLDER/step-00001200/tensors.safetensors
 //! ```
 //!
-//! `state.json` has a checksum of each file of tensors, and of itself.
+//! `state.json` has a checksum of the tensors, and of itself. Tensors are written and read one by one: a checkpoint takes no
+//! more memory than its largest tensor beside what it holds.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use safetensors::tensor::{Dtype, View};
 use serde::Deserialize;
-use serde_json::{Map, Value, json};
-use whole_files::{checksum, sealed, unsealed};
+use serde_json::{Value, json};
+use wake_nn::weights::files::WeightFiles;
+use whole_files::{file_checksum, sealed, unsealed};
 
 use crate::error::{Error, Result};
 
-/// No file of tensors is longer than this \[bytes\], unless a single tensor is.
-const LARGEST_FILE: usize = 11_000_000;
+/// The file of the tensors.
+const TENSORS: &str = "tensors.safetensors";
 /// How many of the newest checkpoints stay.
 const KEPT: usize = 2;
 
@@ -42,7 +45,7 @@ pub struct Checkpoint {
 
 impl Checkpoint {
     /// Writes the checkpoint below a folder and removes all but the two newest, and what killed runs left: a folder
-    /// belongs to one run and one process, see [`RunFolder`](super::RunFolder).
+    /// belongs to one run and one process, see [`RunFolder`](super::folder::RunFolder).
     ///
     /// # Errors
     ///
@@ -84,18 +87,13 @@ impl Checkpoint {
 
     fn write_files(&self, folder: &Path) -> std::io::Result<()> {
         fs::create_dir_all(folder)?;
-        let (mut part, mut bytes, mut files) = (Vec::new(), 0, Map::new());
-        for (name, (shape, numbers)) in &self.tensors {
-            if bytes > 0 && bytes + 4 * numbers.len() > LARGEST_FILE {
-                write_part(folder, &mut files, &part)?;
-                (part, bytes) = (Vec::new(), 0);
-            }
-            bytes += 4 * numbers.len();
-            part.push((name, shape, numbers));
-        }
-        write_part(folder, &mut files, &part)?;
+        let file = folder.join(TENSORS);
+        let tensors = self.tensors.iter();
+        let tensors = tensors.map(|(name, (shape, numbers))| (name, Numbers { shape, numbers }));
+        safetensors::serialize_to_file(tensors, None, &file).map_err(std::io::Error::other)?;
         let state = json!({
-            "step": self.step, "applied": self.applied, "state": self.state, "files": files,
+            "step": self.step, "applied": self.applied, "state": self.state,
+            "tensors": file_checksum(&file)?,
         });
         let state = sealed(&format!("{state:#}")) + "\n";
         fs::write(folder.join("state.json"), state)?;
@@ -137,23 +135,19 @@ impl Checkpoint {
             step,
             applied,
             state,
-            files,
+            tensors,
         } = state.ok_or_else(|| damaged(&file))?;
+        let file = path.join(TENSORS);
+        let found = file_checksum(&file).map_err(|source| match source.kind() {
+            ErrorKind::NotFound => damaged(&file),
+            _ => io("read", &file, source),
+        })?;
+        if found != tensors {
+            return Err(damaged(&file));
+        }
         let mut tensors = Tensors::new();
-        for (name, expected) in files {
-            let file = path.join(&name);
-            // Nothing outside this folder is opened.
-            if file.file_name() != Some(name.as_ref()) {
-                return Err(damaged(&file));
-            }
-            let bytes = whole_files::read_regular(&file).map_err(|source| match source.kind() {
-                ErrorKind::NotFound => damaged(&file),
-                _ => io("read", &file, source),
-            })?;
-            if checksum(&bytes) != expected {
-                return Err(damaged(&file));
-            }
-            read_part(&file, &bytes, &mut tensors)?;
+        for (name, stored) in WeightFiles::open(&file)?.tensors()? {
+            tensors.insert(name, (stored.shape().to_vec(), stored.read()?));
         }
         Ok(Self {
             step,
@@ -170,8 +164,8 @@ struct State {
     step: usize,
     applied: usize,
     state: Value,
-    /// Checksums of the files of tensors by their names.
-    files: BTreeMap<String, String>,
+    /// Checksum of the file of the tensors.
+    tensors: String,
 }
 
 /// The error for a file whose content is not what was written.
@@ -257,51 +251,29 @@ fn checkpoints(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
     Ok(found)
 }
 
-type Part<'a> = [(&'a String, &'a Vec<usize>, &'a Vec<f32>)];
-
-/// Writes a file of tensors and notes its checksum among those of the files before it.
-fn write_part(
-    folder: &Path,
-    files: &mut Map<String, Value>,
-    part: &Part<'_>,
-) -> std::io::Result<()> {
-    let bytes: Vec<Vec<u8>> = part
-        .iter()
-        .map(|(.., numbers)| numbers.iter().flat_map(|x| x.to_le_bytes()).collect())
-        .collect();
-    let views = part.iter().zip(&bytes).map(|((name, shape, _), bytes)| {
-        let view = TensorView::new(Dtype::F32, (*shape).clone(), bytes);
-        view.map(|view| (name.as_str(), view))
-            .map_err(std::io::Error::other)
-    });
-    let views: Vec<_> = views.collect::<std::io::Result<_>>()?;
-    let bytes = safetensors::serialize(views, None).map_err(std::io::Error::other)?;
-    let name = format!("tensors-{:03}.safetensors", files.len());
-    fs::write(folder.join(&name), &bytes)?;
-    files.insert(name, json!(checksum(&bytes)));
-    Ok(())
+/// A tensor that is turned into bytes when it is written.
+struct Numbers<'a> {
+    shape: &'a [usize],
+    numbers: &'a [f32],
 }
 
-fn read_part(path: &Path, bytes: &[u8], tensors: &mut Tensors) -> Result<()> {
-    let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| {
-        Error::Value(wake_nn::Error::InvalidSafetensors {
-            path: path.to_owned(),
-            reason,
-        })
-    };
-    let file = SafeTensors::deserialize(bytes).map_err(|error| invalid(error.into()))?;
-    for (name, view) in file.tensors() {
-        if view.dtype() != Dtype::F32 {
-            return Err(invalid(format!("{name} is no f32").into()));
-        }
-        let (chunks, _) = view.data().as_chunks::<4>();
-        let numbers = chunks
-            .iter()
-            .map(|chunk| f32::from_le_bytes(*chunk))
-            .collect();
-        tensors.insert(name, (view.shape().to_vec(), numbers));
+impl View for Numbers<'_> {
+    fn dtype(&self) -> Dtype {
+        Dtype::F32
     }
-    Ok(())
+
+    fn shape(&self) -> &[usize] {
+        self.shape
+    }
+
+    fn data(&self) -> Cow<'_, [u8]> {
+        let bytes = self.numbers.iter().flat_map(|x| x.to_le_bytes());
+        Cow::Owned(bytes.collect())
+    }
+
+    fn data_len(&self) -> usize {
+        4 * self.numbers.len()
+    }
 }
 
 #[cfg(test)]
@@ -309,7 +281,6 @@ mod tests {
     use super::*;
 
     fn checkpoint(step: usize) -> Checkpoint {
-        let large = vec![0.25; 2_000_000];
         Checkpoint {
             step,
             applied: step - 1,
@@ -319,14 +290,13 @@ mod tests {
                     "a".to_owned(),
                     (vec![2, 2], vec![1.0, -0.0, f32::MIN_POSITIVE, step as f32]),
                 ),
-                ("b".to_owned(), (vec![2_000_000], large.clone())),
-                ("c".to_owned(), (vec![2_000_000], large)),
+                ("b".to_owned(), (vec![300, 2], vec![0.25; 600])),
             ]),
         }
     }
 
     #[test]
-    fn the_newest_comes_back_and_two_are_kept_in_small_files() {
+    fn the_newest_comes_back_and_two_are_kept() {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(
             Checkpoint::newest(&folder.path().join("none")).unwrap(),
@@ -344,16 +314,6 @@ mod tests {
             left.iter().map(|(step, _)| *step).collect::<Vec<_>>(),
             [20, 100]
         );
-        let files: Vec<_> = fs::read_dir(&left[1].1)
-            .unwrap()
-            .map(Result::unwrap)
-            .collect();
-        assert_eq!(files.len(), 3);
-        assert!(
-            files
-                .iter()
-                .all(|file| file.metadata().unwrap().len() <= 12_000_000)
-        );
     }
 
     #[test]
@@ -370,11 +330,11 @@ mod tests {
         checkpoint(8).write(folder.path()).unwrap();
         assert!(!half.exists());
         fs::remove_dir_all(folder.path().join("step-00000008")).unwrap();
-        let file = folder.path().join("step-00000007/tensors-000.safetensors");
+        let file = folder.path().join("step-00000007/tensors.safetensors");
         fs::write(&file, b"short").unwrap();
         let refused = Checkpoint::newest(folder.path()).unwrap_err().to_string();
         assert!(
-            refused.contains("tensors-000.safetensors: missing, damaged"),
+            refused.contains("tensors.safetensors: missing, damaged"),
             "{refused}"
         );
     }
@@ -392,7 +352,7 @@ mod tests {
             small(step).write(folder.path()).unwrap();
         }
         let newest = folder.path().join("step-00000008");
-        for name in ["state.json", "tensors-000.safetensors"] {
+        for name in ["state.json", "tensors.safetensors"] {
             let file = newest.join(name);
             let whole = fs::read(&file).unwrap();
             for at in 0..whole.len() {
@@ -405,7 +365,7 @@ mod tests {
             fs::write(&file, &whole).unwrap();
             assert_eq!(Checkpoint::newest(folder.path()).unwrap(), Some(small(8)));
         }
-        let file = newest.join("tensors-000.safetensors");
+        let file = newest.join("tensors.safetensors");
         fs::write(&file, b"").unwrap();
         let refused = Checkpoint::newest(folder.path()).unwrap_err().to_string();
         assert!(
@@ -414,7 +374,7 @@ mod tests {
         );
         fs::remove_file(&file).unwrap();
         let refused = Checkpoint::newest(folder.path()).unwrap_err().to_string();
-        assert!(refused.contains("tensors-000.safetensors"), "{refused}");
+        assert!(refused.contains("tensors.safetensors"), "{refused}");
         fs::remove_dir_all(newest).unwrap();
         assert_eq!(Checkpoint::newest(folder.path()).unwrap(), Some(small(7)));
     }

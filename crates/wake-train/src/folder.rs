@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 /// checkpoints/     a folder for each stage
 /// ```
 #[derive(Debug)]
-pub struct RunFolder {
+pub(crate) struct RunFolder {
     path: PathBuf,
     record: Map<String, Value>,
     _lock: FolderLock,
@@ -44,7 +44,7 @@ impl RunFolder {
     ///
     /// [`wake_nn::Error::InvalidOption`] with the first value in which the folder's model or data differ, or as
     /// [`begin`](Self::begin); [`Error::Scene`] if another process works there.
-    pub fn open(
+    pub(crate) fn open(
         path: &Path,
         model: &impl Serialize,
         data: &Value,
@@ -75,12 +75,12 @@ impl RunFolder {
     }
 
     /// Where it is.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Where the checkpoints of a stage lie.
-    pub fn checkpoints(&self, stage: &str) -> PathBuf {
+    pub(crate) fn checkpoints(&self, stage: &str) -> PathBuf {
         self.path.join(CHECKPOINTS).join(stage)
     }
 
@@ -89,7 +89,7 @@ impl RunFolder {
     /// # Errors
     ///
     /// [`wake_nn::Error::InvalidOption`] when there is none to resume, or one that a new beginning would lose.
-    pub fn begin(&self, stage: &str, resume: bool) -> Result<Option<Checkpoint>> {
+    pub(crate) fn begin(&self, stage: &str, resume: bool) -> Result<Option<Checkpoint>> {
         check_begin(&self.path, &self.checkpoints(stage), stage, resume)?;
         Checkpoint::newest(&self.checkpoints(stage))
     }
@@ -97,7 +97,7 @@ impl RunFolder {
     /// Whether the results of a stage are there, and were made after `step` steps.
     ///
     /// - `results`: names of its files
-    pub fn is_current(&self, stage: &str, step: usize, results: &[&str]) -> bool {
+    pub(crate) fn is_current(&self, stage: &str, step: usize, results: &[&str]) -> bool {
         let there = results.iter().all(|name| self.path.join(name).is_file());
         there && self.noted(stage).is_some_and(|noted| noted.step == step)
     }
@@ -108,7 +108,7 @@ impl RunFolder {
     /// # Errors
     ///
     /// As [`Checkpoint::newest`].
-    pub fn unfinished(&self, stage: &str, results: &[&str]) -> Result<Option<usize>> {
+    pub(crate) fn unfinished(&self, stage: &str, results: &[&str]) -> Result<Option<usize>> {
         let there = results.iter().all(|name| self.path.join(name).is_file());
         let newest = Checkpoint::newest_step(&self.checkpoints(stage))?;
         Ok(match (newest, self.noted(stage)) {
@@ -124,7 +124,7 @@ impl RunFolder {
     /// # Errors
     ///
     /// [`Error::Scene`] if it cannot be written.
-    pub fn note(&mut self, stage: &str, step: usize, of: usize) -> Result<()> {
+    pub(crate) fn note(&mut self, stage: &str, step: usize, of: usize) -> Result<()> {
         let stages = self.record.entry("stages").or_insert_with(|| json!({}));
         stages[stage] = json!({"results_after": step, "steps": of});
         self.write()
@@ -229,7 +229,7 @@ mod tests {
             step,
             applied: step,
             state: json!({}),
-            tensors: super::super::Tensors::new(),
+            tensors: crate::checkpoint::Tensors::new(),
         };
         checkpoint.write(&folder.checkpoints(stage)).unwrap();
     }
@@ -239,12 +239,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         let data = json!({"seed": 7, "count": 10});
-        drop(RunFolder::open(&path, &config(), &Value::Null, ("mean", false)).unwrap());
-        drop(RunFolder::open(&path, &config(), &data, ("mean", false)).unwrap());
-        drop(RunFolder::open(&path, &config(), &Value::Null, ("mean", false)).unwrap());
+        drop(RunFolder::open(&path, &config(), &Value::Null, ("prior", false)).unwrap());
+        drop(RunFolder::open(&path, &config(), &data, ("prior", false)).unwrap());
+        drop(RunFolder::open(&path, &config(), &Value::Null, ("prior", false)).unwrap());
         let before = std::fs::read(path.join("run.json")).unwrap();
         let other = json!({"seed": 8, "count": 10});
-        let refused = RunFolder::open(&path, &config(), &other, ("mean", false))
+        let refused = RunFolder::open(&path, &config(), &other, ("prior", false))
             .unwrap_err()
             .to_string();
         assert!(
@@ -255,13 +255,13 @@ mod tests {
             prior_width: 64,
             ..config()
         };
-        let refused = RunFolder::open(&path, &wide, &data, ("mean", false))
+        let refused = RunFolder::open(&path, &wide, &data, ("prior", false))
             .unwrap_err()
             .to_string();
         assert!(refused.contains("prior_width = 128"), "{refused}");
         assert_eq!(std::fs::read(path.join("run.json")).unwrap(), before);
-        let first = RunFolder::open(&path, &config(), &data, ("mean", false)).unwrap();
-        let second = RunFolder::open(&path, &config(), &data, ("mean", false))
+        let first = RunFolder::open(&path, &config(), &data, ("prior", false)).unwrap();
+        let second = RunFolder::open(&path, &config(), &data, ("prior", false))
             .unwrap_err()
             .to_string();
         assert!(second.contains("another process"), "{second}");
@@ -271,48 +271,49 @@ mod tests {
     #[test]
     fn a_stage_begins_once_and_is_resumed_from_its_last_checkpoint() {
         let folder = tempfile::tempdir().unwrap();
-        let run = RunFolder::open(folder.path(), &config(), &Value::Null, ("mean", false)).unwrap();
+        let run =
+            RunFolder::open(folder.path(), &config(), &Value::Null, ("prior", false)).unwrap();
         assert!(
-            run.begin("mean", true)
+            run.begin("prior", true)
                 .unwrap_err()
                 .to_string()
                 .contains("no checkpoint")
         );
-        assert_eq!(run.begin("mean", false).unwrap(), None);
+        assert_eq!(run.begin("prior", false).unwrap(), None);
         for step in [100, 20] {
-            checkpoint(&run, "mean", step);
+            checkpoint(&run, "prior", step);
         }
-        let refused = run.begin("mean", false).unwrap_err().to_string();
+        let refused = run.begin("prior", false).unwrap_err().to_string();
         assert!(
             refused.contains("100 steps") && refused.contains("resume goes on"),
             "{refused}"
         );
-        assert_eq!(run.begin("mean", true).unwrap().unwrap().step, 100);
-        assert_eq!(run.begin("words", false).unwrap(), None);
+        assert_eq!(run.begin("prior", true).unwrap().unwrap().step, 100);
+        assert_eq!(run.begin("parser", false).unwrap(), None);
     }
 
     #[test]
     fn results_are_current_only_after_their_last_checkpoint() {
         let folder = tempfile::tempdir().unwrap();
         let mut run =
-            RunFolder::open(folder.path(), &config(), &Value::Null, ("mean", false)).unwrap();
+            RunFolder::open(folder.path(), &config(), &Value::Null, ("prior", false)).unwrap();
         let results = ["prior.safetensors"];
         let file = folder.path().join(results[0]);
-        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(0));
+        assert_eq!(run.unfinished("prior", &results).unwrap(), Some(0));
         std::fs::write(&file, "put there").unwrap();
-        assert_eq!(run.unfinished("mean", &results).unwrap(), None);
-        checkpoint(&run, "mean", 4);
-        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(4));
-        run.note("mean", 4, 6).unwrap();
-        assert!(run.is_current("mean", 4, &results));
-        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(6));
-        checkpoint(&run, "mean", 6);
-        assert!(!run.is_current("mean", 6, &results));
-        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(6));
-        run.note("mean", 6, 6).unwrap();
-        assert_eq!(run.unfinished("mean", &results).unwrap(), None);
+        assert_eq!(run.unfinished("prior", &results).unwrap(), None);
+        checkpoint(&run, "prior", 4);
+        assert_eq!(run.unfinished("prior", &results).unwrap(), Some(4));
+        run.note("prior", 4, 6).unwrap();
+        assert!(run.is_current("prior", 4, &results));
+        assert_eq!(run.unfinished("prior", &results).unwrap(), Some(6));
+        checkpoint(&run, "prior", 6);
+        assert!(!run.is_current("prior", 6, &results));
+        assert_eq!(run.unfinished("prior", &results).unwrap(), Some(6));
+        run.note("prior", 6, 6).unwrap();
+        assert_eq!(run.unfinished("prior", &results).unwrap(), None);
         std::fs::remove_file(file).unwrap();
-        assert_eq!(run.unfinished("mean", &results).unwrap(), Some(6));
-        assert!(!run.is_current("mean", 6, &results));
+        assert_eq!(run.unfinished("prior", &results).unwrap(), Some(6));
+        assert!(!run.is_current("prior", 6, &results));
     }
 }

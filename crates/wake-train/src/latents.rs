@@ -9,7 +9,8 @@ use wake_physics::Scene;
 use crate::error::{Error, Result};
 use wake_dataset::{Pair, Source};
 use wake_ldm::network::{
-    Foreseen, Known, PatchTransform, Prior, Shares, WakeModelConfig, expected_grey,
+    ConditioningInputs, ExplainedVariance, PatchTransform, PhysicsPrior, Prior, WakeModelConfig,
+    expected_grey,
 };
 
 /// Images read or simulated at the same time.
@@ -23,18 +24,18 @@ const RESIDUALS: usize = 8;
 
 /// One example beside its latents.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Example {
+pub(crate) struct Example {
     /// The scene that made the image.
     pub scene: Scene,
     /// Mean grey of the image less that of the expected one.
     pub grey: f32,
-    /// Of the sea in the channels, see [`Foreseen`].
+    /// Of the sea in the channels, see [`PhysicsPrior`].
     pub log_deviations: Vec<f32>,
 }
 
 /// Latents of many images and of the images expected of their scenes, 16 bits a number.
 #[derive(Debug, Default)]
-pub struct LatentSet {
+pub(crate) struct LatentSet {
     shape: [usize; 3],
     latents: Vec<f16>,
     expected: Vec<f16>,
@@ -49,13 +50,13 @@ pub struct LatentSet {
 /// # Errors
 ///
 /// As [`Source::items`], and [`Error::Scene`] for a scene that is not valid.
-pub fn fit_patches(
+pub(crate) fn fit_patches(
     source: &dyn Source,
     count: u64,
     config: &WakeModelConfig,
     device: &Device,
     mut done: impl FnMut(u64),
-) -> Result<(PatchTransform, Shares)> {
+) -> Result<(PatchTransform, ExplainedVariance)> {
     let mut images = Vec::new();
     for first in (0..count).step_by(AT_ONCE as usize) {
         let pairs = source.items(first..count.min(first + AT_ONCE))?;
@@ -91,7 +92,7 @@ impl LatentSet {
     /// # Errors
     ///
     /// As [`Source::items`] and [`extend`](Self::extend), and [`Error::Scene`] for a scene that is not valid.
-    pub fn of(
+    pub(crate) fn of(
         source: &dyn Source,
         count: u64,
         config: &WakeModelConfig,
@@ -102,8 +103,8 @@ impl LatentSet {
         for first in (0..count).step_by(AT_ONCE as usize) {
             let read = |pair: Pair| -> Result<_> {
                 let Pair { image, scene, .. } = pair;
-                let foreseen = Foreseen::new(&scene, &config.grey, patches)?;
-                Ok((image.pixels, foreseen, scene))
+                let physics = PhysicsPrior::new(&scene, &config.grey, patches)?;
+                Ok((image.pixels, physics, scene))
             };
             let pairs = source.items(first..count.min(first + AT_ONCE))?;
             let count = pairs.len() as u64;
@@ -115,7 +116,7 @@ impl LatentSet {
     }
 
     /// Memory that the latents of so many pairs take \[bytes\].
-    pub fn bytes(config: &WakeModelConfig, pairs: u64) -> u64 {
+    pub(crate) fn bytes(config: &WakeModelConfig, pairs: u64) -> u64 {
         // Two numbers of 16 bits for each of the latents of an image.
         let each = 4 * config.latent_channels * config.latent_size().pow(2);
         pairs.saturating_mul(each as u64)
@@ -128,14 +129,14 @@ impl LatentSet {
     /// # Errors
     ///
     /// [`wake_nn::Error::InvalidOption`] for an image that is not square, or of another size than its grid or those before.
-    pub fn extend(
+    pub(crate) fn extend(
         &mut self,
         transform: &PatchTransform,
-        pairs: Vec<(Vec<f32>, Foreseen, Scene)>,
+        pairs: Vec<(Vec<f32>, PhysicsPrior, Scene)>,
     ) -> Result<()> {
         let device = transform.devices().into_iter().next().unwrap_or_default();
-        let encoded = pairs.into_par_iter().map(|(image, foreseen, scene)| {
-            let images = [image, foreseen.grey];
+        let encoded = pairs.into_par_iter().map(|(image, physics, scene)| {
+            let images = [image, physics.grey];
             let (size, columns) = (scene.grid.rows, scene.grid.columns);
             if size != columns || images.iter().any(|image| image.len() != size * size) {
                 return Err(Error::Value(wake_nn::Error::InvalidOption {
@@ -151,7 +152,7 @@ impl LatentSet {
             let example = Example {
                 scene,
                 grey: grey.into_scalar::<f32>(),
-                log_deviations: foreseen.log_deviations,
+                log_deviations: physics.log_deviations,
             };
             Ok(([channels, rows, columns], halves(latents), example))
         });
@@ -176,7 +177,7 @@ impl LatentSet {
     /// The residuals of the latents about the mean and spread that a prior expects; computed on all cores.
     ///
     /// - `done`: called with a number of examples when they are done, from several threads
-    pub fn residuals(&self, prior: &Prior, done: impl Fn(usize) + Sync) -> Self {
+    pub(crate) fn residuals(&self, prior: &Prior, done: impl Fn(usize) + Sync) -> Self {
         let all: Vec<usize> = (0..self.len()).collect();
         let chunks: Vec<&[usize]> = all.chunks(RESIDUALS).collect();
         let residuals = chunks.par_iter().map(|indices| {
@@ -195,27 +196,22 @@ impl LatentSet {
 
     fn residual(&self, indices: &[usize], prior: &Prior) -> Vec<f16> {
         let device = prior.devices().into_iter().next().unwrap_or_default();
-        let expected = prior.forward(&self.known(indices, &device));
+        let expected = prior.forward(&self.inputs(indices, &device));
         halves(expected.residual(self.latents(indices, &device)))
     }
 
     /// Number of examples.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.examples.len()
     }
 
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.examples.is_empty()
-    }
-
     /// Channels, rows and columns of the latents.
-    pub fn shape(&self) -> [usize; 3] {
+    pub(crate) fn shape(&self) -> [usize; 3] {
         self.shape
     }
 
     /// One example.
-    pub fn example(&self, index: usize) -> &Example {
+    pub(crate) fn example(&self, index: usize) -> &Example {
         &self.examples[index]
     }
 
@@ -235,13 +231,13 @@ impl LatentSet {
     }
 
     /// What is known of some examples.
-    pub fn known(&self, indices: &[usize], device: &Device) -> Known {
+    pub(crate) fn inputs(&self, indices: &[usize], device: &Device) -> ConditioningInputs {
         let wake = self.expected(indices, device);
-        Known::new(&self.scenes(indices), wake, &self.log_deviations(indices))
+        ConditioningInputs::new(&self.scenes(indices), wake, &self.log_deviations(indices))
     }
 
     /// Some latent pixels of one example, `[channels, cells]`.
-    pub fn pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
+    pub(crate) fn pixels(&self, index: usize, cells: &[usize]) -> Vec<f32> {
         self.some(&self.latents, index, cells)
     }
 
@@ -251,12 +247,12 @@ impl LatentSet {
     }
 
     /// Latents of some examples, `[indices, channels, rows, columns]`.
-    pub fn latents(&self, indices: &[usize], device: &Device) -> Tensor<4> {
+    pub(crate) fn latents(&self, indices: &[usize], device: &Device) -> Tensor<4> {
         batch(&self.latents, self.shape, indices, device)
     }
 
     /// Latents of the images expected of their scenes.
-    pub fn expected(&self, indices: &[usize], device: &Device) -> Tensor<4> {
+    pub(crate) fn expected(&self, indices: &[usize], device: &Device) -> Tensor<4> {
         batch(&self.expected, self.shape, indices, device)
     }
 

@@ -41,29 +41,19 @@ pub mod detector;
 
 pub use checkpoint::{Checkpoint, Tensors};
 pub use error::{Error, Result};
-pub use fine_tune::{
-    FineTuneTask, FineTuning, Frozen, Prompted, PromptedBatch, PromptedPairs, PromptedSource,
-};
-pub use folder::RunFolder;
-pub use latents::{Example, LatentSet, fit_patches};
+pub use fine_tune::FineTuning;
 pub use log::TrainLog;
 pub use optimizer::{AdamOptions, LrSchedule};
 pub use pairs::TrainingPairs;
 pub use progress::Progress;
-pub use prompts::Prompts;
 pub use run::{Run, RunOptions, Task, Terms};
-pub use sea::{SeaPatches, SeaTask};
+pub use sea::SeaPatches;
 pub use sea_training::SeaTraining;
 pub use small_pipeline::PipelineTraining;
-pub use stage::Stage;
-pub use stage_options::{StageDefaults, StageOptions};
-pub use tasks::{FlowBatch, FlowTask, PriorTask, WordsTask};
-pub use text_to_image::{
-    AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
-};
-pub use trainer::{StepReport, Trainer, TrainerOptions};
+pub use stage_options::StageOptions;
+pub use trainer::{StepReport, TrainerOptions};
 pub use two_sample::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
-pub use wake_model::{WakeStage, WakeTraining};
+pub use wake_model::WakeTraining;
 
 #[cfg(all(test, feature = "flex"))]
 mod tests;

@@ -8,7 +8,7 @@ use wake_physics::Scene;
 use crate::error::Result;
 use wake_dataset::{Folder, Manifest, Pair, Recipe, Simulated, Source};
 use wake_ldm::conditioning::Vocabulary;
-use wake_ldm::network::{Domain, WakeModelConfig};
+use wake_ldm::network::{TrainingRanges, WakeModelConfig};
 
 /// So many pairs of a source, and what a run notes of them.
 #[derive(Debug)]
@@ -94,14 +94,14 @@ impl TrainingPairs {
     ///
     /// # Errors
     ///
-    /// As [`Simulated::scene`], [`Domain::of`] and [`Vocabulary::of_wordings`].
+    /// As [`Simulated::scene`], [`TrainingRanges::of`] and [`Vocabulary::of_wordings`].
     pub fn model(&self) -> Result<WakeModelConfig> {
         let mut config = WakeModelConfig::standard(&Vocabulary::of_wordings()?);
-        config.domain = match &self.pairs {
-            Pairs::Folder(folder) => Domain::of(folder.scenes())?,
+        config.training_ranges = match &self.pairs {
+            Pairs::Folder(folder) => TrainingRanges::of(folder.scenes())?,
             Pairs::Simulated(simulated) => {
                 let scenes = (0..self.count).map(|index| simulated.scene(index));
-                Domain::of(&scenes.collect::<wake_dataset::Result<Vec<Scene>>>()?)?
+                TrainingRanges::of(&scenes.collect::<wake_dataset::Result<Vec<Scene>>>()?)?
             }
         };
         config.scene = self.set.recipe.scene.clone();
@@ -126,7 +126,7 @@ mod tests {
         let simulated = Simulated::new(recipe, 5).unwrap();
         for number in 0..3 {
             let scene = simulated.scene(number).unwrap();
-            model.domain.check(&scene).unwrap();
+            model.training_ranges.check(&scene).unwrap();
         }
         assert_eq!(pairs.len(), 3);
         assert_eq!(pairs.identity()["set"]["seed"], 5);

@@ -15,13 +15,13 @@ const LEFT_OUT: f64 = 0.2;
 
 /// Prompts of random scenes in every wording, half of them with sentences moved or left out.
 #[derive(Debug, Clone)]
-pub struct Prompts {
+pub(crate) struct Prompts {
     scenes: Simulated,
 }
 
 impl Prompts {
     /// Prompts of the scenes of a set.
-    pub fn new(scenes: Simulated) -> Self {
+    pub(crate) fn new(scenes: Simulated) -> Self {
         Self { scenes }
     }
 
@@ -30,7 +30,7 @@ impl Prompts {
     /// # Errors
     ///
     /// [`Error::Text`](crate::Error::Text) for a scene that no prompt can state.
-    pub fn prompt(&self, position: u64) -> Result<(String, PartialScene)> {
+    pub(crate) fn prompt(&self, position: u64) -> Result<(String, PartialScene)> {
         let random = NoiseSource::new(self.scenes.seed());
         let draw = |i: u64| random.uniform(streams::PROMPTS, position * DRAWS + i);
         let wording = Wording::ALL[(draw(0) * Wording::ALL.len() as f64) as usize];

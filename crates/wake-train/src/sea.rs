@@ -6,10 +6,10 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 
 use super::run::{Task, Terms, number};
-use super::tasks::{examples, noise_level, noise_of, on_the_way};
+use super::tasks::{examples, interpolate, noise_level, noise_of};
 use crate::error::Result;
 use crate::streams::SEA_PLACES;
-use wake_ldm::sea_texture::{PATCH, SeaFlow, SeaImage, SeaStyle};
+use wake_ldm::sea_texture::{SeaFlow, SeaImage, SeaStyle, WINDOW};
 use wake_nn::noise::NoiseSource;
 
 /// Patches of an image for every one that fits into it beside the others, at most: more would show the same pixels.
@@ -28,7 +28,7 @@ pub struct SeaPatches {
 
 #[derive(Debug, Clone)]
 struct Patch {
-    /// Amplitude of mean 0 and variance 1, `[PATCH, PATCH]`.
+    /// Amplitude of mean 0 and variance 1, `[WINDOW, WINDOW]`.
     values: Vec<f32>,
     style: SeaStyle,
 }
@@ -42,18 +42,18 @@ impl SeaPatches {
         let [rows, columns] = image.size();
         let number = self.images;
         self.images += 1;
-        if rows < PATCH || columns < PATCH {
+        if rows < WINDOW || columns < WINDOW {
             return 0;
         }
         let random = NoiseSource::new(seed);
-        let room = [rows - PATCH + 1, columns - PATCH + 1];
+        let room = [rows - WINDOW + 1, columns - WINDOW + 1];
         let place = |n: u64| -> [usize; 2] {
             std::array::from_fn(|axis| {
                 let position = 2 * (MOST * number + n) + axis as u64;
                 (random.uniform(SEA_PLACES, position) * room[axis] as f64) as usize
             })
         };
-        let most = OVERLAP * (rows * columns).div_ceil(PATCH * PATCH);
+        let most = OVERLAP * (rows * columns).div_ceil(WINDOW * WINDOW);
         let wanted = count.min(most) as u64;
         let (mut found, mut tried) = (Vec::new(), 0);
         while (found.len() as u64) < wanted && tried < TRIES * wanted {
@@ -110,7 +110,7 @@ impl Patch {
 ///
 /// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants".
 #[derive(Debug)]
-pub struct SeaTask<'a> {
+pub(crate) struct SeaTask<'a> {
     /// What is learnt from, at least one patch.
     pub patches: &'a SeaPatches,
     /// Seed of order, noise and noise levels.
@@ -135,18 +135,18 @@ impl Task<SeaFlow> for SeaTask<'_> {
         let drawn: Vec<(&Patch, u64)> = patches.iter().copied().zip(positions.clone()).collect();
         let noise = drawn.par_iter().map(|(patch, position)| {
             let source = noise_of(self.seed, *position);
-            patch.style.noise(source, PATCH, PATCH).values
+            patch.style.noise(source, WINDOW, WINDOW).values
         });
         let noise: Vec<f32> = noise.collect::<Vec<_>>().concat();
         let residual: Vec<f32> = patches.iter().flat_map(|p| &p.values).copied().collect();
         let features: Vec<f32> = patches.iter().flat_map(|p| p.style.features()).collect();
         let count = patches.len();
         let image = |values| -> Tensor<4> {
-            Tensor::from_data(TensorData::new(values, [count, 1, PATCH, PATCH]), device)
+            Tensor::from_data(TensorData::new(values, [count, 1, WINDOW, WINDOW]), device)
         };
         let told = features.len() / count.max(1);
         let features = Tensor::from_data(TensorData::new(features, [count, told]), device);
-        let (x, target, levels) = on_the_way(image(residual), image(noise), &levels);
+        let (x, target, levels) = interpolate(image(residual), image(noise), &levels);
         let error = model.velocity(x, levels, features) - target.clone();
         let loss = error.square().mean();
         // What a flow that stands still would lose.
@@ -161,8 +161,9 @@ impl Task<SeaFlow> for SeaTask<'_> {
 mod tests {
     use wake_physics::Field;
 
-    use super::super::{Checkpoint, LrSchedule, Run, RunOptions, Tensors, TrainerOptions};
     use super::*;
+    use crate::checkpoint::Tensors;
+    use crate::{Checkpoint, LrSchedule, Run, RunOptions, TrainerOptions};
     use wake_ldm::sea_texture::SeaTexture;
 
     /// Amplitudes exp(0.3 g) of Gaussian noise that neighbours in a row share half of.
@@ -336,7 +337,7 @@ mod tests {
         let styles = patches.styles();
         let texture = SeaTexture::new(run.averaged(), &styles, None).unwrap();
         let drawn = (0..2).map(|n| {
-            let sea = texture.amplitude(&styles[n], n as u64, PATCH, PATCH);
+            let sea = texture.amplitude(&styles[n], n as u64, WINDOW, WINDOW);
             skewness(&sea.unwrap())
         });
         let (found, asked) = (drawn.sum::<f64>() / 2.0, -1.41);
@@ -345,7 +346,7 @@ mod tests {
             "{found} {asked}"
         );
         let gaussian =
-            (0..2).map(|n| skewness(&styles[n].noise(NoiseSource::new(n as u64), PATCH, PATCH)));
+            (0..2).map(|n| skewness(&styles[n].noise(NoiseSource::new(n as u64), WINDOW, WINDOW)));
         let still = gaussian.sum::<f64>() / 2.0;
         assert!(still.abs() < 0.4, "{still}");
     }

@@ -12,7 +12,7 @@ use crate::error::Error;
 
 /// How a [`Run`] is kept in a folder.
 #[derive(Debug, Clone, Copy)]
-pub struct Stage<'a> {
+pub(crate) struct Stage<'a> {
     /// Name of the stage, its checkpoints and its log.
     pub name: &'static str,
     /// Whether it goes on from the newest checkpoint.
@@ -34,7 +34,7 @@ impl Stage<'_> {
     /// # Errors
     ///
     /// Those of `show`, of the run's steps, and of files that cannot be written.
-    pub fn train<M: Module, T: Task<M>, E: From<Error>>(
+    pub(crate) fn train<M: Module, T: Task<M>, E: From<Error>>(
         self,
         folder: &mut RunFolder,
         mut run: Run<M>,

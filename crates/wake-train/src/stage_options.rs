@@ -13,7 +13,7 @@ const WARMUP: usize = 100;
 
 /// What a stage takes where nothing else is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StageDefaults {
+pub(crate) struct StageDefaults {
     /// Steps in all.
     pub steps: usize,
     /// Examples of a batch.
@@ -66,16 +66,14 @@ impl Default for StageOptions {
 
 impl StageOptions {
     /// Steps in all.
-    #[must_use]
-    pub fn steps(&self, usual: &StageDefaults) -> usize {
+    pub(crate) fn steps(&self, usual: &StageDefaults) -> usize {
         self.steps.unwrap_or(usual.steps)
     }
 
     /// Constants of the stage's run.
     ///
     /// - `identity`: what it learns from, see [`RunOptions::identity`]
-    #[must_use]
-    pub fn run(&self, usual: &StageDefaults, identity: Value) -> RunOptions {
+    pub(crate) fn run(&self, usual: &StageDefaults, identity: Value) -> RunOptions {
         RunOptions {
             batch: self.batch.unwrap_or(usual.batch),
             seed: self.seed,

@@ -15,7 +15,8 @@ use crate::streams;
 use wake_dataset::shuffled;
 use wake_ldm::conditioning::{MapGrid, QUANTITIES, Vocabulary, WEDGE, places, statement, tokens};
 use wake_ldm::network::{
-    ChannelWindows, Flow, Known, PatchTransform, Prior, PromptParser, SeaFields, windows,
+    ChannelWindows, ConditioningInputs, Flow, PatchTransform, Prior, PromptParser, SeaFields,
+    windows,
 };
 use wake_nn::noise::NoiseSource;
 
@@ -52,14 +53,14 @@ pub(super) fn noise_of(seed: u64, position: u64) -> NoiseSource {
 
 /// Reading what prompts state: squared error of each quantity, and of whether it is stated.
 #[derive(Debug)]
-pub struct WordsTask<'a> {
+pub(crate) struct ParserTask<'a> {
     /// The prompts.
     pub prompts: &'a Prompts,
     /// The ids that the reader knows.
     pub vocabulary: &'a Vocabulary,
 }
 
-impl Task<PromptParser> for WordsTask<'_> {
+impl Task<PromptParser> for ParserTask<'_> {
     type Batch = Range<u64>;
 
     fn batch(&self, positions: Range<u64>) -> Result<Range<u64>> {
@@ -110,7 +111,7 @@ const CELLS: usize = 64;
 /// al. (2022), "On the Pitfalls of Heteroscedastic Uncertainty Estimation with Probabilistic Neural Networks", Eq. 5,
 /// β = ½.
 #[derive(Debug)]
-pub struct PriorTask<'a> {
+pub(crate) struct PriorTask<'a> {
     /// The latents.
     pub set: &'a LatentSet,
     /// Seed of the order.
@@ -161,30 +162,35 @@ impl Task<Prior> for PriorTask<'_> {
         };
         let wake = tensor(LatentSet::expected_pixels);
         let deviations = self.set.log_deviations(&indices);
-        let expected = model.forward(&Known::of_cells(&scenes, &cells, wake, &deviations));
+        let expected = model.forward(&ConditioningInputs::of_cells(
+            &scenes,
+            &cells,
+            wake,
+            &deviations,
+        ));
         let latents = tensor(LatentSet::pixels);
         let off = latents - expected.mean;
         let error = number(&off.clone().square().mean());
-        let log_spread = expected.log_spread;
-        let spread = log_spread.clone().detach().exp();
+        let log_std = expected.log_std;
+        let spread = log_std.clone().detach().exp();
         let steady = (off.clone().square() / spread).mean() * 0.5;
-        let scaled = off.detach() * log_spread.clone().neg().exp();
-        let surprise = (scaled.square() * 0.5 + log_spread).mean();
+        let scaled = off.detach() * log_std.clone().neg().exp();
+        let nll = (scaled.square() * 0.5 + log_std).mean();
         let greys: Vec<f32> = indices.iter().map(|&i| self.set.example(i).grey).collect();
         let count = greys.len();
         let greys: Tensor<2> = Tensor::from_data(TensorData::new(greys, [count, 1]), device);
         let grey = (expected.grey - greys).square().mean();
         let terms = vec![
-            ("surprise", number(&surprise)),
+            ("nll", number(&nll)),
             ("error", error),
             ("grey", number(&grey)),
         ];
-        (steady + surprise + grey * 50.0, terms)
+        (steady + nll + grey * 50.0, terms)
     }
 }
 
 /// Between data r and noise n at noise levels σ: x = cos φ r + sin φ n, its velocity cos φ n − sin φ r, and σ, φ = πσ/2.
-pub(super) fn on_the_way(
+pub(super) fn interpolate(
     data: Tensor<4>,
     noise: Tensor<4>,
     levels: &[f32],
@@ -210,7 +216,7 @@ pub(super) fn on_the_way(
 /// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants"; Salimans & Ho (2022), "Progressive
 /// Distillation for Fast Sampling of Diffusion Models" (v).
 #[derive(Debug)]
-pub struct FlowTask<'a> {
+pub(crate) struct FlowTask<'a> {
     /// The residuals.
     pub set: &'a LatentSet,
     /// What they were encoded with, outside autodiff.
@@ -221,7 +227,7 @@ pub struct FlowTask<'a> {
 
 /// What a step of the flow needs, but the latents themselves.
 #[derive(Debug)]
-pub struct FlowBatch {
+pub(crate) struct FlowBatch {
     /// Which examples.
     indices: Vec<usize>,
     /// Their noise levels.
@@ -257,9 +263,9 @@ impl Task<Flow> for FlowTask<'_> {
     fn loss(&self, model: &Flow, device: &Device, batch: &FlowBatch) -> (Tensor<1>, Terms) {
         let noise: Tensor<4> = Tensor::from_data(batch.noise.clone(), device);
         let residual = self.set.latents(&batch.indices, device);
-        let (x, target, levels) = on_the_way(residual, noise, &batch.levels);
-        let known = model.prepared(&self.set.known(&batch.indices, device));
-        let error = model.velocity(x, levels, &known) - target;
+        let (x, target, levels) = interpolate(residual, noise, &batch.levels);
+        let inputs = model.cached(&self.set.inputs(&batch.indices, device));
+        let error = model.velocity(x, levels, &inputs) - target;
         let loss = error.square().mean();
         let terms = vec![("flow", number(&loss))];
         (loss, terms)

@@ -13,10 +13,12 @@ use serde_json::Value;
 
 use super::trainer::Trainer;
 use super::*;
+use crate::latents::LatentSet;
 use crate::prompts::Prompts;
+use crate::tasks::{FlowTask, ParserTask, PriorTask};
 use wake_dataset::{Recipe, Simulated};
 use wake_ldm::conditioning::Vocabulary;
-use wake_ldm::network::{Flow, Foreseen, PatchTransform, WakeModelConfig};
+use wake_ldm::network::{Flow, PatchTransform, PhysicsPrior, WakeModelConfig};
 
 const SIZE: usize = 32;
 
@@ -51,11 +53,11 @@ fn set() -> (LatentSet, PatchTransform) {
         let ship = &mut scene.ships[0];
         (ship.speed, ship.heading) = (8.0, (i as f64).to_degrees());
         // What is expected shows half of the wave.
-        let foreseen = Foreseen {
+        let physics = PhysicsPrior {
             grey: image.iter().map(|g| 0.5 + 0.5 * (g - 0.5)).collect(),
             log_deviations: vec![0.0; 4],
         };
-        set.extend(&transform, vec![(image, foreseen, scene)])
+        set.extend(&transform, vec![(image, physics, scene)])
             .unwrap();
     }
     (set, transform)
@@ -258,8 +260,8 @@ fn a_reader_learns_to_tell_prompts_apart() {
     };
     let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
     let devices = vec![Device::flex().autodiff()];
-    let mut run = Run::new("words", &config, init, options(1), devices).unwrap();
-    let task = WordsTask {
+    let mut run = Run::new("parser", &config, init, options(1), devices).unwrap();
+    let task = ParserTask {
         prompts: &prompts,
         vocabulary: &vocabulary,
     };

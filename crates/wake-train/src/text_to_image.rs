@@ -6,7 +6,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use half::f16;
 
-use super::fine_tune::{WITHOUT_PROMPT, noised};
+use super::fine_tune::{is_told, noised};
 use super::latents::batch;
 use super::run::{Task, Terms, number};
 use super::tasks::{examples, noise_of};
@@ -29,7 +29,7 @@ const DIVERGENCE: f64 = 1e-5;
 const ENCODED: usize = 16;
 /// Images of one size beside their prompts in memory, 16 bits a pixel.
 #[derive(Debug, Default)]
-pub struct PromptedImages {
+pub(crate) struct PromptedImages {
     size: [usize; 2],
     pixels: Vec<f16>,
     prompts: Vec<Vec<i32>>,
@@ -41,7 +41,7 @@ impl PromptedImages {
     /// # Errors
     ///
     /// [`wake_nn::Error::InvalidOption`] for an image of another size than those before.
-    pub fn push(&mut self, pair: &Pair) -> Result<()> {
+    pub(crate) fn push(&mut self, pair: &Pair) -> Result<()> {
         let size = [pair.image.rows, pair.image.columns];
         if self.prompts.is_empty() {
             self.size = size;
@@ -60,21 +60,11 @@ impl PromptedImages {
     }
 
     /// Number of images.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.prompts.len()
     }
 
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.prompts.is_empty()
-    }
-
-    /// Rows and columns of the images.
-    pub fn size(&self) -> [usize; 2] {
-        self.size
-    }
-
-    /// The windows of `size` rows and columns at some places `[row, column]` of some images, in −1…1.
+    /// The windows of `size` rows and columns at some places `[row, column]` of some images, grey 0…1.
     fn windows(
         &self,
         places: &[(usize, [usize; 2])],
@@ -87,7 +77,7 @@ impl PromptedImages {
             for r in row..row + size[0] {
                 let first = (image * rows + r) * columns + column;
                 let line = &self.pixels[first..first + size[1]];
-                numbers.extend(line.iter().map(|grey| 2.0 * grey.to_f32() - 1.0));
+                numbers.extend(line.iter().map(|grey| grey.to_f32()));
             }
         }
         let data = TensorData::new(numbers, [places.len(), 1, size[0], size[1]]);
@@ -103,7 +93,7 @@ impl PromptedImages {
     /// # Panics
     ///
     /// When there is no image.
-    pub fn encode(
+    pub(crate) fn encode(
         self,
         autoencoder: AutoencoderKl,
         device: &Device,
@@ -113,8 +103,7 @@ impl PromptedImages {
         let (mut latents, mut shape) = (Vec::<f32>::new(), [0; 3]);
         for places in all.chunks(ENCODED) {
             let images = self.windows(places, self.size, device);
-            let images = images.repeat_dim(1, autoencoder.image_channels());
-            let means = autoencoder.encode(images).mode();
+            let means = autoencoder.encode(autoencoder.scaled(images)).mode();
             let [_, channels, rows, columns] = means.dims();
             shape = [channels, rows, columns];
             latents.extend(means.into_data().iter::<f32>());
@@ -137,7 +126,7 @@ impl PromptedImages {
 
 /// Latents of images beside their prompts, 16 bits a number.
 #[derive(Debug)]
-pub struct PromptedLatents {
+pub(crate) struct PromptedLatents {
     shape: [usize; 3],
     latents: Vec<f16>,
     prompts: Vec<Vec<i32>>,
@@ -146,7 +135,7 @@ pub struct PromptedLatents {
 
 impl PromptedLatents {
     /// Channels, rows and columns of the latents.
-    pub fn shape(&self) -> [usize; 3] {
+    pub(crate) fn shape(&self) -> [usize; 3] {
         self.shape
     }
 }
@@ -158,14 +147,14 @@ impl PromptedLatents {
 /// loss = mean |decode(μ + σ n) − image|² + 10⁻⁵ mean KL
 /// ```
 ///
-/// on squares of 128 pixels anywhere in the images, which lie in −1…1; KL of one latent number.
+/// on squares of 128 pixels anywhere in the images, scaled to −1…1; KL of one latent number.
 ///
 /// # References
 ///
 /// Kingma & Welling (2014), "Auto-Encoding Variational Bayes", Eq. 10; Rombach et al. (2022), "High-Resolution Image
 /// Synthesis with Latent Diffusion Models", appendix G (the weight).
 #[derive(Debug)]
-pub struct AutoencoderTask<'a> {
+pub(crate) struct AutoencoderTask<'a> {
     /// The images, at least one, each with rows and columns that the autoencoder can halve as often as it does.
     pub images: &'a PromptedImages,
     /// Seed of order, places and noise.
@@ -198,8 +187,8 @@ impl Task<AutoencoderKl> for AutoencoderTask<'_> {
         let places = indices.into_iter().zip(positions.clone().map(place));
         let images = self
             .images
-            .windows(&places.collect::<Vec<_>>(), crop, device)
-            .repeat_dim(1, model.image_channels());
+            .windows(&places.collect::<Vec<_>>(), crop, device);
+        let images = model.scaled(images);
         let posterior = model.encode(images.clone());
         let [count, channels, rows, columns] = posterior.mean.dims();
         let sources: Vec<NoiseSource> = positions.clone().map(|p| noise_of(self.seed, p)).collect();
@@ -223,7 +212,7 @@ impl Task<AutoencoderKl> for AutoencoderTask<'_> {
 
 /// What turns prompts into latents, and learns together.
 #[derive(Module, Debug)]
-pub struct TextToImage {
+pub(crate) struct TextToImage {
     /// Reads the prompt.
     pub text_encoder: ClipText,
     /// Predicts the noise.
@@ -243,7 +232,7 @@ pub struct TextToImage {
 /// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models", Eq. 3; Ho & Salimans (2021),
 /// "Classifier-Free Diffusion Guidance", algorithm 1 (prompts left out).
 #[derive(Debug)]
-pub struct TextToImageTask<'a> {
+pub(crate) struct TextToImageTask<'a> {
     /// The latents, at least one.
     pub set: &'a PromptedLatents,
     /// How much noise each step has.
@@ -271,9 +260,9 @@ impl Task<TextToImage> for TextToImageTask<'_> {
         let draw = |p: u64| (random.uniform(streams::STEPS, p) * count) as usize;
         let steps: Vec<usize> = positions.clone().map(draw).collect();
         let told = positions.clone().zip(&indices).flat_map(|(p, &i)| {
-            match random.uniform(streams::LEFT_OUT, p) < WITHOUT_PROMPT {
-                true => &self.set.empty,
-                false => &self.set.prompts[i],
+            match is_told(random, streams::LEFT_OUT, p) {
+                true => &self.set.prompts[i],
+                false => &self.set.empty,
             }
         });
         let told: Vec<i32> = told.copied().collect();

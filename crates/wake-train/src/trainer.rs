@@ -113,7 +113,7 @@ pub struct StepReport {
 /// With several devices each computes the gradients of its own parts of the batch; they are averaged on the first
 /// device, which makes the step, as one device would with the whole batch.
 #[derive(Debug)]
-pub struct Trainer<M> {
+pub(crate) struct Trainer<M> {
     model: M,
     adam: Adam,
     average: Average,
@@ -133,7 +133,7 @@ impl<M: Module> Trainer<M> {
     /// # Panics
     ///
     /// When there is no device.
-    pub fn new(model: M, options: TrainerOptions, devices: Vec<Device>) -> Self {
+    pub(crate) fn new(model: M, options: TrainerOptions, devices: Vec<Device>) -> Self {
         let model = model.fork(devices.first().expect("at least one device"));
         let weights = values(&model);
         Self {
@@ -161,17 +161,17 @@ impl<M: Module> Trainer<M> {
     }
 
     /// The model with averaged weights, outside autodiff.
-    pub fn averaged(&self) -> M {
+    pub(crate) fn averaged(&self) -> M {
         replaced(self.model.valid(), self.average.values().to_vec())
     }
 
     /// Steps made so far.
-    pub fn steps(&self) -> usize {
+    pub(crate) fn steps(&self) -> usize {
         self.step
     }
 
     /// Parts that a batch is cut into.
-    pub fn parts(&self) -> usize {
+    pub(crate) fn parts(&self) -> usize {
         self.devices.len() * self.options.grad_accumulation_steps
     }
 
@@ -180,7 +180,7 @@ impl<M: Module> Trainer<M> {
     /// # Errors
     ///
     /// [`Error::Diverged`] where none of many steps in a row, or of all so far, could be made.
-    pub fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         let never = self.step > 0 && self.applied == 0;
         if self.lost >= LOST || (never && self.step >= self.options.rate.steps) {
             return Err(Error::Diverged {
@@ -197,7 +197,10 @@ impl<M: Module> Trainer<M> {
     /// One step against the mean of `loss` over all parts.
     ///
     /// - `loss`: of the model on a device, and the number of a part, below [`parts`](Self::parts)
-    pub fn step(&mut self, loss: impl Fn(&M, &Device, usize) -> Tensor<1> + Sync) -> StepReport {
+    pub(crate) fn step(
+        &mut self,
+        loss: impl Fn(&M, &Device, usize) -> Tensor<1> + Sync,
+    ) -> StepReport {
         let (gradients, loss) = self.gradients(&loss);
         let norm = global_norm(&gradients);
         let rate = self.options.rate.at(self.step);
@@ -296,7 +299,7 @@ impl<M: Module> Trainer<M> {
     /// # Errors
     ///
     /// [`Error::Diverged`] for weights that are no finite numbers.
-    pub fn checkpoint(&self, state: &Value) -> Result<Checkpoint> {
+    pub(crate) fn checkpoint(&self, state: &Value) -> Result<Checkpoint> {
         let names = names(self.model());
         let mut tensors = Tensors::new();
         for (group, values) in GROUPS.iter().zip(self.state()) {
@@ -324,7 +327,7 @@ impl<M: Module> Trainer<M> {
     /// # Errors
     ///
     /// [`wake_nn::Error::InvalidOption`] for a checkpoint of another `state`, or without a tensor of the model.
-    pub fn restore(&mut self, checkpoint: Checkpoint, state: &Value) -> Result<()> {
+    pub(crate) fn restore(&mut self, checkpoint: Checkpoint, state: &Value) -> Result<()> {
         if let Some(error) = checkpoint.differs(state) {
             return Err(error);
         }

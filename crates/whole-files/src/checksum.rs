@@ -1,11 +1,33 @@
 //! Checksums: whether bytes are still those that were written.
 
+use std::io::{self, Read};
+use std::path::Path;
+
+use crate::read::open_regular;
+
 /// CRC-32 of some bytes, the one of PNG and ZIP, as eight hexadecimal digits.
 ///
 /// A change of up to 32 neighbouring bits changes it, any other does but for one in 2³².
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> String {
     format!("{:08x}", crc32fast::hash(bytes))
+}
+
+/// The [`checksum`] of a file, which is read piece by piece.
+///
+/// # Errors
+///
+/// If it is no regular file or cannot be read.
+pub fn file_checksum(path: &Path) -> io::Result<String> {
+    let mut file = open_regular(path)?;
+    let mut piece = vec![0; 1 << 20];
+    let mut hash = crc32fast::Hasher::new();
+    loop {
+        match file.read(&mut piece)? {
+            0 => return Ok(format!("{:08x}", hash.finalize())),
+            length => hash.update(&piece[..length]),
+        }
+    }
 }
 
 /// The text of a JSON object with one more entry at its end: `crc32`, the [`checksum`] of all text before that entry.
@@ -41,6 +63,10 @@ mod tests {
     fn checksums_are_those_of_png() {
         assert_eq!(checksum(b"123456789"), "cbf43926");
         assert_eq!(checksum(b""), "00000000");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let long = vec![7; (1 << 20) + 5];
+        std::fs::write(file.path(), &long).unwrap();
+        assert_eq!(file_checksum(file.path()).unwrap(), checksum(&long));
     }
 
     #[test]

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-mod checksum;
 mod error;
 mod text;
 mod write;
@@ -9,7 +8,9 @@ mod write;
 mod folder;
 mod read;
 
-pub use checksum::{checksum, sealed, unsealed};
+mod checksum;
+
+pub use checksum::{checksum, file_checksum, sealed, unsealed};
 pub use error::{Error, Result};
 pub use folder::{FolderLock, lock_folder, make_folder, sweep};
 pub use read::{fingerprint, open_regular, read_bytes, read_regular, read_text};

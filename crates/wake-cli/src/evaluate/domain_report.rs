@@ -1,6 +1,7 @@
 //! The report over a recipe: text, and a sheet of images.
 
 use serde::Serialize;
+use wake_physics::measure::median;
 use wake_physics::picture::Picture;
 use wake_train::TwoSample;
 use wake_train::evaluation::{DomainRow, Views};
@@ -45,9 +46,7 @@ pub(crate) fn sheet(simulated: &Views, model: &Views) -> Picture {
     for (name, views) in [("simulator", simulated), ("model", model)] {
         for images in [&views.plain, &views.speckled] {
             panels.extend(images.iter().take(PICTURED).map(|image| {
-                let mut sorted = image.values.clone();
-                let middle = sorted.len() / 2;
-                let median = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+                let median = median(&image.values);
                 let level = |v: &f32| (127.5 * (1.0 + (v - median) / REACH)).round() as u8;
                 let levels: Vec<u8> = image.values.iter().map(level).collect();
                 Picture::from_levels(&levels, image.columns).captioned(name)

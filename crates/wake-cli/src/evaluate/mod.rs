@@ -1,15 +1,13 @@
 //! `wake evaluate`: every figure beside the simulator's own, on scenes that no training set holds.
 
+mod ablation;
 mod detector;
 mod domain;
 mod domain_report;
-mod judge;
 mod model;
 mod options;
 mod plot;
 mod report;
-mod rungs;
-mod scenes;
 mod sea;
 mod sea_report;
 mod text_to_image;
@@ -18,15 +16,15 @@ mod timing;
 pub(crate) use options::Arguments;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use judge::{Judged, Plan, judge};
 use options::Task;
+use report::Report;
 use text_to_image::TextToImage;
 use wake_nn::device_named;
-use wake_train::evaluation::{Baseline, ImageSource, Told};
+use wake_train::evaluation::{Baseline, Evaluation, ImageSource, Told, held_out};
 
 use crate::exit::{self, Outcome};
 
-/// The held-out scene that is shown on every rung.
+/// The held-out scene that every kind of image shows.
 const PICTURED: u64 = 2;
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
@@ -38,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     }
 }
 
-/// Writes `report.json`, `report.md`, `rungs.png`, `spectrum.svg` and `wake_correlation.svg`; `docs/evaluation.md` says what
+/// Writes `report.json`, `report.md`, `ablation.png`, `spectrum.svg` and `wake_correlation.svg`; `docs/evaluation.md` says what
 /// each figure means.
 fn models(arguments: &Arguments) -> Outcome<()> {
     let device = device_named(&arguments.device)?;
@@ -57,33 +55,42 @@ fn models(arguments: &Arguments) -> Outcome<()> {
     // What cannot be read leaves no folder behind.
     whole_files::make_folder(&arguments.out)?;
     let judged = match &model {
-        Some(model) => Judged {
+        Some(model) => Evaluation {
             source: model,
             name: "model",
             has_network: true,
             text_to_image: beside,
+            scenes: arguments.count as usize,
             conditions: vec![Told::Text, Told::Numbers, Told::Paraphrase],
         },
-        None => Judged {
+        None => Evaluation {
             source: &Baseline::OtherSea,
             name: "simulator with another random sea",
             has_network: false,
             text_to_image: beside,
+            scenes: arguments.count as usize,
             conditions: Vec::new(),
         },
     };
-    let plan = Plan::of(arguments.count as usize);
-    let bar = ProgressBar::new(plan.steps(&judged) as u64);
+    let bar = ProgressBar::new(judged.steps());
     bar.set_style(ProgressStyle::with_template(
         "{msg:20} {bar:30} {pos}/{len}, {eta} left",
     )?);
-    let report = judge(&plan, &judged, lpips.as_ref(), &device, &bar)?;
+    let figures = judged.figures(lpips.as_ref(), &device, &|what, more| {
+        bar.set_message(what);
+        bar.inc(more);
+    })?;
+    bar.set_message("seconds");
+    let report = Report {
+        figures,
+        seconds: timing::timings(judged.source, judged.text_to_image)?,
+        paper: report::PAPER,
+    };
     bar.finish_and_clear();
     let text = report::markdown(&report);
     whole_files::write_json(&arguments.out.join("report.json"), &report)?;
     whole_files::write_atomically(&arguments.out.join("report.md"), text.as_bytes())?;
-    rungs::picture(&scenes::held_out(PICTURED), &judged)?
-        .write(&arguments.out.join("rungs.png"))?;
+    ablation::picture(&held_out(PICTURED), &judged)?.write(&arguments.out.join("ablation.png"))?;
     plot::spectrum(&arguments.out.join("spectrum.svg"), &report)?;
     plot::wake(&arguments.out.join("wake_correlation.svg"), &report)?;
     if arguments.json {

@@ -15,7 +15,7 @@ const COLOURS: [RGBColor; 3] = [
 pub(crate) fn spectrum(path: &Path, report: &Report) -> Outcome<()> {
     let area = SVGBackend::new(path, (900, 560)).into_drawing_area();
     area.fill(&WHITE)?;
-    let rings = report.pixels[0].spectrum_curve_db.len();
+    let rings = report.figures.pixels[0].spectrum_curve_db.len();
     let mut chart = ChartBuilder::on(&area)
         .caption("Radial spectrum less the simulator's", ("sans-serif", 22))
         .margin(16)
@@ -28,7 +28,11 @@ pub(crate) fn spectrum(path: &Path, report: &Report) -> Outcome<()> {
         .y_desc("dB")
         .draw()?;
     // A constant image has no spectrum to show.
-    let shown = report.pixels.iter().filter(|row| row.image != "constant");
+    let shown = report
+        .figures
+        .pixels
+        .iter()
+        .filter(|row| row.image != "constant");
     for (row, colour) in shown.zip(COLOURS) {
         let points = row.spectrum_curve_db.iter().enumerate().skip(1);
         let points = points.map(|(n, &db)| (n as f64, db.clamp(-10.0, 5.0)));
@@ -57,12 +61,12 @@ pub(crate) fn wake(path: &Path, report: &Report) -> Outcome<()> {
         .x_desc("simulator, 4 against 4 images")
         .y_desc("model, 8 against 8 images")
         .draw()?;
-    let wake = &report.wake_correlation;
+    let wake = &report.figures.wake_correlation;
     let pairs = wake.simulator.iter().zip(&wake.model);
     let colour = COLOURS[0];
     chart
         .draw_series(pairs.map(|(&s, &m)| Circle::new((s, m), 4, colour.filled())))?
-        .label(report.judged)
+        .label(report.figures.judged)
         .legend(move |(x, y)| Circle::new((x + 9, y), 4, colour.filled()));
     let grey = RGBColor(120, 120, 120);
     chart

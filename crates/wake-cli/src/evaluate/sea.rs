@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
-use wake_ldm::sea_texture::{PATCH, SeaTexture};
+use wake_ldm::sea_texture::{SeaTexture, WINDOW};
 use wake_nn::device_named;
 use wake_physics::Field;
 use wake_physics::picture::Picture;
@@ -111,14 +111,14 @@ fn picture(learnt: &SeaTexture, path: &Path) -> Outcome<()> {
     let show = |field: &Field, caption: &str| {
         let level = |&a: &f32| (90.0 * a).round().clamp(0.0, 255.0) as u8;
         let levels: Vec<u8> = field.values.iter().map(level).collect();
-        Picture::from_levels(&levels, PATCH).captioned(caption)
+        Picture::from_levels(&levels, WINDOW).captioned(caption)
     };
     let styles = || learnt.styles().iter().step_by(step).take(SHOWN).zip(SEED..);
     let mut pictures: Vec<Picture> = styles()
         .map(|(style, seed)| show(&gaussian_amplitude(style, seed), "Gaussian"))
         .collect();
     for (style, seed) in styles() {
-        let sea = learnt.amplitude(style, seed, PATCH, PATCH)?;
+        let sea = learnt.amplitude(style, seed, WINDOW, WINDOW)?;
         pictures.push(show(&sea, "learnt"));
     }
     Ok(Picture::sheet(&pictures, SHOWN).write(path)?)

@@ -1,6 +1,5 @@
 //! A model of images and prompts alone as a source of images: the paper's own way.
 
-use super::scenes::SIZE;
 use crate::exit::Outcome;
 use std::path::Path;
 use wake_ldm::pipeline::{Pipeline, Request};
@@ -8,7 +7,7 @@ use wake_nn::burn::tensor::Device;
 use wake_physics::grey::GreyScale;
 use wake_physics::{Field, Scene};
 use wake_text::Wording;
-use wake_train::evaluation::{ImageSource, Told};
+use wake_train::evaluation::{ImageSource, SIZE, Told};
 
 /// Steps from noise to image, as the paper has them.
 const STEPS: usize = 50;

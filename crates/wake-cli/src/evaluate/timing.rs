@@ -1,6 +1,5 @@
 //! Seconds per image: the model, the simulator's fast methods, and its harmonic sum.
 
-use super::scenes::{SIZE, held_out, ship};
 use crate::exit::Outcome;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -13,7 +12,7 @@ use wake_physics::surface::Surface;
 use wake_physics::waves::{Quantity, Transfer, harmonic_sum};
 use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
 use wake_physics::{Raster, Scene, Track, simulate};
-use wake_train::evaluation::{ImageSource, Told};
+use wake_train::evaluation::{ImageSource, SIZE, Told, held_out};
 
 /// Pixels along a side.
 const SIZES: [usize; 3] = [128, 256, 512];
@@ -116,7 +115,8 @@ fn harmonic_seconds(scene: &Scene) -> f64 {
     let sea = Surface::new(&spectrum, scene.seed, 0.0, &raster)
         .strongest(WAVES)
         .modes();
-    let ship = ship(scene);
+    // Every held-out scene has one.
+    let ship = scene.ships.first().cloned().unwrap_or_default();
     let wake = KelvinWake {
         hull: Hull::wigley(ship.length, ship.beam, ship.draft),
         speed: ship.speed,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use wake_train::detector::{DetectorTraining, Recipe};
+use wake_train::detector::{DetectorTraining, ImageRecipe};
 
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
@@ -23,8 +23,8 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 #[derive(Args)]
 pub(crate) struct Options {
     /// What the images show
-    #[arg(long, default_value = Recipe::Mixed.name(), value_parser = named::recipe())]
-    recipe: Recipe,
+    #[arg(long, default_value = ImageRecipe::Mixed.name(), value_parser = named::recipe())]
+    recipe: ImageRecipe,
     /// Different images, which come again when all were seen; by default all are different
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     distinct: Option<u32>,

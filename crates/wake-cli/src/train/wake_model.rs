@@ -3,41 +3,40 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use wake_ldm::network::WakeModelConfig;
-use wake_train::{LatentSet, StageOptions, WakeStage, WakeTraining};
+use wake_ldm::network::{Part, WakeModelConfig};
+use wake_train::{StageOptions, WakeTraining};
 
 use super::options::{Place, Thrift};
 use super::screen::Screen;
 use super::source::{check_memory, fitting, pairs};
-use crate::exit::{self, Outcome};
+use crate::exit::Outcome;
 
 /// Defaults of the options that all runs have.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[("every", "500"), ("out", "out/train")];
 
-/// A stage of the wake model.
+/// A part of the wake model, as [`Part`].
 #[derive(Clone, Copy, ValueEnum)]
-enum Stage {
-    /// Fit the patch transform, in closed form
-    Autoencoder,
+enum Trained {
+    /// Fit the linear autoencoder, in closed form
+    Patches,
     /// Train the reader of prompts
-    Words,
-    /// Train mean and spread of the latents
-    Mean,
+    Parser,
+    /// Train the mean and the standard deviation of the latents
+    Prior,
     /// Train the flow that draws the sea
-    Diffusion,
+    Flow,
 }
 
-/// Train the wake model, stage by stage.
+/// Train the wake model, part by part.
 ///
-/// A stage runs the earlier ones first, or to their end, where their weights are not in --out yet; so `diffusion`, the last,
-/// trains the whole model. Writes `config.json`, `patches.safetensors`, `reader.safetensors`, `prior.safetensors`,
-/// `flow.safetensors` (averaged weights, 16 bits), `shares.json`, a log `STAGE.jsonl` of each stage, `sheet.png`, `run.json`,
-/// and `checkpoints/`.
+/// The parts before the one asked for are trained first, or to their end, where their weights are not in --out yet; so
+/// `flow`, the last, trains the whole model. Writes `config.json`, `PART.safetensors` (averaged weights, 16 bits) and a log
+/// `PART.jsonl` of each part, `explained_variance.json`, `sheet.png`, `run.json`, and `checkpoints/`.
 #[derive(Args, Clone)]
 pub(crate) struct Options {
-    /// The stage to reach
-    #[arg(value_enum, default_value_t = Stage::Diffusion)]
-    stage: Stage,
+    /// The part to train
+    #[arg(value_enum, default_value_t = Trained::Flow)]
+    part: Trained,
     /// Folder that `wake dataset` wrote; without it, pairs are simulated first
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
@@ -50,13 +49,13 @@ pub(crate) struct Options {
     /// JSON file with the widths of the model [default: those of the model that ships]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Steps of the whole stage [default: words 4000, mean 6000, diffusion 6000]
+    /// Steps in all [default: parser 4000, prior 6000, flow 6000]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     steps: Option<u32>,
-    /// Examples of a batch [default: words 128, mean 32, diffusion 8]
+    /// Examples of a batch [default: parser 128, prior 32, flow 8]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     batch: Option<u16>,
-    /// Largest step of the optimizer [default: words 1e-3, mean 2e-3, diffusion 1e-3]
+    /// Largest step of the optimizer [default: parser 1e-3, prior 2e-3, flow 1e-3]
     #[arg(long)]
     rate: Option<f64>,
     #[command(flatten)]
@@ -65,13 +64,13 @@ pub(crate) struct Options {
     thrift: Thrift,
 }
 
-/// Runs a stage, after those that it needs.
+/// Trains a part, after those that it needs.
 pub(crate) fn run(options: &Options) -> Outcome<()> {
-    let stage = match options.stage {
-        Stage::Autoencoder => WakeStage::Autoencoder,
-        Stage::Words => WakeStage::Words,
-        Stage::Mean => WakeStage::Mean,
-        Stage::Diffusion => WakeStage::Diffusion,
+    let part = match options.part {
+        Trained::Patches => Part::Patches,
+        Trained::Parser => Part::Parser,
+        Trained::Prior => Part::Prior,
+        Trained::Flow => Part::Flow,
     };
     let constants = StageOptions {
         steps: options.steps.map(|steps| steps as usize),
@@ -80,37 +79,23 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         ..options.place.stage(&options.thrift)?
     };
     let config = config(options)?;
-    let pairs = match stage {
-        WakeStage::Words => None,
+    let pairs = match part {
+        Part::Parser => None,
         _ => Some(fitting(options, &config)?),
     };
-    if let (Some(pairs), WakeStage::Mean | WakeStage::Diffusion) = (&pairs, stage) {
-        check_memory(pairs.len(), LatentSet::bytes(&config, pairs.len()))?;
+    if let (Some(pairs), Part::Prior | Part::Flow) = (&pairs, part) {
+        check_memory(pairs.len(), WakeTraining::memory(&config, pairs.len()))?;
     }
     let out = options.place.out.clone();
     let screen = Screen::new(&out);
     let progress = screen.watch();
-    let mut training =
-        WakeTraining::open(out.clone(), (stage, constants), config, pairs, &progress)?;
-    match stage {
-        WakeStage::Autoencoder => {
-            let shares = training.autoencoder()?;
-            let line = |channels| {
-                let (kept, psnr) = (100.0 * shares.kept(channels), shares.psnr(channels));
-                format!("{channels:2} channels: {kept:.2} % of the variance, {psnr:.2} dB")
-            };
-            exit::say(&[4, 8, 16].map(line).join("\n"))?;
-        }
-        WakeStage::Words => training.words()?,
-        WakeStage::Mean => training.mean()?,
-        WakeStage::Diffusion => training.diffusion()?,
-    }
+    WakeTraining::open(out.clone(), (part, constants), config, pairs, &progress)?.run()?;
     screen.end()
 }
 
 /// The widths of the model: those of --config, else those in --out, else the standard ones for the pairs.
 fn config(options: &Options) -> Outcome<WakeModelConfig> {
-    let written = options.place.out.join("config.json");
+    let written = options.place.out.join(WakeModelConfig::FILE);
     let file = match &options.config {
         Some(file) => Some(file),
         None => Some(&written).filter(|file| file.exists()),

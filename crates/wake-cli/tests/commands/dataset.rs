@@ -135,7 +135,7 @@ fn a_broken_line_or_another_set_is_named_and_left_alone() {
     let second = good.lines().nth(1).expect("a second line");
     std::fs::write(&metadata, good.replace(second, r#"{"file_name": 3}"#)).expect("a file");
     refused_into("dataset", &same, &["metadata.jsonl, line 2"], &out);
-    let data = ["autoencoder", "--data", text(&out)];
+    let data = ["patches", "--data", text(&out)];
     refused_by("train wake-model", &data, &["metadata.jsonl, line 2"]);
 }
 
@@ -228,7 +228,7 @@ fn damage_is_named_and_left_alone() {
         "remove the file",
     ];
     refused_into("dataset", &arguments, &words, &out);
-    let data = ["autoencoder", "--data", text(&out)];
+    let data = ["patches", "--data", text(&out)];
     std::fs::remove_file(&image).expect("an image");
     done("dataset", &arguments, &out);
     assert!(files(&out) == whole);

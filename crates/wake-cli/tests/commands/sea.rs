@@ -114,9 +114,9 @@ fn what_is_no_sea_is_named() {
         &given(&["--half", "left"]),
         &["open sea", "128 x 128"],
     );
-    let reader = "crates/wake-ldm/assets/reader.safetensors";
+    let reader = "crates/wake-ldm/assets/parser.safetensors";
     for (name, words) in [
-        (reader, ["reader.safetensors", "does not fit"]),
+        (reader, ["parser.safetensors", "does not fit"]),
         ("no/sea", ["no/sea", "cannot read"]),
     ] {
         refused_by("generate", &["--sea", name], &words);

@@ -6,7 +6,7 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use wake_dataset::{Recipe, Simulated};
-use wake_ldm::network::{Domain, WakeModelConfig};
+use wake_ldm::network::{TrainingRanges, WakeModelConfig};
 use wake_physics::Scene;
 
 use super::{done, files, program, refused_by, refused_into, text};
@@ -32,15 +32,15 @@ fn toys(folder: &Path) {
 
 #[test]
 fn wrong_data_devices_and_folders_are_named() {
-    let data = ["autoencoder", "--data", "no/such/folder"];
+    let data = ["patches", "--data", "no/such/folder"];
     refused_by(
         "train wake-model",
         &data,
         &["no/such/folder", "wake dataset"],
     );
-    let device = ["autoencoder", "--device", "tpu"];
+    let device = ["patches", "--device", "tpu"];
     refused_by("train wake-model", &device, &["tpu", "flex"]);
-    for stage in ["words", "mean", "diffusion"] {
+    for stage in ["parser", "prior", "flow"] {
         refused_by(
             "train wake-model",
             &[stage, "--resume"],
@@ -74,10 +74,10 @@ fn the_stages_make_a_model_that_generates_and_a_stopped_run_goes_on() {
         ];
         done("train wake-model", &[arguments, &common].concat(), &out)
     };
-    train(&["words", "--steps", "2"]);
-    train(&["mean", "--steps", "2"]);
-    train(&["diffusion", "--steps", "2"]);
-    train(&["diffusion", "--steps", "3", "--resume"]);
+    train(&["parser", "--steps", "2"]);
+    train(&["prior", "--steps", "2"]);
+    train(&["flow", "--steps", "2"]);
+    train(&["flow", "--steps", "3", "--resume"]);
     let log = std::fs::read_to_string(out.join("diffusion.jsonl")).expect("a log");
     assert_eq!(log.lines().count(), 3, "{log}");
     let images = folder.path().join("images");
@@ -182,21 +182,21 @@ impl Toys {
 #[test]
 fn a_folder_belongs_to_one_run() {
     let toys = Toys::new();
-    toys.train(&["words", "--steps", "3"]);
+    toys.train(&["parser", "--steps", "3"]);
     let out = toys.path("run");
     toys.refused(
-        &["words", "--steps", "2"],
+        &["parser", "--steps", "2"],
         &["stage words has made 3 steps", "resume goes on"],
     );
     toys.refused(
-        &["words", "--steps", "4", "--resume", "--rate", "1e-2"],
+        &["parser", "--steps", "4", "--resume", "--rate", "1e-2"],
         &["rate = 0.001", "expected 0.01"],
     );
     toys.refused(
-        &["words", "--steps", "4", "--resume", "--seed", "5"],
+        &["parser", "--steps", "4", "--resume", "--seed", "5"],
         &["seed = 7", "expected 5"],
     );
-    toys.train(&["mean", "--steps", "1"]);
+    toys.train(&["prior", "--steps", "1"]);
     let other = toys.path("other");
     let size = [
         "--set",
@@ -211,7 +211,7 @@ fn a_folder_belongs_to_one_run() {
     );
     let config = toys.path("model.json");
     let arguments = [
-        "mean",
+        "prior",
         "--resume",
         "--data",
         text(&other),
@@ -230,16 +230,16 @@ fn a_folder_belongs_to_one_run() {
 #[test]
 fn results_are_made_again_from_the_last_checkpoint() {
     let toys = Toys::new();
-    toys.train(&["words", "--steps", "2"]);
-    toys.train(&["mean", "--steps", "2"]);
-    toys.train(&["diffusion", "--steps", "2", "--every", "1"]);
+    toys.train(&["parser", "--steps", "2"]);
+    toys.train(&["prior", "--steps", "2"]);
+    toys.train(&["flow", "--steps", "2", "--every", "1"]);
     let out = toys.path("run");
     let before = files(&out);
     let results = [
         "flow.safetensors",
         "sheet.png",
         "prior.safetensors",
-        "reader.safetensors",
+        "parser.safetensors",
     ];
     for name in results {
         // As a kill leaves them: one is missing, the others are of an earlier checkpoint.
@@ -250,7 +250,7 @@ fn results_are_made_again_from_the_last_checkpoint() {
     assert_ne!(record, stale);
     std::fs::write(out.join("run.json"), stale).expect("a file");
     std::fs::write(out.join("flow.safetensors"), "old").expect("a file");
-    toys.train(&["diffusion", "--steps", "2", "--resume"]);
+    toys.train(&["flow", "--steps", "2", "--resume"]);
     let after = files(&out);
     for name in results {
         assert!(after[Path::new(name)] == before[Path::new(name)], "{name}");
@@ -264,7 +264,7 @@ fn many_kills_change_no_weight() {
     let (whole, killed) = (toys.path("whole"), toys.path("run"));
     // A rate with all digits that a number can have.
     let rate = "--rate=0.0012345678901234567";
-    let arguments = toys.arguments(&["words", "--steps", "30", "--every", "2", rate]);
+    let arguments = toys.arguments(&["parser", "--steps", "30", "--every", "2", rate]);
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     done("train wake-model", &arguments, &whole);
     let resumed = [&arguments[..], &["--resume"]].concat();
@@ -294,7 +294,7 @@ fn many_kills_change_no_weight() {
     let last = if has_begun() { &resumed } else { &arguments };
     done("train wake-model", last, &killed);
     let file = |folder: &Path, name: &str| std::fs::read(folder.join(name)).expect("a file");
-    let name = "reader.safetensors";
+    let name = "parser.safetensors";
     assert!(file(&whole, name) == file(&killed, name));
     let temporary = files(&killed)
         .into_keys()
@@ -307,27 +307,27 @@ fn many_kills_change_no_weight() {
 #[test]
 fn a_damaged_checkpoint_or_image_is_named() {
     let toys = Toys::new();
-    toys.train(&["mean", "--steps", "4", "--every", "2"]);
+    toys.train(&["prior", "--steps", "4", "--every", "2"]);
     let out = toys.path("run");
     let weights = std::fs::read(out.join("prior.safetensors")).expect("weights");
     let newest = out.join("checkpoints/mean/step-00000004");
-    for name in ["tensors-000.safetensors", "state.json"] {
+    for name in ["tensors.safetensors", "state.json"] {
         let file = newest.join(name);
         let whole = std::fs::read(&file).expect("a file");
         let mut damaged = whole.clone();
         damaged[whole.len() / 2] ^= 4;
         std::fs::write(&file, damaged).expect("a file");
         let words = [name, "checksum", "remove the folder step-00000004"];
-        toys.refused(&["mean", "--steps", "4", "--resume"], &words);
+        toys.refused(&["prior", "--steps", "4", "--resume"], &words);
         std::fs::write(&file, whole).expect("a file");
     }
     std::fs::remove_dir_all(newest).expect("a checkpoint");
-    toys.train(&["mean", "--steps", "4", "--every", "2", "--resume"]);
+    toys.train(&["prior", "--steps", "4", "--every", "2", "--resume"]);
     assert!(std::fs::read(out.join("prior.safetensors")).expect("weights") == weights);
     let images = toys.path("set/images");
     std::fs::copy(images.join("000001.png"), images.join("000000.png")).expect("a copy");
     toys.refused(
-        &["mean", "--steps", "6", "--resume"],
+        &["prior", "--steps", "6", "--resume"],
         &["000000.png", "damaged or another image"],
     );
 }
@@ -348,7 +348,7 @@ fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
             &set,
         );
         let pixels = format!("{rows} × {columns} pixels");
-        for stage in ["autoencoder", "mean", "diffusion"] {
+        for stage in ["patches", "prior", "flow"] {
             let arguments = [stage, "--data", text(&set), "--config", text(&config)];
             refused_by("train wake-model", &arguments, &[&pixels, "64 × 64"]);
         }
@@ -363,7 +363,7 @@ fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
     let mut arguments = vec!["--count", "1"];
     arguments.extend(changes.iter().flat_map(|change| ["--set", *change]));
     done("dataset", &arguments, &set);
-    let arguments = ["mean", "--data", text(&set), "--config", text(&config)];
+    let arguments = ["prior", "--data", text(&set), "--config", text(&config)];
     refused_by(
         "train wake-model",
         &arguments,
@@ -371,11 +371,11 @@ fn data_and_numbers_that_do_not_fit_are_refused_by_name() {
     );
     for rate in ["nan", "inf", "1e300", "0", "-1"] {
         let rate = format!("--rate={rate}");
-        for stage in ["words", "mean", "diffusion"] {
+        for stage in ["parser", "prior", "flow"] {
             refused_by("train wake-model", &[stage, &rate], &["rate is", "outside"]);
         }
     }
-    let count = ["mean", "--count", "18446744073709551615"];
+    let count = ["prior", "--count", "18446744073709551615"];
     refused_by("train wake-model", &count, &["--count", "10000000"]);
 }
 
@@ -395,7 +395,7 @@ fn a_set_of_three_images_is_learnt() {
     let common = ["--data", text(&set), "--config", text(&config)];
     done(
         "train wake-model",
-        &[&["mean", "--steps", "1", "--batch", "2"], &common[..]].concat(),
+        &[&["prior", "--steps", "1", "--batch", "2"], &common[..]].concat(),
         &out,
     );
     assert!(out.join("sheet.png").is_file());
@@ -419,12 +419,12 @@ fn scenes_that_the_model_is_not_told_of_are_refused_by_name() {
     let scenes: Vec<Scene> = (0..200).map(|n| simulated.scene(n).unwrap()).collect();
     let model = WakeModelConfig::read(&toys.path("model.json")).unwrap();
     let model = WakeModelConfig {
-        domain: Domain::of(&scenes).unwrap(),
+        training_ranges: TrainingRanges::of(&scenes).unwrap(),
         ..model
     };
     let config = toys.path("told.json");
     std::fs::write(&config, serde_json::to_vec(&model).unwrap()).unwrap();
-    let arguments = ["mean", "--data", text(&set), "--config", text(&config)];
+    let arguments = ["prior", "--data", text(&set), "--config", text(&config)];
     refused_by(
         "train wake-model",
         &arguments,

@@ -16,6 +16,7 @@
 mod arms;
 mod figures;
 mod inversion;
+mod median;
 mod open_sea;
 mod profile;
 mod radial;
@@ -31,6 +32,7 @@ mod tests;
 
 pub use figures::{ImageFigures, StatedSpeckle, WakeFigures};
 pub use inversion::{incidence, mean_sigma0, wind_axis, wind_speed};
+pub use median::median;
 pub use open_sea::{OpenSea, open_sea};
 pub use profile::{Streak, WakeAxis, WakeProfile, wake_arms, wake_profile};
 pub use radial::{Binning, RadialSpectrum, radial_spectrum};

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use wake_dataset::{Grey, Pair, Simulated, Source};
 use wake_physics::labels::WakeLabel;
 use wake_physics::labels_of;
+use wake_physics::measure::median;
 
 use super::draw::Draw;
 use super::sample::wakes;
@@ -92,12 +93,6 @@ fn hide(wake: &mut WakeLabel, size: usize, hidden: impl Fn(usize) -> bool) {
         x.zip(y).is_none_or(|(x, y)| !hidden(y * size + x))
     });
     visibility.snr *= (free.count() as f64 / PLACES as f64).sqrt();
-}
-
-fn median(pixels: &[f32]) -> f32 {
-    let mut sorted = pixels.to_vec();
-    let middle = sorted.len() / 2;
-    *sorted.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 impl Source for Cluttered {

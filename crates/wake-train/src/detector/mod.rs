@@ -17,7 +17,7 @@ mod targets;
 mod training;
 
 pub use painted::Painted;
-pub use recipes::Recipe;
+pub use recipes::ImageRecipe;
 pub use repeated::Repeated;
 pub use sample::Sample;
 pub use targets::FOUND;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use burn::tensor::Device;
-use wake_dataset::{Mixture, Recipe as SceneRecipe, Simulated, Source};
+use wake_dataset::{Mixture, Recipe, Simulated, Source};
 use wake_ldm::{Sampled, WakeSampler};
 
 use super::cluttered::Cluttered;
@@ -11,7 +11,7 @@ use super::painted::Painted;
 
 /// What the images of a training run, or of an evaluation, show.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Recipe {
+pub enum ImageRecipe {
     /// Painted lines, streaks and blobs, no physics
     Painted,
     /// Simulated: X band over an open sea with at most one ship, at satellite pixels
@@ -52,7 +52,7 @@ const PLAIN: [&str; 5] = [
     "draw.radar.looks = [1, 8]",
 ];
 
-impl Recipe {
+impl ImageRecipe {
     /// All of them.
     pub const ALL: [Self; 9] = [
         Self::Painted,
@@ -157,12 +157,12 @@ impl Recipe {
 
 /// Images of both recipes in turn.
 fn in_turn(
-    recipes: [Recipe; 2],
+    recipes: [ImageRecipe; 2],
     seed: u64,
     size: usize,
     device: &Device,
 ) -> wake_dataset::Result<Arc<dyn Source>> {
-    let part = |recipe: Recipe| Ok((1.0, recipe.source(seed, size, device)?));
+    let part = |recipe: ImageRecipe| Ok((1.0, recipe.source(seed, size, device)?));
     let parts = recipes.into_iter().map(part);
     Ok(Arc::new(Mixture::new(
         parts.collect::<wake_dataset::Result<_>>()?,
@@ -172,6 +172,6 @@ fn in_turn(
 /// The recipe detector with changes.
 fn simulated(changes: &[&str], seed: u64, size: usize) -> wake_dataset::Result<Simulated> {
     let pixels = ["rows", "columns"].map(|side| format!("scene.grid.{side} = {size}"));
-    let recipe = SceneRecipe::detector()?.with_assignments(&pixels)?;
+    let recipe = Recipe::detector()?.with_assignments(&pixels)?;
     Simulated::new(recipe.with_assignments(changes)?, seed)
 }

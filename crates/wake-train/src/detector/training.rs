@@ -12,7 +12,7 @@ use wake_nn::weights::{Layout, Precision, load, save_as};
 use whole_files::fingerprint;
 
 use super::draw::Draw;
-use super::recipes::Recipe;
+use super::recipes::ImageRecipe;
 use super::repeated::Repeated;
 use super::sample::Sample;
 use super::targets::{Batch, Prepared};
@@ -113,7 +113,7 @@ impl Task<Network> for DetectorTask {
 #[derive(Debug, Clone, Default)]
 pub struct DetectorTraining {
     /// What the images show.
-    pub recipe: Recipe,
+    pub recipe: ImageRecipe,
     /// Different images, which come again when all were seen; `None`: all are different.
     pub distinct: Option<usize>,
     /// Weights to begin with; `None`: random ones.

@@ -24,7 +24,7 @@ const KINDS: [&str; 6] = [
 
 /// Figures over scenes, which are added some at a time.
 #[derive(Debug, Clone, Default)]
-pub struct Comparison {
+pub(super) struct Comparison {
     /// By kind, see [`KINDS`].
     tallies: [PixelTally; 6],
     /// What is read from simulated images, scene by scene.
@@ -46,7 +46,7 @@ impl Comparison {
     ///
     /// As [`ImageSource::draw`] and [`Reading::of`], and [`wake_nn::Error::InvalidOption`] for a source that
     /// gives other images than were asked for.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         scenes: &[Scene],
         model: &dyn ImageSource,
@@ -83,7 +83,7 @@ impl Comparison {
     /// The figures of pixels: of the model first, of the simulator with another sea second; the last is that of the model
     /// beside, where there was one.
     #[must_use]
-    pub fn pixels(&self) -> Vec<PixelRow> {
+    pub(super) fn pixels(&self) -> Vec<PixelRow> {
         let kinds = self.tallies.iter().zip(KINDS);
         let drawn = kinds.filter(|(tally, kind)| !tally.is_empty() || *kind != KINDS[5]);
         drawn.map(|(tally, kind)| tally.row(kind)).collect()
@@ -92,7 +92,7 @@ impl Comparison {
     /// Equivalent looks of the open sea after speckle is applied, medians over the scenes: on simulated images, and on the
     /// model's.
     #[must_use]
-    pub fn looks(&self) -> [Option<f64>; 2] {
+    pub(super) fn looks(&self) -> [Option<f64>; 2] {
         self.looks.each_ref().map(|looks| quantile(looks, 0.5))
     }
 }

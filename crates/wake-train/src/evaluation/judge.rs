@@ -20,7 +20,11 @@ const FOUND: f64 = 0.9;
 /// # Errors
 ///
 /// As [`classifier_two_sample_test`].
-pub fn told_apart(first: &[Field], second: &[Field], device: &Device) -> Result<Option<TwoSample>> {
+pub(super) fn told_apart(
+    first: &[Field],
+    second: &[Field],
+    device: &Device,
+) -> Result<Option<TwoSample>> {
     let mut best: Option<TwoSample> = None;
     if first.len() < 4 {
         return Ok(best);

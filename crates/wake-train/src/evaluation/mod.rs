@@ -1,8 +1,8 @@
 //! How good generated images are: every figure beside the simulator's own.
 //!
 //! ```text
-//! scenes ─► ImageSource ─► intensity ─► readings of heading, speed, wind and incidence ─► rows of errors, swaps
-//!                              └─► grey ─► pixels, rungs, wake correlation, two-sample judge, domain
+//! scenes ─► ImageSource ─► intensity ─► readings of heading, speed, wind and incidence ─► rows of errors, controllability
+//!                              └─► grey ─► pixels, ablation, wake correlation, two-sample judge, domain
 //! real images ─► pairs of windows ─► kinds of sea ─► rows
 //! ```
 //!
@@ -26,6 +26,7 @@
 
 // What is judged, and what beside it.
 mod baseline;
+mod held_out;
 mod source;
 
 // Figures of images.
@@ -38,21 +39,23 @@ mod statistics;
 mod comparison;
 mod domain;
 mod measurements;
-mod rungs;
-mod swaps;
+mod ablation;
+mod controllability;
 mod wake_correlation;
+
+mod figures;
 
 pub mod sea;
 
+pub use ablation::AblationRow;
 pub use baseline::Baseline;
-pub use comparison::Comparison;
+pub use controllability::ControllabilityRow;
 pub use domain::{DomainRow, Views};
-pub use judge::told_apart;
+pub use figures::{ConditionRow, Evaluation, Figures, Speckle};
+pub use held_out::{SIZE, held_out};
 pub use measurements::MeasurementRow;
-pub use pixels::{PixelRow, PixelTally, grey};
+pub use pixels::{PixelRow, grey};
 pub use reading::{Quantity, Reading};
-pub use rungs::{RungRow, rungs};
-pub use source::{BATCH, ImageSource, Told, draw_all, other_sea};
-pub use statistics::{AbsoluteErrors, mean, quantile};
-pub use swaps::{SwapRow, swaps};
-pub use wake_correlation::{WakeCorrelation, wake_correlation};
+pub use source::{ImageSource, Told, other_sea};
+pub use statistics::AbsoluteErrors;
+pub use wake_correlation::WakeCorrelation;

@@ -43,7 +43,7 @@ pub(super) fn blur(image: &Field) -> Field {
 
 /// Sums of the figures of one kind of image over scenes.
 #[derive(Debug, Clone, Default)]
-pub struct PixelTally {
+pub(super) struct PixelTally {
     ssim: Vec<f64>,
     psnr: Vec<f64>,
     lpips: Vec<f64>,
@@ -80,7 +80,7 @@ impl PixelTally {
     /// # Panics
     ///
     /// If the sizes differ.
-    pub fn add(&mut self, reference: &Field, image: &Field, lpips: Option<&Lpips>) {
+    pub(super) fn add(&mut self, reference: &Field, image: &Field, lpips: Option<&Lpips>) {
         let planes = [reference, image].map(|f| Plane::new(&f.values, f.columns));
         self.ssim
             .push(ssim(&planes[0], &planes[1], 1.0, SsimWindow::Gaussian));
@@ -103,19 +103,19 @@ impl PixelTally {
 
     /// Number of images.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.ssim.len()
     }
 
     /// Whether no image was counted.
     #[must_use]
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.ssim.is_empty()
     }
 
     /// The means.
     #[must_use]
-    pub fn row(&self, image: &'static str) -> PixelRow {
+    pub(super) fn row(&self, image: &'static str) -> PixelRow {
         let count = self.len().max(1) as f64;
         let curve: Vec<f64> = self.spectrum.iter().map(|sum| sum / count).collect();
         // Ring 0 is the mean, counted as brightness; the rings end at the Nyquist frequency.

@@ -6,10 +6,10 @@ use wake_physics::{Field, Scene};
 use wake_text::Wording;
 
 use crate::error::{Error, Result};
-use wake_ldm::sampler::{Conditioning, WakeSampler};
+use wake_ldm::sampler::{PromptMode, WakeSampler};
 
 /// Images that [`draw_all`] asks a source for at once.
-pub const BATCH: usize = 8;
+pub(super) const BATCH: usize = 8;
 
 /// What a model is told about a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,20 +52,20 @@ pub trait ImageSource: Debug {
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
 }
 
-/// The wake model is told what is asked for, whatever [`Conditioning`] it has; [`Told::Scene`] is told with its own.
+/// The wake model is told what is asked for, whatever [`PromptMode`] it has; [`Told::Scene`] is told with its own.
 impl ImageSource for WakeSampler {
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
         let (told, wording) = match told {
-            Told::Both => (Conditioning::Both, Wording::Paper),
-            Told::Text => (Conditioning::Words, Wording::Paper),
-            Told::Numbers => (Conditioning::Numbers, Wording::Paper),
-            Told::Paraphrase => (Conditioning::Words, Wording::WindFirst),
+            Told::Both => (PromptMode::Both, Wording::Paper),
+            Told::Text => (PromptMode::Words, Wording::Paper),
+            Told::Numbers => (PromptMode::Numbers, Wording::Paper),
+            Told::Paraphrase => (PromptMode::Words, Wording::WindFirst),
             Told::Scene => {
                 let images = self.sample_scenes(scenes)?;
                 return Ok(images.into_iter().map(|image| image.intensity).collect());
             }
         };
-        let sampler = self.clone().with_conditioning(told);
+        let sampler = self.clone().with_prompt_mode(told);
         let mut images = Vec::with_capacity(scenes.len());
         // Image k of a call has the first seed plus k.
         for batch in scenes.chunk_by(|one, next| next.seed == one.seed.wrapping_add(1)) {
@@ -88,7 +88,7 @@ impl ImageSource for WakeSampler {
 /// # Errors
 ///
 /// As [`ImageSource::draw`].
-pub fn draw_all(
+pub(super) fn draw_all(
     source: &dyn ImageSource,
     scenes: &[Scene],
     told: Told,

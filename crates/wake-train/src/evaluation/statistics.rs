@@ -33,7 +33,7 @@ impl AbsoluteErrors {
 ///
 /// - `q`: 0, the smallest value, to 1, the largest
 #[must_use]
-pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
+pub(super) fn quantile(values: &[f64], q: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let place = q.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
@@ -46,7 +46,7 @@ pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
 
 /// The mean; `None` of nothing.
 #[must_use]
-pub fn mean(values: &[f64]) -> Option<f64> {
+pub(super) fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 

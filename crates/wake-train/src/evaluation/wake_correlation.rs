@@ -38,7 +38,7 @@ pub struct WakeCorrelation {
 /// # Errors
 ///
 /// As [`ImageSource::draw`]; [`wake_nn::Error::InvalidOption`] for a scene without a ship.
-pub fn wake_correlation(
+pub(super) fn wake_correlation(
     scenes: &[Scene],
     model: &dyn ImageSource,
     mut step: impl FnMut(),

@@ -7,12 +7,19 @@ use wake_ldm::pipeline::token_ids;
 use wake_nn::noise::NoiseSource;
 use wake_text::Tokenizer;
 
-/// Part of the pairs whose prompt is left out, for guidance.
-pub(crate) const WITHOUT_PROMPT: f64 = 0.1;
+/// Part of the images whose prompt is left out, for guidance.
+const WITHOUT_PROMPT: f64 = 0.1;
+
+/// Whether the prompt of the image at a position of a run is told to the model.
+///
+/// - `stream`: of the random numbers that decide
+pub(crate) fn is_told(random: NoiseSource, stream: u32, position: u64) -> bool {
+    random.uniform(stream, position) >= WITHOUT_PROMPT
+}
 
 /// An image beside its prompt in tokens.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prompted {
+pub(crate) struct Prompted {
     /// The image, 0 to 1.
     pub image: Grey,
     /// Ids of the prompt, marks and padding included.
@@ -20,7 +27,7 @@ pub struct Prompted {
 }
 
 /// Where prompted images come from: a function of the position alone.
-pub trait PromptedSource: Sync {
+pub(crate) trait PromptedSource: Sync {
     /// The one at a position of a run; all have one size and one number of tokens.
     ///
     /// # Errors
@@ -35,7 +42,7 @@ pub trait PromptedSource: Sync {
 ///
 /// Ho & Salimans (2021), "Classifier-Free Diffusion Guidance", algorithm 1 (prompts left out).
 #[derive(Debug)]
-pub struct PromptedPairs<'a> {
+pub(crate) struct PromptedPairs<'a> {
     data: &'a Folder,
     positions: Vec<u64>,
     tokenizer: Option<&'a Tokenizer>,
@@ -45,7 +52,7 @@ pub struct PromptedPairs<'a> {
 impl<'a> PromptedPairs<'a> {
     /// Those of a folder; a tokenizer of `None` is CLIP's own.
     #[must_use]
-    pub fn new(data: &'a Folder, tokenizer: Option<&'a Tokenizer>, seed: u64) -> Self {
+    pub(crate) fn new(data: &'a Folder, tokenizer: Option<&'a Tokenizer>, seed: u64) -> Self {
         Self {
             data,
             positions: data.trainset(),
@@ -56,14 +63,8 @@ impl<'a> PromptedPairs<'a> {
 
     /// Number of pairs that are drawn from.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.positions.len()
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.positions.is_empty()
     }
 }
 
@@ -73,7 +74,7 @@ impl PromptedSource for PromptedPairs<'_> {
         let draw = random.uniform(streams::PAIRS, position);
         let number = self.positions[(draw * self.len() as f64) as usize];
         let Pair { image, prompt, .. } = self.data.pair(number)?;
-        let told = random.uniform(streams::UNTOLD, position) >= WITHOUT_PROMPT;
+        let told = is_told(random, streams::UNTOLD, position);
         let ids = token_ids(self.tokenizer, if told { &prompt } else { "" });
         Ok(Prompted { image, ids })
     }

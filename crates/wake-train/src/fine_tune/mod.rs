@@ -20,13 +20,13 @@ use wake_ldm::text::ClipText;
 use wake_ldm::unet::{UNet, UNetInput};
 use wake_nn::noise::{NoiseSource, normal_batch};
 
-pub(crate) use batches::WITHOUT_PROMPT;
-pub use batches::{Prompted, PromptedPairs, PromptedSource};
+pub(crate) use batches::is_told;
+pub(crate) use batches::{PromptedPairs, PromptedSource};
 pub use training::FineTuning;
 
 /// The parts of the model that do not learn, outside autodiff.
 #[derive(Debug, Clone)]
-pub struct Frozen {
+pub(crate) struct Frozen {
     /// Words to tokens.
     pub text: ClipText,
     /// Images to latents.
@@ -55,7 +55,7 @@ impl Frozen {
 /// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models", Eq. 2; Salimans & Ho
 /// (2022), appendix D (velocity); Hang et al. (2023), section 3.4 (weights).
 #[derive(Debug)]
-pub struct FineTuneTask<S> {
+pub(crate) struct FineTuneTask<S> {
     source: S,
     schedule: NoiseSchedule,
     prediction: Prediction,
@@ -83,7 +83,7 @@ impl<S: PromptedSource> FineTuneTask<S> {
     /// # Errors
     ///
     /// [`wake_nn::Error::Unsupported`] for the prediction of a flow, which mixes noise and image along a line and not with √ᾱ.
-    pub fn new(
+    pub(crate) fn new(
         source: S,
         frozen: &Frozen,
         (schedule, prediction): (NoiseSchedule, Prediction),
@@ -113,14 +113,14 @@ impl<S: PromptedSource> FineTuneTask<S> {
 
     /// Weighs steps by their signal-to-noise ratio, no more than γ; without it every step counts the same.
     #[must_use]
-    pub fn with_snr_gamma(mut self, gamma: Option<f64>) -> Self {
+    pub(crate) fn with_snr_gamma(mut self, gamma: Option<f64>) -> Self {
         self.snr_gamma = gamma;
         self
     }
 
     /// Learns low-rank changes of this U-Net, which stays as it is.
     #[must_use]
-    pub fn with_base(self, unet: &UNet) -> Self {
+    pub(crate) fn with_base(self, unet: &UNet) -> Self {
         for place in &self.places {
             let unet = unet.clone().no_grad().train().fork(&place.device);
             lock(&place.frozen).1 = Some(unet);
@@ -141,7 +141,7 @@ impl<S: PromptedSource> FineTuneTask<S> {
         let inner = device.clone().inner();
         let (positions, count) = (batch.positions.clone(), batch.steps.len());
         let images = Tensor::<4>::from_data(batch.images.clone(), &inner);
-        let images = images.repeat_dim(1, frozen.autoencoder.image_channels());
+        let images = frozen.autoencoder.scaled(images);
         let posterior = frozen.autoencoder.encode(images);
         let [_, channels, rows, columns] = posterior.mode().dims();
         let sources: Vec<NoiseSource> = positions
@@ -180,7 +180,7 @@ impl<S: PromptedSource> FineTuneTask<S> {
         for position in positions.clone() {
             let pair = self.source.at(position)?;
             size = [pair.image.rows, pair.image.columns];
-            pixels.extend(pair.image.pixels.iter().map(|grey| 2.0 * grey - 1.0));
+            pixels.extend(pair.image.pixels);
             ids.extend(pair.ids);
         }
         let tokens = ids.len() / count.max(1);
@@ -197,8 +197,8 @@ impl<S: PromptedSource> FineTuneTask<S> {
 
 /// Images and prompts at some positions of a run.
 #[derive(Debug)]
-pub struct PromptedBatch {
-    /// `[batch, 1, rows, columns]` in −1…1.
+pub(crate) struct PromptedBatch {
+    /// Grey 0…1, `[batch, 1, rows, columns]`.
     images: TensorData,
     /// `[batch, tokens]`
     ids: TensorData,

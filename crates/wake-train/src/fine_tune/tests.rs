@@ -7,6 +7,7 @@ use burn::tensor::{Device, Tensor};
 use serde_json::{Value, json};
 use wake_dataset::Grey;
 
+use super::batches::Prompted;
 use super::*;
 use crate::tensors::values;
 use crate::{Checkpoint, LrSchedule, Run, RunOptions, TrainerOptions};

@@ -6,10 +6,12 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use wake_physics::Scene;
 
-use crate::{Checkpoint, RunFolder, Tensors};
+use crate::Checkpoint;
+use crate::checkpoint::Tensors;
+use crate::folder::RunFolder;
 use wake_ldm::autoencoder::AutoencoderKlConfig;
 use wake_ldm::conditioning::Vocabulary;
-use wake_ldm::network::{Domain, WakeModelConfig};
+use wake_ldm::network::{TrainingRanges, WakeModelConfig};
 use wake_ldm::scheduler::SchedulerConfig;
 use wake_ldm::unet::UNetConfig;
 
@@ -53,7 +55,7 @@ proptest! {
     fn runs(model in numbers(), data in numbers()) {
         let folder = tempfile::tempdir().unwrap();
         for _ in 0..2 {
-            let run = RunFolder::open(folder.path(), &model, &data, ("mean", false));
+            let run = RunFolder::open(folder.path(), &model, &data, ("prior", false));
             prop_assert!(run.is_ok(), "{:?}", run.err().map(|error| error.to_string()));
         }
         let config = std::fs::read_to_string(folder.path().join("config.json")).unwrap();
@@ -66,7 +68,7 @@ proptest! {
         let mut config = WakeModelConfig::standard(&Vocabulary::new([1, 2]));
         let mut scene = Scene::default();
         [scene.sea.wind_speed, scene.sea.fetch, scene.ships[0].speed] = values;
-        (config.domain, config.spacing) = (Domain::of([&scene]).unwrap(), spacing);
+        (config.training_ranges, config.spacing) = (TrainingRanges::of([&scene]).unwrap(), spacing);
         (config.scene, config.grey.brightest_db) = (scene, ends);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("config.json");

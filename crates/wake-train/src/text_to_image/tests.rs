@@ -105,7 +105,7 @@ fn images_of_another_size_are_refused() {
     assert!(error.contains("[32, 32] as before"), "{error}");
     let mut empty = PromptedImages::default();
     empty.push(&pair).unwrap();
-    assert_eq!((empty.len(), empty.size()), (1, [256, 256]));
+    assert_eq!((empty.len(), empty.size), (1, [256, 256]));
     assert_eq!(empty.prompts[0].len(), 77);
 }
 

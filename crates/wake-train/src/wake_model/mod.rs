@@ -1,9 +1,9 @@
-//! The stages of the wake model's training, in the folder of one run: patch transform, words, mean, diffusion.
+//! The stages of the wake model's training, in the folder of one run: patches, parser, prior, flow.
 
-mod diffusion;
-mod mean;
+mod flow;
+mod parser;
 mod patches;
-mod words;
+mod prior;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,64 +19,33 @@ use super::progress::{Progress, counted};
 use super::stage::Stage;
 use super::stage_options::{StageDefaults, StageOptions};
 use crate::error::{Error, Result};
-use wake_ldm::network::{PatchTransform, WakeModelConfig};
+use wake_ldm::network::{Part, PatchTransform, WakeModelConfig};
 use wake_nn::weights::{Layout, Precision, load, save_as};
 use whole_files::fingerprint;
 
-/// Names of what the stages write.
-const PATCHES: &str = "patches.safetensors";
-const PARSER: &str = "reader.safetensors";
-const PRIOR: &str = "prior.safetensors";
-const FLOW: &str = "flow.safetensors";
+/// Images of the pairs beside those of the model.
 const SHEET: &str = "sheet.png";
 /// Images in a row of a sheet.
 const ACROSS: u64 = 8;
 
-/// One stage of the wake model's training.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WakeStage {
-    /// The patch transform, in closed form.
-    Autoencoder,
-    /// The reader of prompts.
-    Words,
-    /// Mean and spread of the latents.
-    Mean,
-    /// The flow that draws the sea.
-    Diffusion,
+/// What training a part takes where nothing else is asked for; the patches take no steps.
+fn defaults(part: Part) -> StageDefaults {
+    let (steps, batch, rate) = match part {
+        Part::Patches => (1, 1, 1e-3),
+        Part::Parser => (4000, 128, 1e-3),
+        Part::Prior => (6000, 32, 2e-3),
+        Part::Flow => (6000, 8, 1e-3),
+    };
+    StageDefaults { steps, batch, rate }
 }
 
-impl WakeStage {
-    /// The name of its checkpoints and its log.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Autoencoder => "autoencoder",
-            Self::Words => "words",
-            Self::Mean => "mean",
-            Self::Diffusion => "diffusion",
-        }
-    }
-
-    /// What it takes where nothing else is asked for; the autoencoder takes no steps.
-    #[must_use]
-    pub fn usual(self) -> StageDefaults {
-        let (steps, batch, rate) = match self {
-            Self::Autoencoder => (1, 1, 1e-3),
-            Self::Words => (4000, 128, 1e-3),
-            Self::Mean => (6000, 32, 2e-3),
-            Self::Diffusion => (6000, 8, 1e-3),
-        };
-        StageDefaults { steps, batch, rate }
-    }
-
-    /// What is there when it is done.
-    fn results(self) -> &'static [&'static str] {
-        match self {
-            Self::Autoencoder => &[PATCHES],
-            Self::Words => &[PARSER],
-            Self::Mean => &[PRIOR],
-            Self::Diffusion => &[FLOW, SHEET],
-        }
+/// Files that are there when a part is trained.
+fn results(part: Part) -> &'static [&'static str] {
+    match part {
+        Part::Patches => const { &[Part::Patches.file()] },
+        Part::Parser => const { &[Part::Parser.file()] },
+        Part::Prior => const { &[Part::Prior.file()] },
+        Part::Flow => const { &[Part::Flow.file(), SHEET] },
     }
 }
 
@@ -84,23 +53,24 @@ impl WakeStage {
 ///
 /// A stage runs the earlier ones first, or to their end, where their weights are not in the folder yet. They leave there
 /// what [`WakeSampler::from_folder`](wake_ldm::WakeSampler::from_folder) reads (weights averaged, 16 bits),
-/// `shares.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and what a [`RunFolder`] has.
+/// `explained_variance.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and what a [`RunFolder`] has.
 ///
 /// ```no_run
 /// use wake_dataset::Recipe;
-/// use wake_train::{StageOptions, TrainingPairs, WakeStage, WakeTraining};
+/// use wake_ldm::network::Part;
+/// use wake_train::{StageOptions, TrainingPairs, WakeTraining};
 ///
 /// let pairs = TrainingPairs::simulated(Recipe::model()?, 7, 2000)?;
 /// let config = pairs.model()?;
-/// let stage = (WakeStage::Diffusion, StageOptions::default());
-/// let mut training = WakeTraining::open("out/train".into(), stage, config, Some(pairs), &|_| {})?;
-/// training.diffusion()?;
+/// let flow = (Part::Flow, StageOptions::default());
+/// WakeTraining::open("out/train".into(), flow, config, Some(pairs), &|_| {})?.run()?;
 /// # Ok::<(), wake_train::Error>(())
 /// ```
 pub struct WakeTraining<'a> {
     folder: RunFolder,
     config: WakeModelConfig,
     pairs: Option<TrainingPairs>,
+    part: Part,
     options: StageOptions,
     progress: &'a (dyn Fn(Progress) + Sync),
     /// Of all pairs, once they were asked for.
@@ -112,6 +82,7 @@ impl std::fmt::Debug for WakeTraining<'_> {
         f.debug_struct("WakeTraining")
             .field("folder", &self.folder)
             .field("pairs", &self.pairs)
+            .field("part", &self.part)
             .field("options", &self.options)
             .finish_non_exhaustive()
     }
@@ -120,7 +91,7 @@ impl std::fmt::Debug for WakeTraining<'_> {
 impl<'a> WakeTraining<'a> {
     /// Takes the folder for one stage; whatever is refused is refused before anything is written.
     ///
-    /// - `pairs`: what is learnt from, all of them scenes and images that the model can have; words alone need none
+    /// - `pairs`: what is learnt from, all of them scenes and images that the model can have; the parser alone needs none
     /// - `progress`: told what is done; residuals are computed by several threads
     ///
     /// # Errors
@@ -128,26 +99,48 @@ impl<'a> WakeTraining<'a> {
     /// As [`RunFolder::open`], [`RunOptions::validate`](super::RunOptions::validate) and [`StageOptions::learning_devices`].
     pub fn open(
         out: PathBuf,
-        (stage, options): (WakeStage, StageOptions),
+        (part, options): (Part, StageOptions),
         config: WakeModelConfig,
         pairs: Option<TrainingPairs>,
         progress: &'a (dyn Fn(Progress) + Sync),
     ) -> Result<Self> {
         let devices = options.learning_devices()?.len();
-        if stage != WakeStage::Autoencoder {
-            let constants = options.run(&stage.usual(), Value::Null);
+        if part != Part::Patches {
+            let constants = options.run(&defaults(part), Value::Null);
             constants.validate(devices)?;
         }
         let identity = pairs.as_ref().map(TrainingPairs::identity);
-        let begin = (stage.name(), options.resume);
+        let begin = (part.name(), options.resume);
         Ok(Self {
             folder: RunFolder::open(&out, &config, &identity.unwrap_or_default(), begin)?,
             config,
             pairs,
+            part,
             options,
             progress,
             latents: None,
         })
+    }
+
+    /// Bytes that so many pairs need in memory while the prior or the flow learns.
+    pub fn memory(config: &WakeModelConfig, pairs: u64) -> u64 {
+        LatentSet::bytes(config, pairs)
+    }
+
+    /// Trains the part, after those before it that are not trained yet.
+    ///
+    /// # Errors
+    ///
+    /// As [`Stage::train`] and [`LatentSet::of`]; [`wake_nn::Error::InvalidOption`] without pairs for any part but the parser,
+    /// and when an earlier part was begun with other values.
+    pub fn run(&mut self) -> Result<()> {
+        let options = self.options.clone();
+        match self.part {
+            Part::Patches => self.fit_patches(),
+            Part::Parser => self.train_parser(&options),
+            Part::Prior => self.train_prior(&options),
+            Part::Flow => self.train_flow(&options),
+        }
     }
 
     fn pairs(&self) -> Result<&TrainingPairs> {
@@ -155,7 +148,7 @@ impl<'a> WakeTraining<'a> {
             Error::Value(wake_nn::Error::InvalidOption {
                 option: "pairs".to_owned(),
                 value: "none".to_owned(),
-                expected: "pairs to learn from: only words need none".to_owned(),
+                expected: "pairs to learn from: only the parser needs none".to_owned(),
             })
         })
     }
@@ -165,33 +158,33 @@ impl<'a> WakeTraining<'a> {
     }
 
     /// How a stage is kept in the folder.
-    fn stage(stage: WakeStage, options: &StageOptions) -> Stage<'static> {
+    fn stage(part: Part, options: &StageOptions) -> Stage<'static> {
         Stage {
-            name: stage.name(),
+            name: part.name(),
             resume: options.resume,
             every: options.every,
-            steps: options.steps(&stage.usual()),
-            results: stage.results(),
+            steps: options.steps(&defaults(part)),
+            results: results(part),
         }
     }
 
     /// What an earlier stage is told if its results are missing, older than its last checkpoint, or not done.
-    fn earlier(&self, stage: WakeStage) -> Result<Option<StageOptions>> {
-        let Some(left) = self.folder.unfinished(stage.name(), stage.results())? else {
+    fn earlier(&self, part: Part) -> Result<Option<StageOptions>> {
+        let Some(left) = self.folder.unfinished(part.name(), results(part))? else {
             return Ok(None);
         };
-        let checkpoint = Checkpoint::newest(&self.folder.checkpoints(stage.name()))?;
+        let checkpoint = Checkpoint::newest(&self.folder.checkpoints(part.name()))?;
         let state = checkpoint.map_or(Value::Null, |checkpoint| checkpoint.state);
         Ok(Some(self.options.before(left, &state)))
     }
 
-    fn fingerprint(&self, name: &str) -> Result<String> {
-        Ok(fingerprint(&self.out(name))?)
+    fn fingerprint(&self, part: Part) -> Result<String> {
+        Ok(fingerprint(&self.out(part.file()))?)
     }
 
     /// A part of the model with the weights of an earlier stage.
-    fn part<M: Module>(&self, module: M, name: &str) -> Result<M> {
-        Ok(load(module, Layout::Diffusers, &self.out(name))?)
+    fn trained<M: Module>(&self, module: M, part: Part) -> Result<M> {
+        Ok(load(module, Layout::Diffusers, &self.out(part.file()))?)
     }
 
     /// Encodes all pairs and the images expected of their scenes, which then stay in memory.

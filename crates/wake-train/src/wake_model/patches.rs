@@ -1,12 +1,12 @@
-//! The first stage: squares of pixels as latents, in closed form.
+//! The first part: squares of pixels as latents, in closed form.
 
 use serde_json::json;
 
 use super::super::latents::fit_patches;
 use super::super::progress::counted;
-use super::{PATCHES, WakeTraining};
+use super::WakeTraining;
 use crate::error::Result;
-use wake_ldm::network::{PatchTransform, Shares};
+use wake_ldm::network::{Part, PatchTransform};
 use wake_nn::weights::{Layout, Precision, save_as};
 
 /// Images that the patch transform is fitted to.
@@ -16,13 +16,8 @@ const CHANNELS: usize = 64;
 
 impl WakeTraining<'_> {
     /// Fits the patch transform to the first 400 pairs, and writes it with what every number of channels keeps
-    /// (`shares.json`).
-    ///
-    /// # Errors
-    ///
-    /// As [`fit_patches`], [`wake_nn::Error::InvalidOption`] without pairs, and for files that cannot be
-    /// written.
-    pub fn autoencoder(&self) -> Result<Shares> {
+    /// (`explained_variance.json`).
+    pub(super) fn fit_patches(&self) -> Result<()> {
         let (pairs, device) = (self.pairs()?, self.options.device());
         let (source, count) = (pairs.source(), pairs.len().min(FITTED));
         let fitted = counted(
@@ -31,26 +26,28 @@ impl WakeTraining<'_> {
             self.progress,
             |done| fit_patches(source, count, &self.config, &device, done),
         );
-        let (transform, shares) = fitted?;
-        let path = self.out(PATCHES);
+        let (transform, explained) = fitted?;
+        let path = self.out(Part::Patches.file());
         save_as(&transform, Layout::Diffusers, &path, Precision::F32)?;
         let row = |channels| {
             json!({
-                "channels": channels, "variance": shares.kept(channels), "psnr_db": finite(shares.psnr(channels)),
+                "channels": channels, "variance": explained.kept(channels), "psnr_db": finite(explained.psnr(channels)),
             })
         };
         let rows: Vec<_> = (1..=CHANNELS).map(row).collect();
-        whole_files::write_json(&self.out("shares.json"), &rows)?;
-        Ok(shares)
+        Ok(whole_files::write_json(
+            &self.out("explained_variance.json"),
+            &rows,
+        )?)
     }
 
     /// The patch transform of an earlier run, or a new one.
     pub(super) fn patches(&self) -> Result<PatchTransform> {
-        if !self.out(PATCHES).exists() {
-            self.autoencoder()?;
+        if !self.out(Part::Patches.file()).exists() {
+            self.fit_patches()?;
         }
         let empty = PatchTransform::zeros(self.config.latent_channels, &self.options.device());
-        self.part(empty, PATCHES)
+        self.trained(empty, Part::Patches)
     }
 }
 

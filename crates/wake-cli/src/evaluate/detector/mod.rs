@@ -8,9 +8,9 @@ mod report;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
-use wake_detector::Finder;
 use wake_detector::drawing::sheet;
-use wake_train::detector::Recipe;
+use wake_detector::{Finder, Radon};
+use wake_train::detector::ImageRecipe;
 use wake_train::detector::judging::{Searched, compared};
 
 use crate::exit::{self, Outcome};
@@ -66,13 +66,13 @@ const PICTURES: usize = 24;
 
 /// Searches, and writes `report.md`, `report.json` and pictures into the folder.
 pub(crate) fn run(options: &Options) -> Outcome<()> {
-    let network = |weights: Option<&Path>| -> Outcome<Finder> {
+    let network = |weights: Option<&Path>| -> Outcome<Box<dyn Finder>> {
         let detector = named::network(weights, &options.device, LEAST_SCORE)?;
-        Ok(Finder::from(detector))
+        Ok(Box::new(detector))
     };
-    let mut finders = vec![
+    let mut finders: Vec<(&str, Box<dyn Finder>)> = vec![
         ("network", network(options.weights.as_deref())?),
-        ("Radon", Finder::Radon),
+        ("Radon", Box::new(Radon)),
     ];
     for (name, file) in &options.rung {
         // Pictures bear these names, in small letters.
@@ -98,12 +98,12 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         ..Report::default()
     };
     let mut speeds = String::new();
-    for recipe in [Recipe::Detector, Recipe::Painted] {
+    for recipe in [ImageRecipe::Detector, ImageRecipe::Painted] {
         speeds.push_str(&simulated(&finders, recipe, options, &mut report)?);
     }
     for (name, finder) in &finders {
         if !tiles.is_empty() {
-            real::judge(name, finder, &tiles, &options.out, &mut report)?;
+            real::judge(name, finder.as_ref(), &tiles, &options.out, &mut report)?;
         }
     }
     if !sea.is_empty() {
@@ -115,8 +115,8 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
 
 /// Adds the rows of a recipe, and draws its first images; gives a line with the speed of the search.
 fn simulated(
-    finders: &[(&str, Finder)],
-    recipe: Recipe,
+    finders: &[(&str, Box<dyn Finder>)],
+    recipe: ImageRecipe,
     options: &Options,
     report: &mut Report,
 ) -> Outcome<String> {
@@ -124,7 +124,7 @@ fn simulated(
     let count = u64::from(options.images);
     let bar = progress::bar(count, recipe.name());
     let mut pictures: Vec<RgbImage> = Vec::new();
-    let all: Vec<&Finder> = finders.iter().map(|(_, finder)| finder).collect();
+    let all: Vec<&dyn Finder> = finders.iter().map(|(_, f)| f.as_ref()).collect();
     let searched = Searched::of(source.as_ref(), count, &all, |image, wakes, found| {
         if pictures.len() < PICTURES {
             pictures.push(compared(image, wakes, &found[0]));
@@ -134,7 +134,7 @@ fn simulated(
     bar.finish_and_clear();
     for (number, (name, _)) in finders.iter().enumerate() {
         report.add(recipe.name(), name, &searched.judged[number]);
-        if recipe == Recipe::Detector {
+        if recipe == ImageRecipe::Detector {
             let set = format!("{}, above {CLEAR:.0} dB", recipe.name());
             report.add(&set, name, &searched.clear(number, CLEAR));
         }
@@ -142,7 +142,7 @@ fn simulated(
     let names: Vec<&str> = finders.iter().map(|(name, _)| *name).collect();
     let by_visibility = by_visibility(recipe, &names, &searched);
     report.visibility.push(by_visibility);
-    if recipe == Recipe::Detector {
+    if recipe == ImageRecipe::Detector {
         report.scenes = by_scene(recipe, &names, &searched);
     }
     let megapixels = (SIZE * SIZE) as f64 * 1e-6;

@@ -24,7 +24,7 @@ pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
 /// Adds the rows of a finder, and draws every tile into the folder.
 pub(crate) fn judge(
     name: &str,
-    finder: &Finder,
+    finder: &dyn Finder,
     tiles: &[Tile],
     out: &Path,
     report: &mut Report,

@@ -9,7 +9,7 @@ use wake_dataset::Source;
 use wake_detector::GreyImage;
 use wake_nn::device_named;
 use wake_physics::Field;
-use wake_train::detector::Recipe;
+use wake_train::detector::ImageRecipe;
 use wake_train::detector::judging::{Tile, paired_windows};
 use wake_train::{TwoSampleOptions, classifier_two_sample_test};
 
@@ -56,7 +56,7 @@ fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
 pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
     let device = device_named("flex")?;
     let sea = |plain: bool, seed: u64| -> Outcome<Vec<Field>> {
-        simulated(&Recipe::open_sea(plain, seed, WINDOW)?, real.len())
+        simulated(&ImageRecipe::open_sea(plain, seed, WINDOW)?, real.len())
     };
     let detector = sea(false, HELD_OUT)?;
     let rows = [

@@ -6,7 +6,7 @@ use wake_detector::Wake;
 use wake_detector::score::{Rule, found_by};
 use wake_physics::Scene;
 use wake_physics::scene::Sensor;
-use wake_train::detector::Recipe;
+use wake_train::detector::ImageRecipe;
 use wake_train::detector::judging::Searched;
 
 use super::report::FALSE_ALARMS;
@@ -53,13 +53,13 @@ fn spans(bounds: &[f64]) -> Vec<String> {
 }
 
 /// A table of recall by visibility.
-pub(crate) fn by_visibility(recipe: Recipe, finders: &[&str], searched: &Searched) -> String {
+pub(crate) fn by_visibility(recipe: ImageRecipe, finders: &[&str], searched: &Searched) -> String {
     let (bounds, what) = match recipe {
-        Recipe::Painted => (SIGNALS, "signal over noise"),
+        ImageRecipe::Painted => (SIGNALS, "signal over noise"),
         _ => (CONTRASTS, "contrast"),
     };
     let decibel = |wake: &Wake| match (recipe, wake.contrast_db) {
-        (Recipe::Painted, _) | (_, None) => 20.0 * f64::from(wake.snr).log10(),
+        (ImageRecipe::Painted, _) | (_, None) => 20.0 * f64::from(wake.snr).log10(),
         (_, Some(db)) => f64::from(db),
     };
     let title = format!("{}, {what} \\[dB\\]", recipe.name());
@@ -68,7 +68,7 @@ pub(crate) fn by_visibility(recipe: Recipe, finders: &[&str], searched: &Searche
 }
 
 /// Tables of recall by sensor, wind, and the angle between a wake and the flight of the radar, which is along the image's rows.
-pub(crate) fn by_scene(recipe: Recipe, finders: &[&str], searched: &Searched) -> String {
+pub(crate) fn by_scene(recipe: ImageRecipe, finders: &[&str], searched: &Searched) -> String {
     let scene = |image: usize| -> &Scene { &searched.scenes[image] };
     let used = |sensor: &Sensor| {
         let mut scenes = searched.scenes.iter();

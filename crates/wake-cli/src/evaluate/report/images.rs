@@ -1,4 +1,4 @@
-//! Figures of images: rungs, pixels, wake correlation.
+//! Figures of images: ablation, pixels, wake correlation.
 
 use super::{Report, number};
 
@@ -7,7 +7,7 @@ fn ratio(model: Option<f64>, simulator: Option<f64>) -> String {
     number(model.zip(simulator).map(|(m, s)| m / s), 3)
 }
 
-pub(super) fn rungs(report: &Report) -> String {
+pub(super) fn ablation(report: &Report) -> String {
     let mut text = "## Rungs\n\nWhat each kind of image has of a sea, means over the scenes: the shape of the grey that is left \
         when the expected image is subtracted; variance on crests of the wake over that in its troughs; squared differences of neighbours across the borders of squares of \
         8 pixels over those elsewhere; share of patches of \
@@ -16,7 +16,7 @@ pub(super) fn rungs(report: &Report) -> String {
         | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests | seams |\n\
         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
-    for r in &report.rungs {
+    for r in &report.figures.ablation {
         let told = r.two_sample.map_or("–".to_owned(), |t| {
             format!("{:.3} ± {:.3}", t.accuracy, t.half_width)
         });
@@ -40,7 +40,7 @@ pub(super) fn pixels(report: &Report) -> String {
         | image | SSIM | PSNR dB | LPIPS | brightness | contrast ratio | spectrum dB |\n\
         | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
-    for r in &report.pixels {
+    for r in &report.figures.pixels {
         text += &format!(
             "| {} | {} | {} | {} | {} | {} | {} |\n",
             r.image,
@@ -57,7 +57,7 @@ pub(super) fn pixels(report: &Report) -> String {
         "| the paper's model | {} | {} | {} | – | – | – |\n",
         paper.ssim, paper.psnr_db, paper.lpips
     );
-    let (model, simulator) = (&report.pixels[0], &report.pixels[1]);
+    let (model, simulator) = (&report.figures.pixels[0], &report.figures.pixels[1]);
     text += &format!(
         "\nModel over simulator: SSIM {}, PSNR {}, LPIPS {}. Good is 0.9 to 1.1: as close as another simulated image.\n",
         ratio(model.ssim, simulator.ssim),
@@ -66,14 +66,14 @@ pub(super) fn pixels(report: &Report) -> String {
     );
     text + &format!(
         "Equivalent looks of the open sea after {} looks of speckle: simulator {}, model {}.\n",
-        report.speckle.looks,
-        number(report.speckle.simulator, 2),
-        number(report.speckle.model, 2)
+        report.figures.speckle.looks,
+        number(report.figures.speckle.simulator, 2),
+        number(report.figures.speckle.model, 2)
     )
 }
 
 pub(super) fn wake(report: &Report) -> String {
-    let wake = &report.wake_correlation;
+    let wake = &report.figures.wake_correlation;
     format!(
         "## Wake correlation\n\nInside the Kelvin wedge, over {} scenes, medians: simulator (4 against 4 images) {}, \
          model (8 against 8) {}, ratio {}.\n",

@@ -5,38 +5,15 @@ mod values;
 
 use super::timing::TimingRow;
 use serde::Serialize;
-use wake_train::evaluation::{MeasurementRow, PixelRow, RungRow, SwapRow, WakeCorrelation};
+use wake_train::evaluation::Figures;
 
 /// Everything that `report.json` holds.
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
-    /// What stands in the place of the model.
-    pub(crate) judged: &'static str,
-    pub(crate) scenes: usize,
-    pub(crate) pixels: Vec<PixelRow>,
-    pub(crate) rungs: Vec<RungRow>,
-    pub(crate) speckle: Speckle,
-    pub(crate) wake_correlation: WakeCorrelation,
-    pub(crate) measurements: Vec<MeasurementRow>,
-    pub(crate) conditions: Vec<ConditionRow>,
-    pub(crate) swaps: Vec<SwapRow>,
+    #[serde(flatten)]
+    pub(crate) figures: Figures,
     pub(crate) seconds: Vec<TimingRow>,
     pub(crate) paper: Paper,
-}
-
-/// Speckle after it is applied: the open sea's equivalent number of looks, median over the scenes.
-#[derive(Debug, Serialize)]
-pub(crate) struct Speckle {
-    pub(crate) looks: u32,
-    pub(crate) simulator: Option<f64>,
-    pub(crate) model: Option<f64>,
-}
-
-/// The measurements under one condition.
-#[derive(Debug, Serialize)]
-pub(crate) struct ConditionRow {
-    pub(crate) told: &'static str,
-    pub(crate) measurements: Vec<MeasurementRow>,
 }
 
 /// What the paper reports of its model.
@@ -61,14 +38,14 @@ pub(crate) fn markdown(report: &Report) -> String {
     let parts = [
         format!(
             "Judged: {}. {} held-out scenes of 256 x 256 pixels of 4 m, before speckle.\n",
-            report.judged, report.scenes
+            report.figures.judged, report.figures.scenes
         ),
-        images::rungs(report),
+        images::ablation(report),
         images::pixels(report),
         images::wake(report),
-        values::measurements("Values read from the images", &report.measurements),
+        values::measurements("Values read from the images", &report.figures.measurements),
         values::conditions(report),
-        values::swaps(report),
+        values::controllability(report),
         seconds(report),
     ];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();

@@ -33,19 +33,22 @@ pub(super) fn measurements(title: &str, rows: &[MeasurementRow]) -> String {
 }
 
 pub(super) fn conditions(report: &Report) -> String {
-    if report.conditions.len() < 2 {
+    if report.figures.conditions.len() < 2 {
         return String::new();
     }
     let mut text =
         "## What the model is told\n\nMedian absolute error (share measurable).\n\n| value |"
             .to_owned();
-    for condition in &report.conditions {
+    for condition in &report.figures.conditions {
         text += &format!(" {} |", condition.told);
     }
-    text += &format!("\n| --- |{}\n", " --- |".repeat(report.conditions.len()));
-    for (n, row) in report.measurements.iter().enumerate() {
+    text += &format!(
+        "\n| --- |{}\n",
+        " --- |".repeat(report.figures.conditions.len())
+    );
+    for (n, row) in report.figures.measurements.iter().enumerate() {
         text += &format!("| {} ({}) |", row.quantity, row.unit);
-        for condition in &report.conditions {
+        for condition in &report.figures.conditions {
             let model = condition.measurements[n].model.as_ref();
             let cell = model.map_or("–".to_owned(), |e| {
                 format!("{} ({:.2})", number(e.median, 3), e.measurable)
@@ -57,11 +60,11 @@ pub(super) fn conditions(report: &Report) -> String {
     text
 }
 
-pub(super) fn swaps(report: &Report) -> String {
+pub(super) fn controllability(report: &Report) -> String {
     let mut text = "## One value changed\n\nShare of pairs in which the measured value follows, of those in which it \
         follows on simulated images.\n\n| value | told | pairs | counted | right |\n| --- | --- | --- | --- | --- |\n"
         .to_owned();
-    for r in &report.swaps {
+    for r in &report.figures.controllability {
         text += &format!(
             "| {} | {} | {} | {} | {} |\n",
             r.quantity,

@@ -87,6 +87,19 @@ impl AutoencoderKl {
         &self.config
     }
 
+    /// Grey 0…1, or colours, as [`encode`](Self::encode) takes them: −1…1, one grey in every channel.
+    ///
+    /// # Shapes
+    ///
+    /// `grey`: `[batch, 1 or in_channels, rows, columns]`; result: `[batch, in_channels, rows, columns]`
+    pub fn scaled(&self, grey: Tensor<4>) -> Tensor<4> {
+        let images = grey * 2.0 - 1.0;
+        match images.dims()[1] {
+            1 => images.repeat_dim(1, self.image_channels()),
+            _ => images,
+        }
+    }
+
     /// Encodes images in [−1, 1].
     ///
     /// # Shapes

@@ -223,9 +223,8 @@ impl Pipeline {
     pub fn encode(&self, pixels: Tensor<4>, noise: Tensor<4>) -> Tensor<4> {
         let images = pixels.dims()[0];
         let one = |k: usize| {
-            let posterior = self
-                .autoencoder
-                .encode(pixels.clone().narrow(0, k, 1) * 2.0 - 1.0);
+            let image = self.autoencoder.scaled(pixels.clone().narrow(0, k, 1));
+            let posterior = self.autoencoder.encode(image);
             posterior.sample(noise.clone().narrow(0, k, 1))
         };
         self.autoencoder

@@ -18,6 +18,6 @@ mod vocabulary;
 pub use features::{FEATURES, features};
 pub use position_maps::MapGrid;
 pub use position_maps::WEDGE;
-pub use position_maps::{PATCH, PLACES, places};
+pub use position_maps::{PATCH_SIZE, PLACES, places};
 pub use statement::{QUANTITIES, said, statement};
 pub use vocabulary::{Vocabulary, tokens};

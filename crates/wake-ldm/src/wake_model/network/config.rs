@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use wake_physics::Scene;
 use wake_physics::grey::GreyScale;
 
-use super::domain::Domain;
+use super::training_ranges::TrainingRanges;
 use crate::error::{Error, Result};
 use crate::unet::UNetConfig;
 use crate::wake_model::conditioning::{FEATURES, Vocabulary};
@@ -42,14 +42,17 @@ pub struct WakeModelConfig {
     #[serde(default)]
     pub scene: Scene,
     /// The scenes of all training images.
-    #[serde(default)]
-    pub domain: Domain,
+    #[serde(default, rename = "domain")]
+    pub training_ranges: TrainingRanges,
     /// The mapping from σ⁰ to the grey of all training images.
     #[serde(default)]
     pub grey: GreyScale,
 }
 
 impl WakeModelConfig {
+    /// The file of the configuration in the folder of a model.
+    pub const FILE: &'static str = "config.json";
+
     /// The shape that ships: 256 × 256 pixels of 4 m, 16 latent channels, few enough sums for two cores to learn.
     pub fn standard(vocabulary: &Vocabulary) -> Self {
         Self {
@@ -65,7 +68,7 @@ impl WakeModelConfig {
             norm_groups: 16,
             vocabulary: vocabulary.known().to_vec(),
             scene: Scene::default(),
-            domain: Domain::default(),
+            training_ranges: TrainingRanges::default(),
             grey: GreyScale::default(),
         }
     }
@@ -156,12 +159,12 @@ impl WakeModelConfig {
                 expected: format!("{size} × {size} pixels, as the model draws them"),
             }));
         }
-        self.domain.check(scene)
+        self.training_ranges.check(scene)
     }
 
     /// Rows and columns of the latent image.
     pub fn latent_size(&self) -> usize {
-        self.image_size / crate::wake_model::conditioning::PATCH
+        self.image_size / crate::wake_model::conditioning::PATCH_SIZE
     }
 
     /// The U-Net, which also sees the maps.
@@ -195,7 +198,7 @@ mod tests {
         let base = standard.base_scene();
         let faster = base.with_assignments(&["ship.speed=14.0"]).unwrap();
         let config = WakeModelConfig {
-            domain: Domain::of([&base, &faster]).unwrap(),
+            training_ranges: TrainingRanges::of([&base, &faster]).unwrap(),
             ..standard
         };
         let refused = |assignment: &str| {

@@ -5,7 +5,7 @@ use burn::nn::conv::Conv2d;
 use burn::tensor::{DType, Device, Tensor};
 
 use super::config::WakeModelConfig;
-use super::known::Known;
+use super::inputs::ConditioningInputs;
 use crate::unet::{UNet, UNetInput};
 use crate::wake_model::conditioning::PLACES;
 use wake_nn::activation::silu;
@@ -38,7 +38,7 @@ pub struct Flow {
 
 /// What is known of some scenes, in the form that every step uses.
 #[derive(Debug, Clone)]
-pub struct Prepared {
+pub struct CachedConditioning {
     numbers: Tensor<2>,
     maps: Tensor<4>,
 }
@@ -59,12 +59,12 @@ impl Flow {
     }
 
     /// Puts what is known in the form that every step uses.
-    pub fn prepared(&self, known: &Known) -> Prepared {
+    pub fn cached(&self, inputs: &ConditioningInputs) -> CachedConditioning {
         let dtype = self.dtype();
-        let maps = Tensor::cat(vec![known.places.clone(), known.wake.clone()], 1);
+        let maps = Tensor::cat(vec![inputs.places.clone(), inputs.wake.clone()], 1);
         let maps = space_to_depth(cast_to(maps, dtype), self.fold);
-        Prepared {
-            numbers: cast_to(known.told(), dtype),
+        CachedConditioning {
+            numbers: cast_to(inputs.told(), dtype),
             maps: silu(convolve(&self.maps, maps)),
         }
     }
@@ -74,14 +74,19 @@ impl Flow {
     /// # Shapes
     ///
     /// `x` and result: `[batch, channels, rows, columns]`; `sigma`: 0 to 1, `[batch]`.
-    pub fn velocity(&self, x: Tensor<4>, sigma: Tensor<1>, known: &Prepared) -> Tensor<4> {
-        let maps = cast_to(known.maps.clone(), x.dtype());
+    pub fn velocity(
+        &self,
+        x: Tensor<4>,
+        sigma: Tensor<1>,
+        inputs: &CachedConditioning,
+    ) -> Tensor<4> {
+        let maps = cast_to(inputs.maps.clone(), x.dtype());
         let folded = space_to_depth(x, self.fold);
         let velocity = self.unet.forward(UNetInput {
             sample: Tensor::cat(vec![folded, maps], 1),
             timesteps: sigma * STEPS,
             context: None,
-            condition: Some(known.numbers.clone()),
+            condition: Some(inputs.numbers.clone()),
         });
         depth_to_space(velocity, self.fold)
     }

@@ -1,11 +1,12 @@
 //! The small wake model: a linear patch transform, a reader of prompts, mean and spread of the latents, and a flow.
 
 mod config;
-mod domain;
+mod training_ranges;
 mod flow;
-mod known;
+mod inputs;
 mod model;
 mod overlap;
+mod part;
 mod patches;
 mod prior;
 mod prompt_parser;
@@ -13,14 +14,15 @@ mod sea;
 mod windows;
 
 pub use config::WakeModelConfig;
-pub use domain::Domain;
-pub use flow::{Flow, Prepared};
-pub use known::{Foreseen, Known, expected_grey};
-pub use known::{expected_greys, images_of, slope_of};
+pub use flow::{CachedConditioning, Flow};
+pub use inputs::{ConditioningInputs, PhysicsPrior, expected_grey};
+pub use inputs::{expected_greys, images_of, slope_of};
 pub use model::WakeModel;
-pub use patches::{PatchTransform, Shares};
+pub use part::Part;
+pub use patches::{ExplainedVariance, PatchTransform};
 pub use prior::{Expected, Prior};
 pub use prompt_parser::PromptParser;
 pub use prompt_parser::windows;
 pub use sea::SeaFields;
+pub use training_ranges::TrainingRanges;
 pub use windows::ChannelWindows;

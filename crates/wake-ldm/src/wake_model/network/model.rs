@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
 use super::flow::Flow;
-use super::known::Known;
+use super::inputs::ConditioningInputs;
 use super::patches::PatchTransform;
 use super::prior::{Expected, Prior};
 use super::prompt_parser::{PromptParser, windows};
@@ -108,10 +108,10 @@ impl WakeModel {
     pub fn decode(
         &self,
         latents: Tensor<4>,
-        (expected, known): (&Expected, &Known),
+        (expected, inputs): (&Expected, &ConditioningInputs),
         image: Tensor<4>,
     ) -> Tensor<4> {
-        let added = latents - known.wake.clone();
+        let added = latents - inputs.wake.clone();
         (image + self.patches.decode(added, expected.grey.clone())).clamp(0.0, 1.0)
     }
 }

@@ -4,14 +4,14 @@ use std::f64::consts::{PI, SQRT_2};
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::wake_model::conditioning::PATCH;
+use crate::wake_model::conditioning::PATCH_SIZE;
 use wake_nn::cast_to;
 use wake_nn::patch::{depth_to_space, space_to_depth};
 
 /// Pixels on each side of a border that are filtered.
-pub(super) const REACH: usize = PATCH / 2;
+pub(super) const REACH: usize = PATCH_SIZE / 2;
 /// Pixels of a square.
-pub(super) const PIXELS: usize = PATCH * PATCH;
+pub(super) const PIXELS: usize = PATCH_SIZE * PATCH_SIZE;
 
 /// Filters images across the borders of their squares, so that what a square holds afterwards reaches into its neighbours.
 ///
@@ -47,7 +47,10 @@ fn filtered(images: Tensor<4>, index: impl Fn(usize, usize) -> [usize; 2]) -> Te
     let [batch, _, rows, columns] = images.dims();
     let line = across_a_border();
     let entry = |p: usize, q: usize| {
-        let [from, to] = [index(p / PATCH, q / PATCH), index(p % PATCH, q % PATCH)];
+        let [from, to] = [
+            index(p / PATCH_SIZE, q / PATCH_SIZE),
+            index(p % PATCH_SIZE, q % PATCH_SIZE),
+        ];
         (line[from[0]][from[1]] * line[to[0]][to[1]]) as f32
     };
     let matrix = (0..PIXELS * PIXELS).map(|n| entry(n / PIXELS, n % PIXELS));
@@ -56,10 +59,10 @@ fn filtered(images: Tensor<4>, index: impl Fn(usize, usize) -> [usize; 2]) -> Te
         Tensor::<3>::from_data(matrix, &images.device()),
         images.dtype(),
     );
-    let squares = space_to_depth(mirrored(mirrored(images, 2), 3), PATCH);
+    let squares = space_to_depth(mirrored(mirrored(images, 2), 3), PATCH_SIZE);
     let [_, _, down, right] = squares.dims();
     let squares = matrix.matmul(squares.reshape([batch, PIXELS, down * right]));
-    depth_to_space(squares.reshape([batch, PIXELS, down, right]), PATCH)
+    depth_to_space(squares.reshape([batch, PIXELS, down, right]), PATCH_SIZE)
         .narrow(2, REACH, rows)
         .narrow(3, REACH, columns)
 }
@@ -78,7 +81,7 @@ fn mirrored(images: Tensor<4>, dimension: usize) -> Tensor<4> {
 }
 
 /// The filter of the eight pixels about a border, in their order.
-fn across_a_border() -> [[f64; PATCH]; PATCH] {
+fn across_a_border() -> [[f64; PATCH_SIZE]; PATCH_SIZE] {
     let n = REACH as f64;
     let second = |k: usize, i: usize| {
         let scale = if k == 0 { 1.0 / SQRT_2 } else { 1.0 };
@@ -87,9 +90,9 @@ fn across_a_border() -> [[f64; PATCH]; PATCH] {
     let fourth = |k: usize, j: usize| {
         (2.0 / n).sqrt() * (PI * (k as f64 + 0.5) * (j as f64 + 0.5) / n).cos()
     };
-    let mut filter = [[0.0; PATCH]; PATCH];
-    for (i, j) in (0..PATCH).flat_map(|i| (0..PATCH).map(move |j| (i, j))) {
-        let [from_end_i, from_end_j] = [i, j].map(|k| k.min(PATCH - 1 - k));
+    let mut filter = [[0.0; PATCH_SIZE]; PATCH_SIZE];
+    for (i, j) in (0..PATCH_SIZE).flat_map(|i| (0..PATCH_SIZE).map(move |j| (i, j))) {
+        let [from_end_i, from_end_j] = [i, j].map(|k| k.min(PATCH_SIZE - 1 - k));
         let turned: f64 = (0..REACH)
             .map(|k| second(k, from_end_i) * fourth(k, from_end_j))
             .sum();

@@ -4,11 +4,11 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::overlap::{self, PIXELS, REACH};
-use crate::wake_model::conditioning::PATCH;
+use crate::wake_model::conditioning::PATCH_SIZE;
 use wake_nn::patch::{depth_to_space, space_to_depth};
 
 /// Rows and columns of pixels that one square of latents reaches.
-pub(super) const WINDOW: usize = PATCH + 2 * REACH;
+pub(super) const WINDOW: usize = PATCH_SIZE + 2 * REACH;
 
 /// A linear map between squares of 8 × 8 pixels that overlap and a few numbers, both ways.
 ///
@@ -34,12 +34,12 @@ pub struct PatchTransform {
 
 /// How much of the variance each principal component holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shares {
+pub struct ExplainedVariance {
     /// Variances in grey², the largest first.
     pub variances: Vec<f64>,
 }
 
-impl Shares {
+impl ExplainedVariance {
     /// Share of the variance that the first `channels` hold.
     pub fn kept(&self, channels: usize) -> f64 {
         let total: f64 = self.variances.iter().sum();
@@ -74,7 +74,7 @@ impl PatchTransform {
         size: usize,
         channels: usize,
         device: &Device,
-    ) -> (Self, Shares) {
+    ) -> (Self, ExplainedVariance) {
         let filtered = images.map(|image| {
             let data = TensorData::new(image.to_vec(), [1, 1, size, size]);
             let image = overlap::before_encoding(Tensor::from_data(data, device));
@@ -97,7 +97,7 @@ impl PatchTransform {
             analysis: matrix(analysis, [channels, PIXELS]),
             synthesis: matrix(synthesis, [PIXELS, channels]),
         };
-        (transform, Shares { variances: values })
+        (transform, ExplainedVariance { variances: values })
     }
 
     /// Where the transform lies.
@@ -112,9 +112,9 @@ impl PatchTransform {
         let square = analysis.reshape([channels, PIXELS, 1, 1]);
         // The transpose of the filter is its inverse.
         let alone = square.pad((1, 1, 1, 1), 0.0);
-        overlap::after_decoding(depth_to_space(alone, PATCH))
-            .narrow(2, PATCH - REACH, WINDOW)
-            .narrow(3, PATCH - REACH, WINDOW)
+        overlap::after_decoding(depth_to_space(alone, PATCH_SIZE))
+            .narrow(2, PATCH_SIZE - REACH, WINDOW)
+            .narrow(3, PATCH_SIZE - REACH, WINDOW)
             .into_data()
             .iter::<f32>()
             .collect()
@@ -130,7 +130,7 @@ impl PatchTransform {
         let [batch, _, rows, columns] = images.dims();
         let mean = images.clone().reshape([batch, rows * columns]).mean_dim(1);
         let images = overlap::before_encoding(images - mean.clone().reshape([batch, 1, 1, 1]));
-        let squares = space_to_depth(images, PATCH);
+        let squares = space_to_depth(images, PATCH_SIZE);
         (mix(self.analysis.val(), squares), mean)
     }
 
@@ -143,7 +143,7 @@ impl PatchTransform {
     /// - result: `[batch, 1, 8 rows, 8 columns]`
     pub fn decode(&self, latents: Tensor<4>, mean: Tensor<2>) -> Tensor<4> {
         let [batch, ..] = latents.dims();
-        let squares = depth_to_space(mix(self.synthesis.val(), latents), PATCH);
+        let squares = depth_to_space(mix(self.synthesis.val(), latents), PATCH_SIZE);
         overlap::after_decoding(squares) + mean.reshape([batch, 1, 1, 1])
     }
 }
@@ -165,10 +165,12 @@ fn covariance(images: impl Iterator<Item = Vec<f32>>, size: usize) -> Vec<Vec<f6
     let mut count = 0.0;
     for image in images {
         let mean = image.iter().sum::<f32>() / image.len() as f32;
-        for corner in 0..(size / PATCH) * (size / PATCH) {
-            let start = corner / (size / PATCH) * PATCH * size + corner % (size / PATCH) * PATCH;
-            let square: [f32; PIXELS] =
-                std::array::from_fn(|p| image[start + p / PATCH * size + p % PATCH] - mean);
+        for corner in 0..(size / PATCH_SIZE) * (size / PATCH_SIZE) {
+            let start = corner / (size / PATCH_SIZE) * PATCH_SIZE * size
+                + corner % (size / PATCH_SIZE) * PATCH_SIZE;
+            let square: [f32; PIXELS] = std::array::from_fn(|p| {
+                image[start + p / PATCH_SIZE * size + p % PATCH_SIZE] - mean
+            });
             for (row, &a) in sums.iter_mut().zip(&square) {
                 for (sum, &b) in row.iter_mut().zip(&square) {
                     *sum += f64::from(a * b);
@@ -331,7 +333,7 @@ mod tests {
             columns: 256,
             values: image.into_data().iter::<f32>().collect(),
         };
-        let seams = seams(&field, PATCH).unwrap_or(f64::INFINITY);
+        let seams = seams(&field, PATCH_SIZE).unwrap_or(f64::INFINITY);
         assert!(seams < 3.0, "{seams}");
     }
 }

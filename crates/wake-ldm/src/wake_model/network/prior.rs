@@ -6,14 +6,14 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
 use super::config::WakeModelConfig;
-use super::known::Known;
+use super::inputs::ConditioningInputs;
 use crate::wake_model::conditioning::{FEATURES, PLACES};
 use wake_nn::activation::silu;
 use wake_nn::cast_to;
 use wake_nn::conv::{conv1x1, convolve};
 
 /// Largest |c|.
-const LARGEST_LOG_SPREAD: f64 = 3.0;
+const LARGEST_LOG_STD: f64 = 3.0;
 /// Layers after the first.
 const LAYERS: usize = 3;
 /// Width of the network of the mean grey.
@@ -26,7 +26,7 @@ const GREY_WIDTH: usize = 128;
 /// ```
 ///
 /// - w: latents of the image that physics expects; d: deviation of the linear sea in the channel, see
-///   [`Foreseen`](super::Foreseen)
+///   [`PhysicsPrior`](super::PhysicsPrior)
 /// - a, m, c: of a network that sees one latent pixel, its place in the ship's frame and the numbers: what the formulas of
 ///   w and d neglect
 ///
@@ -56,7 +56,7 @@ pub struct Expected {
     /// μ, `[batch, channels, rows, columns]`.
     pub mean: Tensor<4>,
     /// ln s, `[batch, channels, rows, columns]`.
-    pub log_spread: Tensor<4>,
+    pub log_std: Tensor<4>,
     /// Mean grey of each image less that of the expected one, `[batch, 1]`.
     pub grey: Tensor<2>,
 }
@@ -81,32 +81,32 @@ impl Prior {
     }
 
     /// Mean, spread and brightness at the latent pixels of `known`, of its type.
-    pub fn forward(&self, known: &Known) -> Expected {
-        let (dtype, wide) = (self.mean.weight.val().dtype(), known.wake.dtype());
-        let numbers = cast_to(known.told(), dtype);
+    pub fn forward(&self, inputs: &ConditioningInputs) -> Expected {
+        let (dtype, wide) = (self.mean.weight.val().dtype(), inputs.wake.dtype());
+        let numbers = cast_to(inputs.told(), dtype);
         let told = |layer: &Linear| {
             let told = layer.forward(numbers.clone());
             let [batch, width] = told.dims();
             told.reshape([batch, width, 1, 1])
         };
-        let seen = convolve(&self.places, cast_to(known.places.clone(), dtype))
-            + convolve(&self.wake, cast_to(known.wake.clone(), dtype));
+        let seen = convolve(&self.places, cast_to(inputs.places.clone(), dtype))
+            + convolve(&self.wake, cast_to(inputs.wake.clone(), dtype));
         let mut x = silu(seen + told(&self.numbers[0]));
         for (layer, numbers) in self.layers.iter().zip(&self.numbers[1..]) {
             x = silu(convolve(layer, x.clone()) + told(numbers)) + x;
         }
         let out = |layer: &Conv2d| cast_to(convolve(layer, x.clone()), wide);
         let hidden = silu(self.grey_in.forward(numbers.clone()));
-        let [batch, channels, ..] = known.wake.dims();
-        let deviations = known
+        let [batch, channels, ..] = inputs.wake.dims();
+        let deviations = inputs
             .log_deviations
             .clone()
             .reshape([batch, channels, 1, 1]);
-        let change = (out(&self.spread) / LARGEST_LOG_SPREAD).tanh() * LARGEST_LOG_SPREAD;
+        let change = (out(&self.spread) / LARGEST_LOG_STD).tanh() * LARGEST_LOG_STD;
         Expected {
-            mean: known.wake.clone() * (out(&self.gain) + 1.0)
+            mean: inputs.wake.clone() * (out(&self.gain) + 1.0)
                 + out(&self.mean) * deviations.clone().exp(),
-            log_spread: change + deviations,
+            log_std: change + deviations,
             grey: cast_to(self.grey_out.forward(hidden), wide),
         }
     }
@@ -115,11 +115,11 @@ impl Prior {
 impl Expected {
     /// What the flow draws: (z − μ)/s.
     pub fn residual(&self, latents: Tensor<4>) -> Tensor<4> {
-        (latents - self.mean.clone()) * self.log_spread.clone().neg().exp()
+        (latents - self.mean.clone()) * self.log_std.clone().neg().exp()
     }
 
     /// The latents z = μ + s r of a residual r.
     pub fn latents(&self, residual: Tensor<4>) -> Tensor<4> {
-        residual * self.log_spread.clone().exp() + self.mean.clone()
+        residual * self.log_std.clone().exp() + self.mean.clone()
     }
 }

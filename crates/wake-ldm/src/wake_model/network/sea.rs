@@ -4,7 +4,7 @@ use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use wake_physics::{LinearSea, Scene};
 
-use super::known::{images_of, runs_of_equals};
+use super::inputs::{images_of, runs_of_equals};
 use super::patches::PatchTransform;
 use super::windows::ChannelWindows;
 use crate::error::Result;
@@ -87,7 +87,7 @@ impl SeaFields {
         Ok(Self { seas, fields })
     }
 
-    /// What [`Foreseen::log_deviations`](super::Foreseen::log_deviations) is of each scene, one after the other.
+    /// What [`PhysicsPrior::log_deviations`](super::PhysicsPrior::log_deviations) is of each scene, one after the other.
     ///
     /// - `slopes`: change of the grey by the relative intensity, of each scene
     pub fn log_deviations(&self, channels: &ChannelWindows, slopes: &[f64]) -> Vec<f32> {

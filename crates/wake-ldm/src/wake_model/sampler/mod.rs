@@ -19,8 +19,8 @@ use crate::error::{Error, Result};
 use crate::self_check::check_once;
 use crate::wake_model::conditioning::Vocabulary;
 use crate::wake_model::network::{
-    ChannelWindows, Expected, Known, SeaFields, WakeModel, WakeModelConfig, expected_greys,
-    images_of, slope_of,
+    ChannelWindows, ConditioningInputs, Expected, SeaFields, WakeModel, WakeModelConfig,
+    expected_greys, images_of, slope_of,
 };
 use crate::wake_model::sea_texture::SeaTexture;
 pub use image::speckled;
@@ -34,7 +34,7 @@ const STEPS: usize = 3;
 
 /// What the model is told about a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Conditioning {
+pub enum PromptMode {
     /// The numbers that [`wake_text`] reads from the words; where it leaves numbers or words of the field unread, also those
     /// that the model reads.
     #[default]
@@ -65,7 +65,7 @@ pub struct WakeSampler {
     device: Device,
     windows: ChannelWindows,
     steps: usize,
-    conditioning: Conditioning,
+    conditioning: PromptMode,
     sea: Option<SeaTexture>,
 }
 
@@ -90,7 +90,7 @@ impl WakeSampler {
             model,
             config,
             steps: STEPS,
-            conditioning: Conditioning::default(),
+            conditioning: PromptMode::default(),
             sea: None,
         })
     }
@@ -107,7 +107,7 @@ impl WakeSampler {
 
     /// The same sampler with a model that sees less.
     #[must_use]
-    pub fn with_conditioning(self, conditioning: Conditioning) -> Self {
+    pub fn with_prompt_mode(self, conditioning: PromptMode) -> Self {
         Self {
             conditioning,
             ..self
@@ -233,7 +233,7 @@ impl WakeSampler {
             Ok(Input {
                 unread: None,
                 words: match self.conditioning {
-                    Conditioning::Words => Wording::Paper.prompt(scene)?,
+                    PromptMode::Words => Wording::Paper.prompt(scene)?,
                     _ => String::new(),
                 },
                 scene: scene.clone(),
@@ -289,15 +289,15 @@ impl WakeSampler {
         let deviations = seas.log_deviations(&self.windows, &slopes.collect::<Vec<_>>());
         let patches = &self.model.patches;
         let image = images_of(&scenes, &expected, patches);
-        let known = Known::new(&scenes, patches.encode(image.clone()).0, &deviations);
-        let expected = self.model.prior.forward(&known);
+        let inputs = ConditioningInputs::new(&scenes, patches.encode(image.clone()).0, &deviations);
+        let expected = self.model.prior.forward(&inputs);
         check_finite("the mean of the image", &expected.mean)?;
         seconds.expect = lap();
         let noise = seas.noise(&scenes, &sources, patches);
-        let latents = self.denoise(&known, &expected, noise);
+        let latents = self.denoise(&inputs, &expected, noise);
         check_finite("the latents of the image", &latents)?;
         seconds.denoise = lap();
-        let grey = self.model.decode(latents, (&expected, &known), image);
+        let grey = self.model.decode(latents, (&expected, &inputs), image);
         check_finite("the image", &grey)?;
         let pixels: Vec<f32> = grey.to_data().iter::<f32>().collect();
         seconds.decode = lap();
@@ -315,9 +315,9 @@ impl WakeSampler {
     fn resolved(&self, inputs: &[Input]) -> Result<Vec<Scene>> {
         let asked = |input: &Input| match self.conditioning {
             // Of words that are all understood the model would only add what they do not say.
-            Conditioning::Both => input.unread.is_some(),
-            Conditioning::Words => true,
-            Conditioning::Numbers => false,
+            PromptMode::Both => input.unread.is_some(),
+            PromptMode::Words => true,
+            PromptMode::Numbers => false,
         };
         let prompts = inputs.iter().filter(|input| asked(input));
         let prompts: Vec<&str> = prompts.map(|input| input.words.as_str()).collect();
@@ -331,7 +331,7 @@ impl WakeSampler {
                 return Ok(input.scene.clone());
             };
             let (stated, base) = match self.conditioning {
-                Conditioning::Words => (PartialScene::default(), self.unspoken(&input.scene)),
+                PromptMode::Words => (PartialScene::default(), self.unspoken(&input.scene)),
                 _ => (input.unread.unwrap_or_default(), input.scene.clone()),
             };
             Ok(stated.or(read).onto(&base)?)
@@ -361,10 +361,15 @@ impl WakeSampler {
     }
 
     /// Euler's steps along the flow, from noise to latents.
-    fn denoise(&self, known: &Known, expected: &Expected, noise: Tensor<4>) -> Tensor<4> {
+    fn denoise(
+        &self,
+        inputs: &ConditioningInputs,
+        expected: &Expected,
+        noise: Tensor<4>,
+    ) -> Tensor<4> {
         let [batch, ..] = noise.dims();
         let mut x = noise;
-        let prepared = self.model.flow.prepared(known);
+        let prepared = self.model.flow.cached(inputs);
         for [from, to] in levels(self.steps) {
             let sigma = Tensor::full([batch], from, &self.device);
             let velocity = self.model.flow.velocity(x.clone(), sigma, &prepared);

@@ -2,25 +2,29 @@
 
 use std::path::Path;
 
+use burn::module::Module;
 use burn::tensor::Device;
 
 use super::WakeSampler;
 use crate::error::Result;
-use crate::wake_model::network::{WakeModel, WakeModelConfig};
+use crate::wake_model::network::{Part, WakeModel, WakeModelConfig};
 use wake_nn::weights::{Layout, load, load_bytes};
-
-/// Files of a small model.
-const CONFIG: &str = "config.json";
-const PATCHES: &str = "patches.safetensors";
-const PARSER: &str = "reader.safetensors";
-const PRIOR: &str = "prior.safetensors";
-const FLOW: &str = "flow.safetensors";
 
 /// Bytes of a file of the model in this crate.
 macro_rules! asset {
     ($name:literal) => {
         include_bytes!(concat!("../../../assets/", $name))
     };
+}
+
+/// Weights of a part in this crate.
+const fn weights(part: Part) -> &'static [u8] {
+    match part {
+        Part::Patches => asset!("patches.safetensors"),
+        Part::Parser => asset!("parser.safetensors"),
+        Part::Prior => asset!("prior.safetensors"),
+        Part::Flow => asset!("flow.safetensors"),
+    }
 }
 
 impl WakeSampler {
@@ -31,20 +35,17 @@ impl WakeSampler {
     /// None that a build from unchanged files can give.
     pub fn pretrained(device: &Device) -> Result<Self> {
         let config = include_str!("../../../assets/config.json");
-        let config = WakeModelConfig::from_json(config, Path::new(CONFIG))?;
-        let (model, layout) = (config.init(device), Layout::Diffusers);
-        let model = WakeModel {
-            patches: load_bytes(
-                model.patches,
-                layout,
-                PATCHES,
-                asset!("patches.safetensors"),
-            )?,
-            parser: load_bytes(model.parser, layout, PARSER, asset!("reader.safetensors"))?,
-            prior: load_bytes(model.prior, layout, PRIOR, asset!("prior.safetensors"))?,
-            flow: load_bytes(model.flow, layout, FLOW, asset!("flow.safetensors"))?,
-        };
-        Self::new(model, config)
+        let config = WakeModelConfig::from_json(config, Path::new(WakeModelConfig::FILE))?;
+        let model = config.init(device);
+        Self::new(
+            WakeModel {
+                patches: embedded(model.patches, Part::Patches)?,
+                parser: embedded(model.parser, Part::Parser)?,
+                prior: embedded(model.prior, Part::Prior)?,
+                flow: embedded(model.flow, Part::Flow)?,
+            },
+            config,
+        )
     }
 
     /// A model that training wrote into a folder.
@@ -54,15 +55,25 @@ impl WakeSampler {
     /// [`wake_nn::Error::Io`], [`wake_nn::Error::Json`] or what
     /// [`load`] finds for files that are not there or do not fit.
     pub fn from_folder(folder: &Path, device: &Device) -> Result<Self> {
-        let file = folder.join(CONFIG);
-        let config = WakeModelConfig::read(&file)?;
+        let config = WakeModelConfig::read(&folder.join(WakeModelConfig::FILE))?;
         let (model, layout) = (config.init(device), Layout::Diffusers);
+        let file = |part: Part| folder.join(part.file());
         let model = WakeModel {
-            patches: load(model.patches, layout, &folder.join(PATCHES))?,
-            parser: load(model.parser, layout, &folder.join(PARSER))?,
-            prior: load(model.prior, layout, &folder.join(PRIOR))?,
-            flow: load(model.flow, layout, &folder.join(FLOW))?,
+            patches: load(model.patches, layout, &file(Part::Patches))?,
+            parser: load(model.parser, layout, &file(Part::Parser))?,
+            prior: load(model.prior, layout, &file(Part::Prior))?,
+            flow: load(model.flow, layout, &file(Part::Flow))?,
         };
         Self::new(model, config)
     }
+}
+
+/// A part with the weights in this crate.
+fn embedded<M: Module>(module: M, part: Part) -> Result<M> {
+    Ok(load_bytes(
+        module,
+        Layout::Diffusers,
+        part.file(),
+        weights(part),
+    )?)
 }

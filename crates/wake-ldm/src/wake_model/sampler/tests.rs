@@ -7,7 +7,7 @@ use burn::tensor::Device;
 use wake_physics::grey::GreyScale;
 
 use super::*;
-use crate::network::Foreseen;
+use crate::network::PhysicsPrior;
 use crate::sea_texture::{SeaFlow, SeaStyle};
 
 const PROMPT: &str = "Simulated SAR image of wakes from a ship moving at 10 mps toward 135 degrees. Ocean waves are \
@@ -117,16 +117,16 @@ fn steps_follow_the_velocity_from_noise_to_latents() {
     sampler.model.flow = sampler.model.flow.clone().map(&mut Constant);
     let scene = sampler.base_scene();
     let patches = &sampler.model.patches;
-    let foreseen = Foreseen::new(&scene, &sampler.config.grey, patches).unwrap();
+    let physics = PhysicsPrior::new(&scene, &sampler.config.grey, patches).unwrap();
     let scenes = [scene];
-    let image = images_of(&scenes, &[foreseen.grey], patches);
-    let known = Known::new(&scenes, patches.encode(image).0, &foreseen.log_deviations);
-    let expected = sampler.model.prior.forward(&known);
+    let image = images_of(&scenes, &[physics.grey], patches);
+    let inputs = ConditioningInputs::new(&scenes, patches.encode(image).0, &physics.log_deviations);
+    let expected = sampler.model.prior.forward(&inputs);
     let noise = expected.mean.zeros_like() + 0.5;
     let there = expected.latents(noise.clone() - 0.1 * FRAC_PI_2);
     for steps in [1, 3] {
         let sampler = sampler.clone().with_steps(steps).unwrap();
-        let found = sampler.denoise(&known, &expected, noise.clone());
+        let found = sampler.denoise(&inputs, &expected, noise.clone());
         let far: f32 = (found - there.clone()).abs().max().into_scalar();
         let moved: f32 = (expected.latents(noise.clone()) - there.clone())
             .abs()
@@ -232,12 +232,8 @@ fn image_labels_and_scene_are_one() {
     let no_ship = Wording::Paper.prompt(&open).unwrap();
     let mut elsewhere = sampler.base_scene();
     elsewhere.ships[0].position = [150.0, -100.0];
-    for conditioning in [
-        Conditioning::Both,
-        Conditioning::Words,
-        Conditioning::Numbers,
-    ] {
-        let told = sampler.clone().with_conditioning(conditioning);
+    for conditioning in [PromptMode::Both, PromptMode::Words, PromptMode::Numbers] {
+        let told = sampler.clone().with_prompt_mode(conditioning);
         let mut images = vec![
             told.sample_scenes(std::slice::from_ref(&elsewhere))
                 .unwrap()
@@ -248,7 +244,7 @@ fn image_labels_and_scene_are_one() {
                 .unwrap(),
         );
         let drawn: Vec<Scene> = images.iter().map(|image| image.scene.clone()).collect();
-        let numbers = sampler.clone().with_conditioning(Conditioning::Numbers);
+        let numbers = sampler.clone().with_prompt_mode(PromptMode::Numbers);
         let again = numbers.sample_scenes(&drawn).unwrap();
         for (image, again) in images.iter().zip(&again) {
             let far = distance(&image.grey.values, &again.grey.values);
@@ -258,7 +254,7 @@ fn image_labels_and_scene_are_one() {
         }
         let [x, y] = drawn[0].ships[0].position;
         let expected = match conditioning {
-            Conditioning::Words => [0.0, 0.0],
+            PromptMode::Words => [0.0, 0.0],
             _ => [150.0, -100.0],
         };
         let far = (x - expected[0]).hypot(y - expected[1]);
@@ -290,7 +286,7 @@ fn a_given_scene_is_drawn_untouched() {
 /// With words alone the parser says whether there is a ship, and labels and image follow it.
 #[test]
 fn an_open_sea_that_only_the_words_state_has_no_labels_of_a_ship() {
-    let sampler = sampler().with_conditioning(Conditioning::Words);
+    let sampler = sampler().with_prompt_mode(PromptMode::Words);
     let mut scene = sampler.base_scene();
     scene.ships.clear();
     let mut told = Input {
@@ -389,21 +385,17 @@ impl burn::module::ModuleMapper for Tracked {
 #[test]
 fn words_and_numbers_each_move_the_image() {
     let sampler = sampler();
-    let grey = |told: Conditioning, prompt: &str| {
+    let grey = |told: PromptMode, prompt: &str| {
         sampler
             .clone()
-            .with_conditioning(told)
+            .with_prompt_mode(told)
             .sample(prompt, 1)
             .unwrap()
             .grey
             .values
     };
     let turned = PROMPT.replace("135", "315");
-    for told in [
-        Conditioning::Both,
-        Conditioning::Words,
-        Conditioning::Numbers,
-    ] {
+    for told in [PromptMode::Both, PromptMode::Words, PromptMode::Numbers] {
         let (a, b) = (grey(told, PROMPT), grey(told, &turned));
         assert!(
             a.iter().zip(&b).any(|(a, b)| (a - b).abs() > 1e-3),

@@ -6,7 +6,7 @@ use super::style::SeaStyle;
 use crate::error::{Error, Result};
 
 /// Rows and columns of the patches that a sea is learnt from.
-pub const PATCH: usize = 128;
+pub const WINDOW: usize = 128;
 
 /// Amplitudes of any scale, and the pixels that shall not be looked at.
 #[derive(Debug, Clone)]
@@ -44,11 +44,11 @@ impl SeaImage {
 
     /// Places of the first pixels of patches beside each other that fit into the image.
     pub fn places(&self) -> impl Iterator<Item = [usize; 2]> {
-        let [rows, columns] = self.size().map(|n| n / PATCH);
-        (0..rows * columns).map(move |n| [n / columns * PATCH, n % columns * PATCH])
+        let [rows, columns] = self.size().map(|n| n / WINDOW);
+        (0..rows * columns).map(move |n| [n / columns * WINDOW, n % columns * WINDOW])
     }
 
-    /// The patch of [`PATCH`] rows and columns at a place, and its style; `None` where it is masked anywhere, is no open
+    /// The patch of [`WINDOW`] rows and columns at a place, and its style; `None` where it is masked anywhere, is no open
     /// sea, or lies beyond the image.
     pub fn patch(&self, place: [usize; 2]) -> Option<(Field, SeaStyle)> {
         if let Some(hidden) = &self.hidden
@@ -64,14 +64,14 @@ impl SeaImage {
 
 /// A patch of a field; `None` where it does not lie inside.
 fn cut(field: &Field, [top, left]: [usize; 2]) -> Option<Field> {
-    if top + PATCH > field.rows || left + PATCH > field.columns {
+    if top + WINDOW > field.rows || left + WINDOW > field.columns {
         return None;
     }
     let rows = field.values.chunks_exact(field.columns).skip(top);
-    let rows = rows.take(PATCH).flat_map(|row| &row[left..left + PATCH]);
+    let rows = rows.take(WINDOW).flat_map(|row| &row[left..left + WINDOW]);
     Some(Field {
-        rows: PATCH,
-        columns: PATCH,
+        rows: WINDOW,
+        columns: WINDOW,
         values: rows.copied().collect(),
     })
 }
@@ -94,25 +94,25 @@ mod tests {
 
     #[test]
     fn patches_hold_neither_targets_nor_what_a_mask_marks() {
-        let mut image = rough(2 * PATCH + 40, 2 * PATCH);
-        image.values[(PATCH + 5) * 2 * PATCH + PATCH - 1] = 900.0;
+        let mut image = rough(2 * WINDOW + 40, 2 * WINDOW);
+        image.values[(WINDOW + 5) * 2 * WINDOW + WINDOW - 1] = 900.0;
         let mut mask = Field {
             values: vec![0.0; image.values.len()],
             ..image
         };
-        mask.values[PATCH] = 255.0;
+        mask.values[WINDOW] = 255.0;
         let open = SeaImage::new(image.clone(), Some(mask.clone())).unwrap();
         let found: Vec<[usize; 2]> = open
             .places()
             .filter(|&place| open.patch(place).is_some())
             .collect();
         assert_eq!(open.places().count(), 4);
-        assert_eq!(found, [[0, 0], [PATCH, PATCH]]);
+        assert_eq!(found, [[0, 0], [WINDOW, WINDOW]]);
         // Beside the target and below the marked pixel, by one.
-        assert!(open.patch([1, PATCH]).is_some() && open.patch([0, PATCH]).is_none());
-        assert!(open.patch([PATCH + 5, PATCH]).is_some());
-        assert!(open.patch([PATCH + 5, PATCH - 1]).is_none());
-        assert!(open.patch([PATCH + 41, 0]).is_none() && open.patch([0, PATCH + 1]).is_none());
+        assert!(open.patch([1, WINDOW]).is_some() && open.patch([0, WINDOW]).is_none());
+        assert!(open.patch([WINDOW + 5, WINDOW]).is_some());
+        assert!(open.patch([WINDOW + 5, WINDOW - 1]).is_none());
+        assert!(open.patch([WINDOW + 41, 0]).is_none() && open.patch([0, WINDOW + 1]).is_none());
         mask.rows -= 1;
         let refused = SeaImage::new(image, Some(mask)).unwrap_err().to_string();
         assert!(refused.contains("mask is 295 x 256"), "{refused}");
@@ -121,13 +121,13 @@ mod tests {
     /// Of 16,384 white pixels: mean 1, spread a tenth, correlation 0 within five standard errors, whatever the scale.
     #[test]
     fn the_style_is_that_of_the_pixels() {
-        let image = rough(PATCH, PATCH);
+        let image = rough(WINDOW, WINDOW);
         let (patch, style) = SeaImage::new(image.clone(), None)
             .unwrap()
             .patch([0, 0])
             .unwrap();
         assert_eq!(patch, image);
-        let error = 5.0 / PATCH as f32;
+        let error = 5.0 / WINDOW as f32;
         // A median is known π/2 times as badly as a mean.
         assert!((style.mean() - 1.0).abs() < 0.1 * error * 1.6);
         assert!((style.spread() - 0.1).abs() < 0.1 * error);
@@ -150,7 +150,7 @@ mod tests {
     /// above the mean of 110 is 367.
     #[test]
     fn land_and_coasts_are_no_sea() {
-        let image = rough(PATCH, PATCH);
+        let image = rough(WINDOW, WINDOW);
         let with = |change: fn(usize, f32) -> f32| {
             let values = image.values.iter().enumerate();
             SeaStyle::of(&Field {
@@ -159,8 +159,8 @@ mod tests {
             })
         };
         assert!(with(|_, v| v).is_some());
-        assert!(with(|n, v| if n % PATCH < 64 { 0.6 * v } else { v }).is_none());
-        assert!(with(|n, v| if n % PATCH < 64 { 0.8 * v } else { v }).is_some());
+        assert!(with(|n, v| if n % WINDOW < 64 { 0.6 * v } else { v }).is_none());
+        assert!(with(|n, v| if n % WINDOW < 64 { 0.8 * v } else { v }).is_some());
         assert!(with(|n, v| if n.is_multiple_of(10) { 2.0 * v } else { v }).is_none());
     }
 }

@@ -11,7 +11,6 @@ mod style;
 mod texture;
 
 pub use flow::SeaFlow;
-pub use image::{PATCH, SeaImage};
+pub use image::{SeaImage, WINDOW};
 pub use style::SeaStyle;
-pub use style::median;
 pub use texture::SeaTexture;

@@ -2,7 +2,7 @@
 
 use wake_physics::Field;
 use wake_physics::correlated::{CorrelatedNoise, Correlation};
-use wake_physics::measure::{Texture, texture};
+use wake_physics::measure::{Texture, median, texture};
 
 use crate::error::{Error, Result};
 use crate::streams::SEA_TEXTURE_STREAM;
@@ -49,7 +49,7 @@ impl SeaStyle {
     #[must_use]
     pub fn of(amplitude: &Field) -> Option<Self> {
         let side = amplitude.rows;
-        let median = median(amplitude);
+        let median = median(&amplitude.values);
         let largest = amplitude.values.iter().copied().fold(0.0, f32::max);
         // A median of 0 or no number fails, too.
         let lit = median > 0.0 && largest <= BRIGHTEST * median;
@@ -154,14 +154,4 @@ fn numbers(mean: f64, spread: f64, texture: &Texture) -> [f32; NUMBERS] {
     let [c1, c2, ..] = texture.along_columns;
     let [fine, coarse] = texture.block_variation;
     [mean, spread, texture.skewness, r1, r2, c1, c2, fine, coarse].map(|x| x as f32)
-}
-
-/// The middle value; 0 of no pixel.
-pub fn median(field: &Field) -> f32 {
-    let mut sorted = field.values.clone();
-    let middle = sorted.len() / 2;
-    match sorted.is_empty() {
-        true => 0.0,
-        false => *sorted.select_nth_unstable_by(middle, f32::total_cmp).1,
-    }
 }

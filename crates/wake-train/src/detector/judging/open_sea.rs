@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use wake_detector::GreyImage;
+use wake_physics::measure::median;
 
 /// A window with a pixel brighter than this many medians holds more than sea: chosen.
 const BRIGHTEST: f32 = 4.0;
@@ -65,9 +66,7 @@ fn is_open(pixels: &[f32]) -> bool {
     if pixels.is_empty() {
         return false;
     }
-    let mut sorted = pixels.to_vec();
-    let middle = sorted.len() / 2;
-    let median = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let median = median(pixels);
     let largest = pixels.iter().copied().fold(0.0, f32::max);
     median > 0.0 && largest < BRIGHTEST * median && largest > median
 }

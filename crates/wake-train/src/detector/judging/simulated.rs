@@ -56,7 +56,7 @@ impl Searched {
     pub fn of(
         source: &dyn Source,
         count: u64,
-        finders: &[&Finder],
+        finders: &[&dyn Finder],
         mut done: impl FnMut(&GreyImage, &[Wake], &[Vec<Detection>]),
     ) -> Result<Self> {
         let mut searched = Self {
@@ -120,7 +120,7 @@ impl Searched {
 }
 
 /// What the first finder takes for an image \[s\].
-fn seconds(finders: &[&Finder], images: &[GreyImage]) -> f64 {
+fn seconds(finders: &[&dyn Finder], images: &[GreyImage]) -> f64 {
     let begin = Instant::now();
     for image in images {
         finders.first().map(|finder| finder.find(image));

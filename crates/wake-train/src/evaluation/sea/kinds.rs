@@ -1,7 +1,7 @@
 //! The kinds of sea that stand against a real one.
 
 use rayon::prelude::*;
-use wake_physics::measure::texture;
+use wake_physics::measure::{median, texture};
 use wake_physics::sar::speckle::speckle;
 use wake_physics::{Field, Scene, Simulator, expected_intensity};
 
@@ -9,7 +9,7 @@ use super::pair::{SeaPair, window};
 use crate::error::Result;
 use crate::evaluation::baseline::gaussian_sea;
 use wake_dataset::{Grey, Recipe, Simulated};
-use wake_ldm::sea_texture::{PATCH, SeaStyle, SeaTexture, median};
+use wake_ldm::sea_texture::{SeaStyle, SeaTexture, WINDOW};
 use wake_nn::noise::NoiseSource;
 
 /// The open sea of the recipe detector.
@@ -43,8 +43,8 @@ pub fn kinds(
             .map(|(pair, seed)| Ok(levels(work(pair, seed)?, pair)))
             .collect()
     };
-    let own = draw(&|_, seed| Ok(amplitude(&learnt.sample(seed, PATCH, PATCH)?)))?;
-    let told = draw(&|pair, seed| Ok(learnt.amplitude(&pair.style, seed, PATCH, PATCH)?))?;
+    let own = draw(&|_, seed| Ok(amplitude(&learnt.sample(seed, WINDOW, WINDOW)?)))?;
+    let told = draw(&|pair, seed| Ok(learnt.amplitude(&pair.style, seed, WINDOW, WINDOW)?))?;
     let gaussian = draw(&|pair, seed| Ok(gaussian_amplitude(&pair.style, seed)))?;
     let white = draw(&|pair, seed| Ok(white_speckle(&pair.left, seed)))?;
     let recipe = Recipe::detector()?.with_assignments(&OPEN_SEA)?;
@@ -72,10 +72,10 @@ pub fn kinds(
 }
 
 /// Gaussian amplitude over its median, with the mean, the spread and the correlations of a style, cut at 0:
-/// `[PATCH, PATCH]`.
+/// `[WINDOW, WINDOW]`.
 #[must_use]
 pub fn gaussian_amplitude(style: &SeaStyle, seed: u64) -> Field {
-    let mut field = style.noise(NoiseSource::new(seed), PATCH, PATCH);
+    let mut field = style.noise(NoiseSource::new(seed), WINDOW, WINDOW);
     for value in &mut field.values {
         *value = (style.mean() + style.spread() * *value).max(0.0);
     }
@@ -91,15 +91,15 @@ fn amplitude(intensity: &Field) -> Field {
 
 /// Speckle that no pixel shares with its neighbour, of the window's equivalent looks, to a whole one.
 fn white_speckle(like: &Field, seed: u64) -> Field {
-    let looks = texture(like, PATCH).map_or(1.0, |texture| texture.looks);
-    let mut field = window(vec![1.0; PATCH * PATCH]);
+    let looks = texture(like, WINDOW).map_or(1.0, |texture| texture.looks);
+    let mut field = window(vec![1.0; WINDOW * WINDOW]);
     speckle(&mut field, looks.round().max(1.0) as u32, seed);
     amplitude(&field)
 }
 
 /// Amplitudes as the levels of a quick-look whose median is that of the pair's left window.
 fn levels(mut amplitude: Field, pair: &SeaPair) -> Field {
-    let factor = pair.median as f32 / median(&amplitude).max(f32::MIN_POSITIVE);
+    let factor = pair.median as f32 / median(&amplitude.values).max(f32::MIN_POSITIVE);
     for value in &mut amplitude.values {
         *value = (factor * *value).round().clamp(0.0, 255.0);
     }
@@ -136,20 +136,20 @@ mod tests {
     #[test]
     fn white_speckle_has_the_looks_and_the_median_of_its_window() {
         let left = {
-            let mut field = window(vec![2500.0; PATCH * PATCH]);
+            let mut field = window(vec![2500.0; WINDOW * WINDOW]);
             speckle(&mut field, 4, 1);
             amplitude(&field)
         };
         let style = SeaStyle::of(&left).unwrap();
         let pair = SeaPair {
             right: left.clone(),
-            median: f64::from(median(&left)),
+            median: f64::from(median(&left.values)),
             style,
             left,
         };
         let drawn = levels(white_speckle(&pair.left, 2), &pair);
-        assert!((f64::from(median(&drawn)) - pair.median).abs() <= 0.5);
-        let looks = texture(&drawn, PATCH).unwrap().looks;
+        assert!((f64::from(median(&drawn.values)) - pair.median).abs() <= 0.5);
+        let looks = texture(&drawn, WINDOW).unwrap().looks;
         // A variance of 128² pixels has an error of 1.1 %, steps of one level add less.
         assert!((looks - 4.0).abs() < 0.3, "{looks}");
         let noise = gaussian_amplitude(&pair.style, 3);

@@ -2,9 +2,9 @@
 
 use wake_physics::Field;
 
-use wake_ldm::sea_texture::{PATCH, SeaImage, SeaStyle};
+use wake_ldm::sea_texture::{SeaImage, SeaStyle, WINDOW};
 
-/// A real window of a left half, and one of the right half of the same image, both of [`PATCH`] rows and columns.
+/// A real window of a left half, and one of the right half of the same image, both of [`WINDOW`] rows and columns.
 #[derive(Debug, Clone)]
 pub struct SeaPair {
     /// Amplitudes of the left one, of the image's scale.
@@ -47,8 +47,8 @@ impl SeaPair {
 /// A window of so many amplitudes.
 pub(super) fn window(values: Vec<f32>) -> Field {
     Field {
-        rows: PATCH,
-        columns: PATCH,
+        rows: WINDOW,
+        columns: WINDOW,
         values,
     }
 }
@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn a_pair_has_a_window_of_each_half() {
         let image = |windows: usize, seed: u64| {
-            let raster = Raster::image(PATCH, windows * PATCH, 1.0);
+            let raster = Raster::image(WINDOW, windows * WINDOW, 1.0);
             let mut field = Field::constant(&raster, 100.0);
             speckle(&mut field, 4, seed);
             field.values.iter_mut().for_each(|v| *v = v.sqrt());
@@ -73,8 +73,8 @@ mod tests {
         let (left, right) = (image(3, 1), image(2, 2));
         let pairs = SeaPair::of_image(&left, &right, 8);
         assert_eq!(pairs.len(), 2);
-        assert_eq!(pairs[1].left, left.patch([0, PATCH]).unwrap().0);
-        assert_eq!(pairs[1].right, right.patch([0, PATCH]).unwrap().0);
+        assert_eq!(pairs[1].left, left.patch([0, WINDOW]).unwrap().0);
+        assert_eq!(pairs[1].right, right.patch([0, WINDOW]).unwrap().0);
         for pair in &pairs {
             let mut sorted = pair.left.values.clone();
             sorted.sort_by(f32::total_cmp);

@@ -5,7 +5,7 @@ use wake_physics::Field;
 use wake_physics::measure::{Binning, Texture, radial_spectrum, texture};
 
 use crate::TwoSample;
-use wake_ldm::sea_texture::PATCH;
+use wake_ldm::sea_texture::WINDOW;
 
 /// Figures of one kind of sea, means over its windows.
 #[derive(Debug, Clone, Serialize)]
@@ -25,7 +25,7 @@ pub struct SeaRow {
 }
 
 impl SeaRow {
-    /// The row of some windows of [`PATCH`] rows and columns.
+    /// The row of some windows of [`WINDOW`] rows and columns.
     ///
     /// - `reference`: [`mean_spectrum`] of what they stand against
     #[must_use]
@@ -35,7 +35,7 @@ impl SeaRow {
         reference: &[f64],
         two_sample: Option<TwoSample>,
     ) -> Self {
-        let textures: Vec<_> = windows.iter().filter_map(|f| texture(f, PATCH)).collect();
+        let textures: Vec<_> = windows.iter().filter_map(|f| texture(f, WINDOW)).collect();
         let mean = |of: &dyn Fn(&Texture) -> f64| {
             textures.iter().map(of).sum::<f64>() / textures.len().max(1) as f64
         };
@@ -60,11 +60,11 @@ impl SeaRow {
     }
 }
 
-/// Power by rings of windows of [`PATCH`] rows and columns and of variance 1, up to the Nyquist wavenumber, mean over the windows
+/// Power by rings of windows of [`WINDOW`] rows and columns and of variance 1, up to the Nyquist wavenumber, mean over the windows
 /// \[dB\].
 #[must_use]
 pub fn mean_spectrum(windows: &[Field]) -> Vec<f64> {
-    let rings = PATCH / 2;
+    let rings = WINDOW / 2;
     let mut sums = vec![0.0; rings - 1];
     for field in windows {
         let spectrum = radial_spectrum(field, Binning::Round);
@@ -89,16 +89,16 @@ mod tests {
     #[test]
     fn the_spectrum_knows_no_scale() {
         let noise = |seed: u64, scale: f32| {
-            let values = NoiseSource::new(seed).normal(0, PATCH * PATCH);
+            let values = NoiseSource::new(seed).normal(0, WINDOW * WINDOW);
             window(values.into_iter().map(|x| scale * (3.0 + x)).collect())
         };
         let windows: Vec<Field> = (1..5).map(|seed| noise(seed, 1.0)).collect();
         let louder: Vec<Field> = (1..5).map(|seed| noise(seed, 7.0)).collect();
         let spectrum = mean_spectrum(&windows);
-        assert_eq!(spectrum.len(), PATCH / 2 - 1);
+        assert_eq!(spectrum.len(), WINDOW / 2 - 1);
         let row = SeaRow::of("louder", &louder, &spectrum, None);
         assert!(row.spectrum_db < 1e-3, "{row:?}");
-        let expected = -10.0 * ((PATCH * PATCH - 1) as f64).log10();
+        let expected = -10.0 * ((WINDOW * WINDOW - 1) as f64).log10();
         for ring in &spectrum[1..] {
             assert!((ring - expected).abs() < 3.0, "{ring} {expected}");
         }

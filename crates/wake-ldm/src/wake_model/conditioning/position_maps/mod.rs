@@ -6,7 +6,7 @@ use wake_physics::kelvin::half_angle;
 use wake_physics::scene::{Grid, Ship};
 
 /// Side of the squares of pixels that become one latent pixel.
-pub const PATCH: usize = 8;
+pub const PATCH_SIZE: usize = 8;
 /// Maps at the size of the latents.
 pub const PLACES: usize = 8;
 /// Which of them says whether a place is in the wedge.
@@ -40,7 +40,7 @@ struct Frame {
 /// Distances along and across the track, in the image's axes and from the ship, in the wedge of the bow's waves or not, how
 /// far from its edge, and a band behind the stern. The wedge opens as the wake does at this speed and depth.
 ///
-/// `cells`: squares of [`PATCH`] × [`PATCH`] pixels, counted in rows.
+/// `cells`: squares of [`PATCH_SIZE`] × [`PATCH_SIZE`] pixels, counted in rows.
 ///
 /// # Shapes
 ///
@@ -81,15 +81,15 @@ impl MapGrid {
 
     /// All squares of pixels, in rows.
     pub fn cells(self) -> Vec<usize> {
-        let coarse = self.size / PATCH;
+        let coarse = self.size / PATCH_SIZE;
         (0..coarse * coarse).collect()
     }
 
-    /// Place (x, y) \[m\] of the middle of a square, half a pixel before its pixel PATCH/2.
+    /// Place (x, y) \[m\] of the middle of a square, half a pixel before its pixel `PATCH_SIZE`/2.
     fn middle(self, cell: usize) -> [f64; 2] {
-        let coarse = self.size / PATCH;
-        let [row, column] = [cell / coarse, cell % coarse].map(|n| (n * PATCH) as f64);
-        let (origin, half) = ((self.size / 2) as f64, 0.5 * (PATCH as f64 - 1.0));
+        let coarse = self.size / PATCH_SIZE;
+        let [row, column] = [cell / coarse, cell % coarse].map(|n| (n * PATCH_SIZE) as f64);
+        let (origin, half) = ((self.size / 2) as f64, 0.5 * (PATCH_SIZE as f64 - 1.0));
         [
             (column + half - origin) * self.spacing,
             (origin - row - half) * self.spacing,

@@ -78,8 +78,8 @@ fn maps_count_pixels_and_know_every_ship() {
 #[test]
 fn maps_are_bounded_and_move_with_the_ship() {
     // Three latent pixels to the right in range and two toward smaller azimuth, so down.
-    let shift = [3.0, -2.0].map(|n| n * PATCH as f64 * GRID.spacing);
-    let coarse = GRID.size / PATCH;
+    let shift = [3.0, -2.0].map(|n| n * PATCH_SIZE as f64 * GRID.spacing);
+    let coarse = GRID.size / PATCH_SIZE;
     let [a, b] =
         [[0.0, 0.0], shift].map(|position| places(&known(9.0, 70.0, position), &GRID.cells()));
     assert!(a.iter().chain(&b).all(|x| x.abs() <= 1.5));
@@ -97,7 +97,7 @@ fn maps_are_bounded_and_move_with_the_ship() {
 #[test]
 fn the_wedge_is_that_of_the_simulators_measurements() {
     let raster = Raster::image(GRID.size, GRID.size, GRID.spacing);
-    let coarse = GRID.size / PATCH;
+    let coarse = GRID.size / PATCH_SIZE;
     for (heading, position) in [(30.0, [100.0, 150.0]), (250.0, [120.0, 10.0])] {
         let maps = places(&known(8.0, heading, position), &GRID.cells());
         let ship = ShipPlace {
@@ -107,12 +107,13 @@ fn the_wedge_is_that_of_the_simulators_measurements() {
         };
         let inside = kelvin_wedge(&raster, &ship, heading, 8.0);
         for cell in GRID.cells() {
-            let (row, column) = (cell / coarse * PATCH, cell % coarse * PATCH);
-            let pixels = (0..PATCH * PATCH).map(|p| (row + p / PATCH, column + p % PATCH));
+            let (row, column) = (cell / coarse * PATCH_SIZE, cell % coarse * PATCH_SIZE);
+            let pixels = (0..PATCH_SIZE * PATCH_SIZE)
+                .map(|p| (row + p / PATCH_SIZE, column + p % PATCH_SIZE));
             let count = pixels.filter(|(i, j)| inside[i * GRID.size + j]).count();
             let ours = maps[WEDGE * coarse * coarse + cell] > 0.5;
             // The map says where the middle of a square lies.
-            if count == 0 || count == PATCH * PATCH {
+            if count == 0 || count == PATCH_SIZE * PATCH_SIZE {
                 assert_eq!(ours, count > 0, "heading {heading}, square {cell}");
             }
         }

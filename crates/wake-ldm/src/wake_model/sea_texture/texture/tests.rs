@@ -5,17 +5,17 @@
 use burn::module::ModuleMapper;
 use half::f16;
 
-use super::super::PATCH;
+use super::super::WINDOW;
 use super::*;
 
 /// Amplitudes 100 + 20 n of noise that neighbours in a row share half of.
 fn patch(seed: u64) -> Field {
-    let white = NoiseSource::new(seed).normal(0, PATCH * PATCH + 1);
+    let white = NoiseSource::new(seed).normal(0, WINDOW * WINDOW + 1);
     let value = |n: usize| 100.0 + 20.0 * (white[n] + white[n + 1]) / f32::sqrt(2.0);
     Field {
-        rows: PATCH,
-        columns: PATCH,
-        values: (0..PATCH * PATCH).map(value).collect(),
+        rows: WINDOW,
+        columns: WINDOW,
+        values: (0..WINDOW * WINDOW).map(value).collect(),
     }
 }
 

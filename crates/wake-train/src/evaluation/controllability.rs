@@ -10,7 +10,7 @@ use crate::error::Result;
 
 /// How often a measured value followed.
 #[derive(Debug, Clone, Serialize)]
-pub struct SwapRow {
+pub struct ControllabilityRow {
     /// Name of the quantity that was changed.
     pub quantity: &'static str,
     /// What the images' source was told; "simulator" for the simulator with another sea.
@@ -35,13 +35,13 @@ pub struct SwapRow {
 /// # Errors
 ///
 /// As [`ImageSource::draw`] and [`Reading::of`].
-pub fn swaps(
+pub(super) fn controllability(
     quantity: Quantity,
     scenes: &[Scene],
     model: &dyn ImageSource,
     told: &[Told],
     mut step: impl FnMut(),
-) -> Result<Vec<SwapRow>> {
+) -> Result<Vec<ControllabilityRow>> {
     let mut counted = Vec::new();
     for base in scenes {
         if let Some(pair) = Swap::new(base, quantity)
@@ -51,19 +51,20 @@ pub fn swaps(
         }
         step();
     }
-    let row = |name: &'static str, source: &dyn ImageSource, told: Told| -> Result<SwapRow> {
-        let mut right = 0;
-        for pair in &counted {
-            right += usize::from(pair.is_followed(source, told)?);
-        }
-        Ok(SwapRow {
-            quantity: quantity.name()[0],
-            told: name,
-            pairs: scenes.len(),
-            counted: counted.len(),
-            right: (!counted.is_empty()).then(|| right as f64 / counted.len() as f64),
-        })
-    };
+    let row =
+        |name: &'static str, source: &dyn ImageSource, told: Told| -> Result<ControllabilityRow> {
+            let mut right = 0;
+            for pair in &counted {
+                right += usize::from(pair.is_followed(source, told)?);
+            }
+            Ok(ControllabilityRow {
+                quantity: quantity.name()[0],
+                told: name,
+                pairs: scenes.len(),
+                counted: counted.len(),
+                right: (!counted.is_empty()).then(|| right as f64 / counted.len() as f64),
+            })
+        };
     let mut rows = vec![row("simulator", &Baseline::OtherSea, Told::Both)?];
     for &told in told {
         rows.push(row(told.name(), model, told)?);

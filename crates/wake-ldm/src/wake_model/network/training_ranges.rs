@@ -30,7 +30,7 @@ const BEYOND: f64 = 0.02;
 /// The values that the scenes of a training set have, key by key: numbers from the smallest to the largest, of all else each.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Domain(BTreeMap<String, Seen>);
+pub struct TrainingRanges(BTreeMap<String, Seen>);
 
 /// The values of one key.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -44,23 +44,23 @@ struct Seen {
     values: Vec<Value>,
 }
 
-impl Domain {
+impl TrainingRanges {
     /// That of some scenes.
     ///
     /// # Errors
     ///
     /// [`wake_nn::Error::Json`] for a scene that cannot be written.
     pub fn of<'a>(scenes: impl IntoIterator<Item = &'a Scene>) -> Result<Self> {
-        let mut domain = Self::default();
+        let mut ranges = Self::default();
         for scene in scenes {
             for (key, value) in leaves(scene)? {
-                domain.0.entry(key).or_default().add(&value);
+                ranges.0.entry(key).or_default().add(&value);
             }
         }
-        Ok(domain)
+        Ok(ranges)
     }
 
-    /// Checks that a scene has only values that were seen; a domain of no scene holds every scene.
+    /// Checks that a scene has only values that were seen; a ranges of no scene holds every scene.
     ///
     /// # Errors
     ///
@@ -188,9 +188,10 @@ mod tests {
             "radar.range_resolution=8.0",
         ]);
         open.ships.clear();
-        let domain =
-            Domain::of(&[scene(&["sea.wind_speed=9.0", "ship.length=80.0"]), open]).unwrap();
-        let check = |assignments: &[&str]| domain.check(&scene(assignments));
+        let ranges =
+            TrainingRanges::of(&[scene(&["sea.wind_speed=9.0", "ship.length=80.0"]), open])
+                .unwrap();
+        let check = |assignments: &[&str]| ranges.check(&scene(assignments));
         assert!(check(&["sea.wind_speed=6.0", "ship.length=80.0"]).is_ok());
         assert!(
             check(&[
@@ -229,18 +230,21 @@ mod tests {
         }
         let mut two = scene(&["ship.length=80.0"]);
         two.ships.push(two.ships[0].clone());
-        let refused = domain.check(&two).unwrap_err().to_string();
+        let refused = ranges.check(&two).unwrap_err().to_string();
         assert!(refused.contains("ships is 2, expected 0 to 1"), "{refused}");
     }
 
     #[test]
     fn it_is_read_as_it_was_written() {
-        let domain = Domain::of(&[
+        let ranges = TrainingRanges::of(&[
             scene(&[]),
             scene(&["ship.echo=true", "radar.noise_floor=-20.0"]),
         ]);
-        let domain = domain.unwrap();
-        let text = serde_json::to_string(&domain).unwrap();
-        assert_eq!(serde_json::from_str::<Domain>(&text).unwrap(), domain);
+        let ranges = ranges.unwrap();
+        let text = serde_json::to_string(&ranges).unwrap();
+        assert_eq!(
+            serde_json::from_str::<TrainingRanges>(&text).unwrap(),
+            ranges
+        );
     }
 }

@@ -1,17 +1,17 @@
-//! The second stage: what prompts state, read from wordings of simulated scenes.
+//! The second part: what prompts state, read from wordings of simulated scenes.
 
 use burn::tensor::Device;
 use serde_json::json;
 
 use super::super::run::Run;
 use super::super::stage_options::StageOptions;
-use super::super::tasks::WordsTask;
-use super::{PARSER, WakeStage, WakeTraining, keep};
+use super::super::tasks::ParserTask;
+use super::{WakeTraining, defaults, keep};
 use crate::error::Result;
 use crate::prompts::Prompts;
 use wake_dataset::{Recipe, Simulated};
 use wake_ldm::conditioning::Vocabulary;
-use wake_ldm::network::{PromptParser, WakeModelConfig};
+use wake_ldm::network::{Part, PromptParser, WakeModelConfig};
 
 /// Ranges that prompts to read are drawn from, beyond those of images.
 const PROMPT_RANGES: [&str; 4] = [
@@ -22,35 +22,27 @@ const PROMPT_RANGES: [&str; 4] = [
 ];
 
 impl WakeTraining<'_> {
-    /// Trains the reader of prompts; it needs no pairs.
-    ///
-    /// # Errors
-    ///
-    /// As [`Stage::train`](super::super::Stage::train).
-    pub fn words(&mut self) -> Result<()> {
-        self.words_with(&self.options.clone())
-    }
-
-    pub(super) fn words_with(&mut self, options: &StageOptions) -> Result<()> {
+    /// Trains the parser; it needs no pairs.
+    pub(super) fn train_parser(&mut self, options: &StageOptions) -> Result<()> {
         let recipe = Recipe::default().with_assignments(&PROMPT_RANGES)?;
         let identity = json!({"prompts": recipe});
         let prompts = Prompts::new(Simulated::new(recipe, options.seed)?);
         let vocabulary = Vocabulary::new(self.config.vocabulary.iter().copied());
         let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
         let run = Run::new(
-            WakeStage::Words.name(),
+            Part::Parser.name(),
             &self.config,
             init,
-            options.run(&WakeStage::Words.usual(), identity),
+            options.run(&defaults(Part::Parser), identity),
             options.learning_devices()?,
         )?;
-        let task = WordsTask {
+        let task = ParserTask {
             prompts: &prompts,
             vocabulary: &vocabulary,
         };
-        let file = self.out(PARSER);
+        let file = self.out(Part::Parser.file());
         let show = |run: &Run<PromptParser>| keep(&run.averaged(), &file);
-        let stage = Self::stage(WakeStage::Words, options);
+        let stage = Self::stage(Part::Parser, options);
         stage.train(&mut self.folder, run, &task, self.progress, show)
     }
 }

@@ -12,7 +12,7 @@ use crate::wake_model::conditioning::{FEATURES, MapGrid, PLACES, features, place
 
 /// What is known of the scenes of a batch.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct ConditioningInputs {
     /// Their numbers, `[batch, FEATURES]`.
     pub numbers: Tensor<2>,
     /// Where the pixels of the latents lie, `[batch, PLACES, rows, columns]`.
@@ -23,11 +23,11 @@ pub struct Known {
     pub log_deviations: Tensor<2>,
 }
 
-impl Known {
+impl ConditioningInputs {
     /// What is known of some scenes at all their latent pixels.
     ///
-    /// - `wake`: see [`Foreseen`]; its device is that of the result
-    /// - `log_deviations`: of the channels, see [`Foreseen`], one scene after the other
+    /// - `wake`: see [`PhysicsPrior`]; its device is that of the result
+    /// - `log_deviations`: of the channels, see [`PhysicsPrior`], one scene after the other
     pub fn new(scenes: &[Scene], wake: Tensor<4>, log_deviations: &[f32]) -> Self {
         let cells: Vec<Vec<usize>> = scenes
             .iter()
@@ -76,14 +76,14 @@ const EVEN: usize = 32;
 
 /// What physics foresees of a scene's image.
 #[derive(Debug, Clone)]
-pub struct Foreseen {
+pub struct PhysicsPrior {
     /// Grey of [`expected_intensity`], `[rows, columns]` of the scene.
     pub grey: Vec<f32>,
     /// Logarithm of the deviation that the [`LinearSea`] has in each channel of the latents.
     pub log_deviations: Vec<f32>,
 }
 
-impl Foreseen {
+impl PhysicsPrior {
     /// That of a scene in the latents of a transform.
     ///
     /// # Errors

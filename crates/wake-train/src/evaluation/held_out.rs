@@ -7,12 +7,14 @@ use wake_physics::scene::Ship;
 
 /// First seed of the scenes: data sets count theirs from small numbers.
 const FIRST_SEED: u64 = 0xE7A1_0000_0000_0000;
-/// Pixels along a side, and their size [m]: those of the model.
-pub(crate) const SIZE: usize = 256;
+/// Pixels along a side of a held-out scene: those of the model.
+pub const SIZE: usize = 256;
+/// Their size \[m\].
 const SPACING: f64 = 4.0;
 
 /// The scene of an index: values anywhere in the ranges of the paper's grid, as exact as a prompt states them.
-pub(crate) fn held_out(index: u64) -> Scene {
+#[must_use]
+pub fn held_out(index: u64) -> Scene {
     let seed = FIRST_SEED + (index << 16);
     let mut random = StdRng::seed_from_u64(seed);
     let mut whole = |from: i32, to: i32| f64::from(random.random_range(from..=to));
@@ -31,9 +33,4 @@ pub(crate) fn held_out(index: u64) -> Scene {
     scene.sea.fetch = 100.0 * whole(100, 700);
     scene.radar.incidence = whole(16, 32);
     scene
-}
-
-/// The ship of a scene; every held-out scene has one.
-pub(crate) fn ship(scene: &Scene) -> Ship {
-    scene.ships.first().cloned().unwrap_or_default()
 }

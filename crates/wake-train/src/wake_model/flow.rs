@@ -1,4 +1,4 @@
-//! The last stage: the flow that draws what mean and spread leave open.
+//! The last part: the flow that draws what mean and spread leave open.
 
 use burn::tensor::Device;
 use serde_json::json;
@@ -7,48 +7,44 @@ use wake_physics::Scene;
 use super::super::progress::counted;
 use super::super::run::Run;
 use super::super::sheet::write_sheet;
+use super::super::stage_options::StageOptions;
 use super::super::tasks::FlowTask;
-use super::{ACROSS, FLOW, PARSER, PATCHES, PRIOR, SHEET, WakeStage, WakeTraining, keep};
+use super::{ACROSS, SHEET, WakeTraining, defaults, keep};
 use crate::error::Result;
-use wake_ldm::network::{Flow, WakeModel, WakeModelConfig};
+use wake_ldm::network::{Flow, Part, WakeModel, WakeModelConfig};
 use wake_ldm::sampler::WakeSampler;
 
 impl WakeTraining<'_> {
-    /// Trains the flow, after all stages that are not done yet.
-    ///
-    /// # Errors
-    ///
-    /// As [`mean`](Self::mean), and [`wake_nn::Error::InvalidOption`] when an earlier stage was begun with
-    /// other values.
-    pub fn diffusion(&mut self) -> Result<()> {
-        if let Some(earlier) = self.earlier(WakeStage::Words)? {
-            self.words_with(&earlier)?;
+    /// Trains the flow, after all parts that are not trained yet.
+    pub(super) fn train_flow(&mut self, options: &StageOptions) -> Result<()> {
+        if let Some(earlier) = self.earlier(Part::Parser)? {
+            self.train_parser(&earlier)?;
         }
-        if let Some(earlier) = self.earlier(WakeStage::Mean)? {
-            self.mean_with(&earlier)?;
+        if let Some(earlier) = self.earlier(Part::Prior)? {
+            self.train_prior(&earlier)?;
         }
-        let (config, options) = (self.config.clone(), self.options.clone());
+        let config = self.config.clone();
         let device = options.device();
         let model = WakeModel {
             patches: self.patches()?,
-            parser: self.part(config.init_parser(&device), PARSER)?,
-            prior: self.part(config.init_prior(&device), PRIOR)?,
+            parser: self.trained(config.init_parser(&device), Part::Parser)?,
+            prior: self.trained(config.init_prior(&device), Part::Prior)?,
             flow: config.init_flow(&device),
         };
         let set = self.latents(&model.patches)?;
         let pairs = self.pairs()?;
         let identity = json!({
-            "data": pairs.identity(), "patches": self.fingerprint(PATCHES)?, "prior": self.fingerprint(PRIOR)?,
+            "data": pairs.identity(), "patches": self.fingerprint(Part::Patches)?, "prior": self.fingerprint(Part::Prior)?,
         });
         let set = counted("residuals", set.len() as u64, self.progress, |done| {
             set.residuals(&model.prior, |n| done(n as u64))
         });
         let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
         let run = Run::new(
-            WakeStage::Diffusion.name(),
+            Part::Flow.name(),
             &config,
             init,
-            options.run(&WakeStage::Diffusion.usual(), identity),
+            options.run(&defaults(Part::Flow), identity),
             options.learning_devices()?,
         )?;
         let task = FlowTask {
@@ -58,7 +54,7 @@ impl WakeTraining<'_> {
         };
         let examples = pairs.first(ACROSS)?;
         let scenes: Vec<Scene> = examples.iter().map(|pair| pair.scene.clone()).collect();
-        let (weights, sheet) = (self.out(FLOW), self.out(SHEET));
+        let (weights, sheet) = (self.out(Part::Flow.file()), self.out(SHEET));
         let show = |run: &Run<Flow>| {
             let flow = run.averaged();
             keep(&flow, &weights)?;
@@ -70,7 +66,7 @@ impl WakeTraining<'_> {
             let drawn: Vec<Vec<f32>> = drawn.into_iter().map(|image| image.grey.values).collect();
             write_sheet(&examples, &drawn, &sheet)
         };
-        let stage = Self::stage(WakeStage::Diffusion, &options);
+        let stage = Self::stage(Part::Flow, options);
         stage.train(&mut self.folder, run, &task, self.progress, show)
     }
 }

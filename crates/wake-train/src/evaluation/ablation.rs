@@ -18,7 +18,7 @@ const SQUARE: usize = 8;
 
 /// What one kind of image has of a sea, means over the scenes.
 #[derive(Debug, Clone, Serialize)]
-pub struct RungRow {
+pub struct AblationRow {
     /// Kind of image.
     pub image: &'static str,
     /// Skewness of the grey that is left when the expected image is subtracted; 0 of a Gaussian field.
@@ -46,12 +46,12 @@ pub struct RungRow {
 /// # Errors
 ///
 /// As [`ImageSource::draw`] and [`told_apart`].
-pub fn rungs(
+pub(super) fn ablation(
     scenes: &[Scene],
     kinds: &[(&'static str, &dyn ImageSource)],
     device: &Device,
     mut step: impl FnMut(),
-) -> Result<Vec<RungRow>> {
+) -> Result<Vec<AblationRow>> {
     let draw = |source: &dyn ImageSource, scenes: &[Scene]| -> Result<Vec<Field>> {
         let images = draw_all(source, scenes, Told::Both, |_| {})?;
         Ok(images.iter().map(grey).collect())
@@ -79,7 +79,7 @@ fn row(
     images: &[Field],
     expected: &[Field],
     two_sample: Option<TwoSample>,
-) -> RungRow {
+) -> AblationRow {
     let mut shapes: Vec<SeaShape> = Vec::new();
     let (mut crests, mut borders) = (Vec::new(), Vec::new());
     for ((scene, image), expected) in scenes.iter().zip(images).zip(expected) {
@@ -96,7 +96,7 @@ fn row(
         let values: Vec<f64> = shapes.iter().map(value).collect();
         mean(&values)
     };
-    RungRow {
+    AblationRow {
         image,
         skewness: of(&|s| s.skewness),
         kurtosis: of(&|s| s.kurtosis),

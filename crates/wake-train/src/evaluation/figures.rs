@@ -1,0 +1,226 @@
+//! All figures of a model on held-out scenes, in one call.
+
+use burn::tensor::Device;
+use serde::Serialize;
+use wake_physics::Scene;
+
+use super::ablation::{AblationRow, ablation};
+use super::baseline::Baseline;
+use super::comparison::Comparison;
+use super::controllability::{ControllabilityRow, controllability};
+use super::held_out::held_out;
+use super::measurements::MeasurementRow;
+use super::pixels::PixelRow;
+use super::reading::{Quantity, Reading};
+use super::source::{BATCH, ImageSource, Told};
+use super::wake_correlation::{WakeCorrelation, wake_correlation};
+use crate::error::Result;
+use crate::metrics::Lpips;
+
+/// First index of the scenes whose values are changed: apart from those of the other figures.
+const FIRST_CHANGED: u64 = 1 << 20;
+
+/// What is judged, and how much is drawn for it.
+#[derive(Clone)]
+pub struct Evaluation<'a> {
+    /// What draws the images.
+    pub source: &'a dyn ImageSource,
+    /// Its name in the report.
+    pub name: &'static str,
+    /// Whether it is a model, not the simulator in its place.
+    pub has_network: bool,
+    /// A model of images and prompts alone, beside it.
+    pub text_to_image: Option<&'a dyn ImageSource>,
+    /// What the source can be told besides sentence and numbers together; none for the simulator.
+    pub conditions: Vec<Told>,
+    /// Scenes; some figures take a share of them.
+    pub scenes: usize,
+}
+
+/// Every figure of an [`Evaluation`].
+#[derive(Debug, Serialize)]
+pub struct Figures {
+    /// What was judged.
+    pub judged: &'static str,
+    /// Number of scenes.
+    pub scenes: usize,
+    /// Pixel by pixel beside simulated images.
+    pub pixels: Vec<PixelRow>,
+    /// From the dumbest image to the simulator's.
+    pub ablation: Vec<AblationRow>,
+    /// Speckle after it is applied.
+    pub speckle: Speckle,
+    /// Mean images of a wake over many seas.
+    pub wake_correlation: WakeCorrelation,
+    /// What can be read from the images.
+    pub measurements: Vec<MeasurementRow>,
+    /// The same when the source is told less.
+    pub conditions: Vec<ConditionRow>,
+    /// Whether images follow a value that is changed.
+    pub controllability: Vec<ControllabilityRow>,
+}
+
+/// The open sea's equivalent number of looks, median over the scenes.
+#[derive(Debug, Serialize)]
+pub struct Speckle {
+    /// Looks of the scenes' radar.
+    pub looks: u32,
+    /// In simulated images.
+    pub simulator: Option<f64>,
+    /// In those of the source.
+    pub model: Option<f64>,
+}
+
+/// The measurements under one condition.
+#[derive(Debug, Serialize)]
+pub struct ConditionRow {
+    /// What the source was told.
+    pub told: &'static str,
+    /// What can be read from its images then.
+    pub measurements: Vec<MeasurementRow>,
+}
+
+impl std::fmt::Debug for Evaluation<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Evaluation")
+            .field("name", &self.name)
+            .field("scenes", &self.scenes)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Evaluation<'a> {
+    /// Kinds of images from the dumbest upward, without the simulator's own.
+    #[must_use]
+    pub fn kinds(&self) -> Vec<(&'static str, &'a dyn ImageSource)> {
+        let baseline = |of: &'static Baseline| (of.name(), of as &dyn ImageSource);
+        let mut kinds = vec![
+            baseline(&Baseline::Constant),
+            baseline(&Baseline::Expected),
+            baseline(&Baseline::Gaussian),
+        ];
+        if self.has_network {
+            kinds.push(("model", self.source));
+        }
+        if let Some(source) = self.text_to_image {
+            kinds.push(("text to image", source));
+        }
+        kinds.push(baseline(&Baseline::OtherSea));
+        kinds
+    }
+
+    fn wake_scenes(&self) -> usize {
+        self.scenes.div_ceil(12)
+    }
+
+    fn condition_scenes(&self) -> usize {
+        self.scenes.div_ceil(4)
+    }
+
+    fn pairs(&self) -> usize {
+        self.scenes.div_ceil(5)
+    }
+
+    /// How much [`figures`](Self::figures) counts in all.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        let conditions = self.condition_scenes() * self.conditions.len();
+        let pairs = Quantity::ALL.len() * self.pairs();
+        let kinds = self.kinds().len() + 1;
+        (self.scenes + 8 * self.wake_scenes() + conditions + pairs + kinds) as u64
+    }
+
+    /// Draws everything and counts.
+    ///
+    /// - `lpips`: compares pixels as the paper does, if it is there
+    /// - `device`: of the judges, one that holds no gradients
+    /// - `step`: told what is drawn, and how much more of it was done
+    ///
+    /// # Errors
+    ///
+    /// As [`ImageSource::draw`].
+    ///
+    /// # Panics
+    ///
+    /// Without any scene.
+    pub fn figures(
+        &self,
+        lpips: Option<&Lpips>,
+        device: &Device,
+        step: &dyn Fn(&'static str, u64),
+    ) -> Result<Figures> {
+        let scenes: Vec<Scene> = (0..self.scenes as u64).map(held_out).collect();
+        let mut compared = Comparison::default();
+        for batch in scenes.chunks(BATCH) {
+            compared.add(batch, self.source, self.text_to_image, lpips)?;
+            step("pixels and values", batch.len() as u64);
+        }
+        let ablation = ablation(&scenes, &self.kinds(), device, || step("ablation", 1))?;
+        let with_wake = &scenes[..self.wake_scenes()];
+        let wake_correlation =
+            wake_correlation(with_wake, self.source, || step("wake correlation", 8))?;
+        let conditions = self.conditions(&scenes[..self.condition_scenes()], &compared, step)?;
+        let controllability = self.controllability(step)?;
+        let [simulator, model] = compared.looks();
+        Ok(Figures {
+            judged: self.name,
+            scenes: scenes.len(),
+            pixels: compared.pixels(),
+            ablation,
+            speckle: Speckle {
+                looks: scenes[0].radar.looks,
+                simulator,
+                model,
+            },
+            wake_correlation,
+            measurements: MeasurementRow::of_all(
+                &scenes,
+                &compared.simulated,
+                Some(&compared.generated),
+                Some(&compared.gaussian),
+            ),
+            conditions,
+            controllability,
+        })
+    }
+
+    /// The measurements when the source is told less.
+    fn conditions(
+        &self,
+        scenes: &[Scene],
+        compared: &Comparison,
+        step: &dyn Fn(&'static str, u64),
+    ) -> Result<Vec<ConditionRow>> {
+        let simulated = &compared.simulated[..scenes.len()];
+        let row = |told: Told, generated: &[Reading]| ConditionRow {
+            told: told.name(),
+            measurements: MeasurementRow::of_all(scenes, simulated, Some(generated), None),
+        };
+        let mut all = vec![row(Told::Both, &compared.generated[..scenes.len()])];
+        for &told in &self.conditions {
+            let read = Reading::of_source(self.source, scenes, told, |n| step("conditions", n))?;
+            all.push(row(told, &read));
+        }
+        Ok(all)
+    }
+
+    /// Pairs of scenes of which one value is changed.
+    fn controllability(&self, step: &dyn Fn(&'static str, u64)) -> Result<Vec<ControllabilityRow>> {
+        let told = [&[Told::Both][..], &self.conditions].concat();
+        let mut rows = Vec::new();
+        for quantity in Quantity::ALL {
+            let first = FIRST_CHANGED + ((quantity as u64) << 12);
+            let scenes = (first..first + self.pairs() as u64).map(held_out);
+            let scenes: Vec<Scene> = scenes.collect();
+            let done = || step("controllability", 1);
+            rows.extend(controllability(
+                quantity,
+                &scenes,
+                self.source,
+                &told,
+                done,
+            )?);
+        }
+        Ok(rows)
+    }
+}
