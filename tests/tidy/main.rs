@@ -219,7 +219,7 @@ fn code_of_the_front_page_is_compiled() {
     let tested = [
         "crates/wake-physics/README.md",
         "crates/wake-ldm/README.md",
-        "crates/wake-dataset/src/loader.rs",
+        "crates/wake-dataset/src/batch.rs",
         "crates/wake-detector/README.md",
     ];
     let tested: Vec<Vec<String>> = tested.iter().flat_map(|name| blocks_of(name)).collect();

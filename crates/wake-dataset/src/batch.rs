@@ -225,7 +225,7 @@ mod tests {
     /// Row by row the box, the class and the image of every object.
     #[test]
     fn boxes_are_those_of_the_objects() {
-        let batch = ToBatch.batch(source().items(0..6).unwrap(), &Device::default());
+        let batch = ToBatch.batch(source().items(0..30).unwrap(), &Device::default());
         let rows: Vec<f32> = batch.boxes.clone().into_data().try_to_vec().unwrap();
         let mut rows = rows.chunks(6);
         assert_eq!(

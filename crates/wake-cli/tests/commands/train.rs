@@ -78,7 +78,7 @@ fn the_stages_make_a_model_that_generates_and_a_stopped_run_goes_on() {
     train(&["prior", "--steps", "2"]);
     train(&["flow", "--steps", "2"]);
     train(&["flow", "--steps", "3", "--resume"]);
-    let log = std::fs::read_to_string(out.join("diffusion.jsonl")).expect("a log");
+    let log = std::fs::read_to_string(out.join("flow.jsonl")).expect("a log");
     assert_eq!(log.lines().count(), 3, "{log}");
     let images = folder.path().join("images");
     done(
@@ -186,7 +186,7 @@ fn a_folder_belongs_to_one_run() {
     let out = toys.path("run");
     toys.refused(
         &["parser", "--steps", "2"],
-        &["stage words has made 3 steps", "resume goes on"],
+        &["stage parser has made 3 steps", "resume goes on"],
     );
     toys.refused(
         &["parser", "--steps", "4", "--resume", "--rate", "1e-2"],
@@ -269,7 +269,7 @@ fn many_kills_change_no_weight() {
     done("train wake-model", &arguments, &whole);
     let resumed = [&arguments[..], &["--resume"]].concat();
     let has_begun = || {
-        let checkpoints = std::fs::read_dir(killed.join("checkpoints/words"));
+        let checkpoints = std::fs::read_dir(killed.join("checkpoints/parser"));
         checkpoints.is_ok_and(|entries| {
             let names = entries.filter_map(|entry| Some(entry.ok()?.file_name()));
             names
@@ -310,7 +310,7 @@ fn a_damaged_checkpoint_or_image_is_named() {
     toys.train(&["prior", "--steps", "4", "--every", "2"]);
     let out = toys.path("run");
     let weights = std::fs::read(out.join("prior.safetensors")).expect("weights");
-    let newest = out.join("checkpoints/mean/step-00000004");
+    let newest = out.join("checkpoints/prior/step-00000004");
     for name in ["tensors.safetensors", "state.json"] {
         let file = newest.join(name);
         let whole = std::fs::read(&file).expect("a file");

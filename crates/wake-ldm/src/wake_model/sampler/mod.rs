@@ -23,11 +23,9 @@ use crate::wake_model::network::{
     expected_greys, images_of, slope_of,
 };
 use crate::wake_model::sea_texture::SeaTexture;
-pub use image::speckled;
-pub use image::{SampleSeconds, WakeImage};
-use wake_nn::check_finite;
-use wake_nn::check_range;
+pub use image::{SampleSeconds, WakeImage, speckled};
 use wake_nn::noise::NoiseSource;
+use wake_nn::{check_finite, check_range};
 
 /// Steps from noise to image, unless others are asked for.
 const STEPS: usize = 3;
@@ -65,7 +63,7 @@ pub struct WakeSampler {
     device: Device,
     windows: ChannelWindows,
     steps: usize,
-    conditioning: PromptMode,
+    prompt_mode: PromptMode,
     sea: Option<SeaTexture>,
 }
 
@@ -90,7 +88,7 @@ impl WakeSampler {
             model,
             config,
             steps: STEPS,
-            conditioning: PromptMode::default(),
+            prompt_mode: PromptMode::default(),
             sea: None,
         })
     }
@@ -107,9 +105,9 @@ impl WakeSampler {
 
     /// The same sampler with a model that sees less.
     #[must_use]
-    pub fn with_prompt_mode(self, conditioning: PromptMode) -> Self {
+    pub fn with_prompt_mode(self, prompt_mode: PromptMode) -> Self {
         Self {
-            conditioning,
+            prompt_mode,
             ..self
         }
     }
@@ -192,9 +190,8 @@ impl WakeSampler {
                 scene,
             })
         };
-        let inputs = (0..).zip(prompts).map(input);
-        let inputs: Vec<Input> = inputs.collect::<Result<_>>()?;
-        self.run(&inputs, begin)?.images()
+        let inputs: Result<Vec<Input>> = (0..).zip(prompts).map(input).collect();
+        self.run(&inputs?, begin)?.images()
     }
 
     /// An image of each scene.
@@ -204,8 +201,7 @@ impl WakeSampler {
     /// As [`sample_batch`](Self::sample_batch).
     pub fn sample_scenes(&self, scenes: &[Scene]) -> Result<Vec<WakeImage>> {
         let begin = Instant::now();
-        let inputs = self.inputs(scenes)?;
-        self.run(&inputs, begin)?.images()
+        self.run(&self.inputs(scenes)?, begin)?.images()
     }
 
     /// An image of each scene, in one batch on the device, without speckle but that of a learnt sea, and the labels of what
@@ -232,7 +228,7 @@ impl WakeSampler {
             self.config.check_scene(scene)?;
             Ok(Input {
                 unread: None,
-                words: match self.conditioning {
+                words: match self.prompt_mode {
                     PromptMode::Words => Wording::Paper.prompt(scene)?,
                     _ => String::new(),
                 },
@@ -273,10 +269,8 @@ impl WakeSampler {
                 seconds,
             });
         }
-        let sources: Vec<NoiseSource> = scenes
-            .iter()
-            .map(|scene| NoiseSource::new(scene.seed))
-            .collect();
+        let sources = scenes.iter().map(|scene| NoiseSource::new(scene.seed));
+        let sources: Vec<NoiseSource> = sources.collect();
         // Neither needs the other, and one of a single image does not fill all cores.
         let (expected, seas) = rayon::join(
             || expected_greys(&scenes, &self.config.grey),
@@ -313,7 +307,7 @@ impl WakeSampler {
 
     /// The scenes that are drawn: as they are given, or with what the model reads in words that the grammar did not understand.
     fn resolved(&self, inputs: &[Input]) -> Result<Vec<Scene>> {
-        let asked = |input: &Input| match self.conditioning {
+        let asked = |input: &Input| match self.prompt_mode {
             // Of words that are all understood the model would only add what they do not say.
             PromptMode::Both => input.unread.is_some(),
             PromptMode::Words => true,
@@ -330,7 +324,7 @@ impl WakeSampler {
             let Some(read) = asked(input).then(|| answers.next()).flatten() else {
                 return Ok(input.scene.clone());
             };
-            let (stated, base) = match self.conditioning {
+            let (stated, base) = match self.prompt_mode {
                 PromptMode::Words => (PartialScene::default(), self.unspoken(&input.scene)),
                 _ => (input.unread.unwrap_or_default(), input.scene.clone()),
             };
@@ -430,11 +424,10 @@ impl Drawn {
             Pixels::Grey(pixels) => pixels,
             Pixels::WithSpeckle(intensities) => {
                 let images = intensities.into_par_iter().zip(self.scenes);
-                return Ok(images
-                    .map(|(image, scene)| {
-                        WakeImage::with_speckle(image, self.scale, scene, self.seconds)
-                    })
-                    .collect());
+                let drawn = |(image, scene)| {
+                    WakeImage::with_speckle(image, self.scale, scene, self.seconds)
+                };
+                return Ok(images.map(drawn).collect());
             }
         };
         let images = pixels.par_chunks(rows * columns);
