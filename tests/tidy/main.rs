@@ -27,6 +27,7 @@ const CRATES: [&str; 9] = [
     "wake-detector",
     "wake-train",
     "wake-geo",
+    "wake-product",
 ];
 
 /// Longest source file [lines]: tests are not counted.

@@ -72,6 +72,16 @@ fn is_failure(error: &(dyn Error + 'static)) -> bool {
             _ => false,
         };
     }
+    #[cfg(feature = "simulate")]
+    if let Some(error) = error.downcast_ref::<wake_product::Error>() {
+        use wake_product::Error as E;
+        return match error {
+            E::Product(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            E::File(error) => is_failure(error),
+            _ => false,
+        };
+    }
     #[cfg(feature = "locate")]
     if let Some(error) = error.downcast_ref::<wake_geo::Error>() {
         return matches!(error, wake_geo::Error::Unwritable { .. });
