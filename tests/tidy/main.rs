@@ -28,6 +28,7 @@ const CRATES: [&str; 9] = [
     "wake-train",
     "wake-geo",
     "wake-product",
+    "wake-map",
 ];
 
 /// Longest source file [lines]: tests are not counted.

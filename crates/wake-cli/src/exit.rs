@@ -60,6 +60,15 @@ fn is_failure(error: &(dyn Error + 'static)) -> bool {
         };
     }
     #[cfg(feature = "detect")]
+    if let Some(error) = error.downcast_ref::<wake_map::Error>() {
+        use wake_map::Error as E;
+        return match error {
+            E::Product(error) => is_failure(error),
+            E::File(error) => is_failure(error),
+            _ => false,
+        };
+    }
+    #[cfg(feature = "detect")]
     if let Some(wake_detector::Error::Model(error)) = error.downcast_ref() {
         return is_failure(error);
     }
