@@ -29,12 +29,18 @@ fn dependencies(name: &str, features: &str) -> BTreeSet<String> {
 /// The crates of the architecture page depend on nothing that they may not know.
 #[test]
 fn crates_do_not_know_what_they_may_not() {
-    let cases: [(&str, &str, &[&str]); 12] = [
+    let cases: [(&str, &str, &[&str]); 14] = [
         ("whole-files", "", &["burn", "wake-"]),
         ("wake-nn", "flex", &["wake-"]),
         ("wake-nn", "", &["burn", "wake-"]),
         ("wake-physics", "", &["burn", "wake-"]),
         ("wake-geo", "", &["burn", "wake-"]),
+        ("wake-product", "", &["burn", "wake-text", "wake-dataset"]),
+        (
+            "wake-map",
+            "",
+            &["wake-physics", "wake-text", "wake-dataset", "wake-ldm"],
+        ),
         ("wake-text", "scene", &["burn"]),
         ("wake-text", "", &["burn", "wake-"]),
         ("wake-dataset", "", &["burn", "wake-ldm", "wake-train"]),

@@ -27,6 +27,8 @@ const CRATES: [&str; 9] = [
     "wake-detector",
     "wake-train",
     "wake-geo",
+    "wake-product",
+    "wake-map",
 ];
 
 /// Longest source file [lines]: tests are not counted.

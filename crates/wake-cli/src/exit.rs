@@ -60,6 +60,15 @@ fn is_failure(error: &(dyn Error + 'static)) -> bool {
         };
     }
     #[cfg(feature = "detect")]
+    if let Some(error) = error.downcast_ref::<wake_map::Error>() {
+        use wake_map::Error as E;
+        return match error {
+            E::Product(error) => is_failure(error),
+            E::File(error) => is_failure(error),
+            _ => false,
+        };
+    }
+    #[cfg(feature = "detect")]
     if let Some(wake_detector::Error::Model(error)) = error.downcast_ref() {
         return is_failure(error);
     }
@@ -69,6 +78,16 @@ fn is_failure(error: &(dyn Error + 'static)) -> bool {
         return match error {
             E::Io { action, .. } => is_of_writing(action),
             E::NotFinite { .. } | E::WrongNumbers { .. } => true,
+            _ => false,
+        };
+    }
+    #[cfg(feature = "simulate")]
+    if let Some(error) = error.downcast_ref::<wake_product::Error>() {
+        use wake_product::Error as E;
+        return match error {
+            E::Product(error) => is_failure(error),
+            E::Scene(error) => is_failure(error),
+            E::File(error) => is_failure(error),
             _ => false,
         };
     }

@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A progress bar of so many `things`.
-#[cfg(any(feature = "dataset", feature = "generate", feature = "detect"))]
+#[cfg(any(feature = "simulate", feature = "detect"))]
 pub(crate) fn bar(length: u64, things: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}, {per_sec}, {eta} left");
     ProgressBar::new(length)

@@ -9,7 +9,8 @@ use crate::error::{Result, check_range};
 use crate::image::GreyImage;
 use crate::maps::Maps;
 use crate::network::{INPUTS, Network, STRIDE};
-use crate::search::{Mapper, Search, find};
+use crate::raster::Raster;
+use crate::search::{Mapper, Search, Tile, find, in_tile, merged};
 use crate::self_check::self_check;
 use crate::wake::Detection;
 
@@ -92,7 +93,24 @@ impl Detector {
     /// The wakes of an image, the surest first; each is told once.
     #[must_use]
     pub fn find(&self, image: &GreyImage) -> Vec<Detection> {
-        find(image, self, self.search)
+        let Ok(found) = find(image, self, self.search);
+        found
+    }
+
+    /// The wakes of one of the [`Tile`]s of an image that is read window by window; [`merged`](Self::merged) puts those of all
+    /// tiles together.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Raster::window`].
+    pub fn find_in<R: Raster>(&self, image: &R, tile: &Tile) -> Result<Vec<Detection>, R::Error> {
+        in_tile(image, tile, self, self.search)
+    }
+
+    /// The wakes of all tiles, each told once, the surest first.
+    #[must_use]
+    pub fn merged(found: Vec<Detection>) -> Vec<Detection> {
+        merged(found)
     }
 }
 

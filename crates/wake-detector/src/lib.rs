@@ -5,6 +5,7 @@ mod error;
 mod files;
 mod image;
 pub mod normalize;
+mod raster;
 mod scaling;
 mod wake;
 
@@ -12,6 +13,7 @@ pub mod network;
 pub mod self_check;
 
 mod maps;
+mod missing;
 mod search;
 
 mod detector;
@@ -28,4 +30,6 @@ pub use error::{Error, Result};
 pub use files::{image_files, image_name, picture_name};
 pub use finder::{Finder, Radon};
 pub use image::GreyImage;
+pub use raster::Raster;
+pub use search::Tile;
 pub use wake::{Detection, Wake, angle_of, direction};

@@ -180,9 +180,9 @@ type Sums = [Option<f32>; LENGTHS.len()];
 /// sea, beyond that of the threshold.
 #[must_use]
 pub fn find(image: &GreyImage) -> Vec<Detection> {
-    let tiles = Tile::all(image);
+    let tiles = Tile::all(image.rows, image.columns);
     let found = tiles.iter().flat_map(|tile| {
-        let (rows, columns, pixels) = tile.pixels(image);
+        let Ok((rows, columns, pixels)) = tile.pixels(image);
         let found = in_sea(&Sea::of(&pixels, rows, columns), tiles.len());
         found.into_iter().filter_map(|one| {
             Some(Detection {

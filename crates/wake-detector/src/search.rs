@@ -1,9 +1,10 @@
 //! The search of an image: tiles, scales, network, wakes.
 
-use crate::image::GreyImage;
 use crate::maps::{Maps, same, without_repeats};
+use crate::missing::filled;
 use crate::network::{MULTIPLE, STRIDE};
 use crate::normalize;
+use crate::raster::Raster;
 use crate::scaling::rescaled;
 use crate::wake::{Detection, Wake};
 
@@ -37,12 +38,21 @@ pub(crate) struct Search {
 }
 
 /// The wakes of an image, the surest first; tips in pixels (column, row) from the centre of the first one.
-pub(crate) fn find(image: &GreyImage, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
-    let in_tile = |tile: Tile| in_tile(image, &tile, mapper, search);
-    without_repeats(
-        Tile::all(image).into_iter().flat_map(in_tile).collect(),
-        NEAR,
-    )
+pub(crate) fn find<R: Raster>(
+    image: &R,
+    mapper: &dyn Mapper,
+    search: Search,
+) -> Result<Vec<Detection>, R::Error> {
+    let mut found = Vec::new();
+    for tile in Tile::all(image.rows(), image.columns()) {
+        found.extend(in_tile(image, &tile, mapper, search)?);
+    }
+    Ok(merged(found))
+}
+
+/// What the tiles of an image hold, each wake once, the surest first.
+pub(crate) fn merged(found: Vec<Detection>) -> Vec<Detection> {
+    without_repeats(found, NEAR)
 }
 
 /// The wakes of all scales, each told once, its score raised where other scales see it, too.
@@ -73,7 +83,7 @@ fn agreed(by_scale: Vec<Vec<Detection>>) -> Vec<Detection> {
 
 /// A part of an image whose tips are told together, and its surroundings, that are seen with it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Tile {
+pub struct Tile {
     /// First row and column of the part, and the ones behind its last.
     part: [[usize; 2]; 2],
     /// The same of what is seen.
@@ -84,10 +94,11 @@ pub(crate) struct Tile {
 
 impl Tile {
     /// The tiles of an image; a small one is one tile.
-    pub(crate) fn all(image: &GreyImage) -> Vec<Self> {
-        let sides = [image.rows, image.columns];
-        let columns = tiles(image.columns);
-        let places = tiles(image.rows)
+    #[must_use]
+    pub fn all(rows: usize, columns: usize) -> Vec<Self> {
+        let sides = [rows, columns];
+        let columns = tiles(columns);
+        let places = tiles(rows)
             .into_iter()
             .flat_map(|r| columns.iter().map(move |&c| [r, c]));
         let tile = |[(top, rows), (left, columns)]: [(usize, usize); 2]| {
@@ -105,20 +116,20 @@ impl Tile {
     }
 
     /// Rows, columns and pixels of what is seen.
-    pub(crate) fn pixels(&self, image: &GreyImage) -> (usize, usize, Vec<f32>) {
+    pub(crate) fn pixels<R: Raster>(
+        &self,
+        image: &R,
+    ) -> Result<(usize, usize, Vec<f32>), R::Error> {
         let [begin, end] = self.seen;
         let [rows, columns] = [0, 1].map(|a| end[a] - begin[a]);
-        (
-            rows,
-            columns,
-            image.window(begin[0], begin[1], rows, columns),
-        )
+        let pixels = image.window(begin[0], begin[1], rows, columns)?;
+        Ok((rows, columns, pixels))
     }
 
     /// A wake found in the scaled pixels as it lies in the image; `None` where its tip lies in another tile.
-    pub(crate) fn placed(&self, mut wake: Wake, factor: f32) -> Option<Wake> {
-        wake.tip = [0, 1].map(|a| (wake.tip[a] + 0.5) / factor - 0.5 + self.seen[0][1 - a] as f32);
-        wake.length /= factor;
+    pub(crate) fn placed(&self, wake: Wake, factor: f32) -> Option<Wake> {
+        let mut wake = unscaled(wake, factor);
+        wake.tip = [0, 1].map(|a| wake.tip[a] + self.seen[0][1 - a] as f32);
         let inside = |a: usize| {
             let [begin, end] = [self.part[0][a], self.part[1][a]];
             let low = if begin == 0 { f32::MIN } else { begin as f32 };
@@ -133,6 +144,13 @@ impl Tile {
     }
 }
 
+/// A wake found in scaled pixels, in those of the window.
+fn unscaled(mut wake: Wake, factor: f32) -> Wake {
+    wake.tip = wake.tip.map(|x| (x + 0.5) / factor - 0.5);
+    wake.length /= factor;
+    wake
+}
+
 /// First pixels of the tiles and their sizes: few enough pixels are one tile.
 fn tiles(size: usize) -> Vec<(usize, usize)> {
     if size <= TILE + 2 * MARGIN {
@@ -145,24 +163,34 @@ fn tiles(size: usize) -> Vec<(usize, usize)> {
         .collect()
 }
 
-fn in_tile(image: &GreyImage, tile: &Tile, mapper: &dyn Mapper, search: Search) -> Vec<Detection> {
-    let (rows, columns, pixels) = tile.pixels(image);
+/// The wakes of a tile.
+pub(crate) fn in_tile<R: Raster>(
+    image: &R,
+    tile: &Tile,
+    mapper: &dyn Mapper,
+    search: Search,
+) -> Result<Vec<Detection>, R::Error> {
+    let (rows, columns, mut pixels) = tile.pixels(image)?;
+    let Some(missing) = filled(&mut pixels, columns) else {
+        return Ok(Vec::new());
+    };
     let at = |factor: f32| -> Vec<Detection> {
         let maps = at_scale(&pixels, rows, columns, factor, mapper);
         let sure = maps
             .detections()
             .into_iter()
             .filter(|one| one.score >= search.least_score);
-        sure.filter_map(|one| {
-            Some(Detection {
-                wake: tile.placed(one.wake, factor)?,
-                ..one
+        sure.filter(|one| missing.leaves(&unscaled(one.wake, factor)))
+            .filter_map(|one| {
+                Some(Detection {
+                    wake: tile.placed(one.wake, factor)?,
+                    ..one
+                })
             })
-        })
-        .collect()
+            .collect()
     };
     let scales = scales(&pixels, rows, columns, search.spacing);
-    agreed(scales.into_iter().map(at).collect())
+    Ok(agreed(scales.into_iter().map(at).collect()))
 }
 
 /// The factors by which an image is scaled before the network sees it.
@@ -232,6 +260,7 @@ fn at_scale(pixels: &[f32], rows: usize, columns: usize, factor: f32, mapper: &d
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::GreyImage;
     use crate::network::{INPUTS, Map, OUTPUTS};
     use wake_nn::noise::NoiseSource;
 
@@ -324,7 +353,7 @@ mod tests {
             }
         }
         assert!(tiles(columns).len() > 1 && tiles(rows).len() > 1);
-        let found = find(
+        let Ok(found) = find(
             &GreyImage::from_levels(rows, columns, &levels),
             &Bright,
             SEARCH,
@@ -353,9 +382,10 @@ mod tests {
         let noise = |i: usize| ((i * 2_654_435_761) % 1009) as f32 / 4.0;
         for (rows, columns) in [(1, 1), (17, 4000), (5, 3), (64, 64)] {
             let flat = GreyImage::from_levels(rows, columns, &vec![120.0; rows * columns]);
-            assert!(find(&flat, &Bright, SEARCH).is_empty());
+            let Ok(found) = find(&flat, &Bright, SEARCH);
+            assert!(found.is_empty());
             let levels: Vec<f32> = (0..rows * columns).map(noise).collect();
-            find(
+            let Ok(_) = find(
                 &GreyImage::from_levels(rows, columns, &levels),
                 &Bright,
                 SEARCH,

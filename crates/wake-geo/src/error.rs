@@ -107,6 +107,19 @@ pub enum Error {
         size_pixels: usize,
     },
 
+    /// A part of an image that cannot be cut out.
+    #[error(
+        "the part of lines {lines:?} and pixels {pixels:?} cannot be cut out of an image of {size_lines} lines and \
+         {size_pixels} pixels; give a part inside it of at least {smallest} of both"
+    )]
+    Part {
+        lines: std::ops::Range<usize>,
+        pixels: std::ops::Range<usize>,
+        size_lines: usize,
+        size_pixels: usize,
+        smallest: usize,
+    },
+
     /// A file that could not be written as asked.
     #[error("cannot write {}: {why}", shown(path))]
     Unwritable { path: PathBuf, why: String },

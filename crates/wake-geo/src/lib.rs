@@ -23,6 +23,7 @@ mod safe;
 
 // What is asked of them.
 mod product;
+mod land;
 mod locate;
 
 pub use error::{Error, Result};
@@ -31,6 +32,7 @@ pub use geolocation::{Affine, GridPoint};
 pub use geotiff::{
     Compression, GeoTiff, GeoTiffLayout, Placement, SampleType, TiffSample, write_geotiff,
 };
+pub use land::{Land, LandMask};
 pub use locate::{Located, locate};
 pub use place::{PixelAxes, Place};
 pub use product::{Product, Values};

@@ -64,3 +64,25 @@ pub(crate) fn check_window(
         }),
     }
 }
+
+/// Checks that a part lies in an image of that many lines and pixels, and has at least `smallest` of both.
+pub(crate) fn check_part(
+    lines: &Range<usize>,
+    pixels: &Range<usize>,
+    (size_lines, size_pixels): (usize, usize),
+    smallest: usize,
+) -> Result<()> {
+    let fits = |range: &Range<usize>, size| {
+        range.start < range.end && range.end <= size && range.len() >= smallest
+    };
+    match fits(lines, size_lines) && fits(pixels, size_pixels) {
+        true => Ok(()),
+        false => Err(Error::Part {
+            lines: lines.clone(),
+            pixels: pixels.clone(),
+            size_lines,
+            size_pixels,
+            smallest,
+        }),
+    }
+}

@@ -1,5 +1,6 @@
 //! What is asked for on the command line.
 
+use super::product::ProductArguments;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -38,6 +39,8 @@ pub(crate) struct Arguments {
     /// Print the report as JSON on standard output, and nothing else
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) product: ProductArguments,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

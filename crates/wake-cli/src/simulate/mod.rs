@@ -3,6 +3,7 @@
 mod across;
 mod arguments;
 mod compare;
+mod product;
 mod real;
 mod results;
 
@@ -23,8 +24,12 @@ const ACROSS: usize = 3;
 /// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`, of several scenes into a folder each; with
 /// `--overlay` the picture with its labels drawn, `overlay.png`; with `--export` every field as a NumPy array or a TIFF with
 /// the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
-/// `comparison.json`, and quick-looks of what was simulated, `sheet.png`.
+/// `comparison.json`, and quick-looks of what was simulated, `sheet.png`. With `--product` a Sentinel-1 product of a real place.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
+    if let Some(template) = &arguments.product.product {
+        let (changes, out) = (&arguments.set, &arguments.out);
+        return product::run(&arguments.product, template, changes, out, arguments.json);
+    }
     let scenes = scenes(arguments)?;
     // A scene that cannot be simulated leaves no folder behind.
     let plans = scenes.iter().map(|(_, scene)| Plan::new(scene));

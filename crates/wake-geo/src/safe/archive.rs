@@ -54,6 +54,9 @@ impl Archive {
                 check_count(path, names.len())?;
             }
         }
+        if path.join("manifest.safe").is_file() {
+            names.push("manifest.safe".to_owned());
+        }
         names.sort();
         Ok(Self {
             path: path.to_owned(),

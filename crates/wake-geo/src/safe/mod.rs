@@ -7,6 +7,10 @@ mod lut;
 mod noise;
 mod orbit;
 mod sigma;
+mod tree;
+
+mod cut;
+mod write;
 
 use std::ops::Range;
 use std::path::Path;

@@ -1,4 +1,6 @@
-//! `wake detect`: searches images, draws them with their wakes, and tells them as JSON.
+//! `wake detect`: searches images, draws them with their wakes, and tells them as JSON; of products as a map.
+
+mod product;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -26,7 +28,8 @@ enum Method {
 /// Find ship wakes in radar images.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Arguments {
-    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them, whose *.wakes.png are left out
+    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them, whose *.wakes.png are left out; or one satellite
+    /// product: a Sentinel-1 .SAFE folder or .zip, or a GeoTIFF
     #[arg(required = true, value_name = "FILE|DIR")]
     images: Vec<PathBuf>,
     /// Pixel spacing [m]; without it the scale comes from the image
@@ -50,11 +53,18 @@ pub(crate) struct Arguments {
     /// Folder of the pictures, made if absent
     #[arg(long, value_name = "DIR", default_value = "out/detect")]
     out: PathBuf,
+    #[command(flatten)]
+    product: product::ProductArguments,
 }
 
 /// Prints every wake by tip, axis, half-angle, visible length and score, and draws the wakes of `NAME` into `NAME.wakes.png`
 /// in `--out`. Files of a folder that cannot be read are named, and the others are searched.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
+    if let [path] = &arguments.images[..]
+        && let Some(found) = product::opened(path, &arguments.product)?
+    {
+        return product::run(&found, arguments);
+    }
     let files = image_files(&arguments.images)?;
     let finder = finder(arguments)?;
     let bar = progress::bar(files.len() as u64, "images");

@@ -1,0 +1,255 @@
+//! `wake detect PRODUCT`: the wakes of a satellite product as places on a map.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use image::{ImageFormat, RgbImage};
+use indicatif::ProgressBar;
+use serde_json::json;
+use wake_detector::drawing::Drawing;
+use wake_detector::{Detection, Detector, GreyImage, Wake};
+use wake_geo::{Land, LandMask, Product, Values};
+use wake_map::{MappedWake, Search, csv, geojson, html, mapped, search};
+use whole_files::{make_folder, write_atomically, write_json};
+
+use super::Arguments;
+use crate::exit::{self, Outcome};
+use crate::{named, progress};
+
+/// What is asked for of a product.
+#[derive(clap::Args, Debug, Clone)]
+#[command(next_help_heading = "Products")]
+pub(crate) struct ProductArguments {
+    /// Also write the wakes as GeoJSON to this file
+    #[arg(long, value_name = "FILE")]
+    geojson: Option<PathBuf>,
+    /// Polygons of land (GeoJSON), in the place of the built-in coast of Natural Earth
+    #[arg(long, value_name = "FILE")]
+    land: Option<PathBuf>,
+    /// Search land, too
+    #[arg(long, conflicts_with = "land")]
+    no_land: bool,
+    /// Sea closer to land than this is left out [m]
+    #[arg(long, value_name = "N", default_value_t = 1000.0)]
+    coast: f64,
+    /// VV, HH, VH or HV, by default the first of these that the product has
+    #[arg(long, value_parser = crate::locate::polarization)]
+    polarization: Option<wake_geo::Polarization>,
+}
+
+/// Longest side of the quick-look \[pixels\].
+const LONGEST: usize = 2400;
+
+/// The product behind a path: a `.SAFE` folder, a `.zip`, or a TIFF with places or of 32-bit numbers; `None` for other images.
+pub(crate) fn opened(path: &Path, arguments: &ProductArguments) -> Outcome<Option<Product>> {
+    let has = |name: &str| path.join(name).exists();
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let is_tiff = matches!(ending.as_deref(), Some("tif" | "tiff"));
+    let is_product = path.is_dir() && (has("annotation") || has("manifest.safe"))
+        || path.file_name().is_some_and(|name| name == "manifest.safe")
+        || matches!(ending.as_deref(), Some("zip" | "safe"));
+    if !is_product && !(is_tiff && path.is_file()) {
+        return Ok(None);
+    }
+    let product = match arguments.polarization {
+        Some(polarization) => Product::open_polarization(path, polarization)?,
+        None => Product::open(path)?,
+    };
+    Ok(Some(product).filter(|product| is_product || product.has_places()))
+}
+
+/// Searches a product; writes `wakes.geojson`, `wakes.csv`, `wakes.json`, `quicklook.png` and `report.html` into the folder. A search
+/// that was stopped goes on where it was, as `search.jsonl` has it.
+pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
+    let (out, options) = (&arguments.out, &arguments.product);
+    let name = product.path().file_name().unwrap_or_default();
+    let name = name.to_string_lossy().into_owned();
+    let (lines, pixels) = product.size();
+    let detector = named::network(
+        arguments.weights.as_deref(),
+        &arguments.device,
+        arguments.least_score,
+    )?;
+    let spacing = spacing(product, arguments.spacing)?;
+    let detector = match spacing {
+        Some(metres) => detector.with_spacing(metres)?,
+        None => detector,
+    };
+    let land = land(product, options)?;
+    make_folder(out)?;
+    let settings = json!({
+        "spacing": spacing, "least_score": arguments.least_score, "weights": arguments.weights, "land": options.land,
+        "coast": options.coast,
+    });
+    let state = out.join("search.jsonl");
+    let bar = progress::bar(0, "tiles");
+    let watched = |done: usize, of: usize| watch(&bar, done, of);
+    let search_options = Search {
+        land: land.as_ref(),
+        state: Some(&state),
+        settings: &settings.to_string(),
+    };
+    let found = search(product, &detector, search_options, &watched);
+    bar.finish_and_clear();
+    let found = found?;
+    let wakes = mapped(product, &found)?;
+    let collection = geojson(&wakes, &name);
+    let picture = quick_look(product, &found)?;
+    let mut png = Cursor::new(Vec::new());
+    picture.plain.write_to(&mut png, ImageFormat::Png)?;
+    let told = |value: Option<f32>| value.map_or("unknown".to_owned(), |v| format!("{v:.1} m"));
+    let shown = [
+        ("image", format!("{name}, {lines} lines of {pixels} pixels")),
+        ("pixel spacing", told(spacing)),
+        (
+            "weights",
+            arguments
+                .weights
+                .as_ref()
+                .map_or("those of this program".to_owned(), |w| {
+                    w.display().to_string()
+                }),
+        ),
+        ("least score", arguments.least_score.to_string()),
+        (
+            "land",
+            match (&options.land, options.no_land) {
+                (_, true) => "searched, too".to_owned(),
+                (Some(file), _) => format!(
+                    "{}, and {} m of sea before it, left out",
+                    file.display(),
+                    options.coast
+                ),
+                (None, _) => format!(
+                    "Natural Earth 1:10 million, and {} m of sea before it, left out",
+                    options.coast
+                ),
+            },
+        ),
+        ("program", format!("wake {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    let page = html(&wakes, &name, [pixels, lines], &png.into_inner(), &shown);
+    write_json(&out.join("wakes.geojson"), &collection)?;
+    if let Some(file) = &options.geojson {
+        write_json(file, &collection)?;
+    }
+    write_atomically(&out.join("wakes.csv"), csv(&wakes).as_bytes())?;
+    write_json(&out.join("wakes.json"), &wakes)?;
+    write_atomically(&out.join("report.html"), page.as_bytes())?;
+    crate::picture::write(&picture.drawn, &out.join("quicklook.png"))?;
+    std::fs::remove_file(&state).ok();
+    match arguments.json {
+        true => exit::say(&json!({"product": name, "wakes": wakes}).to_string())?,
+        false => exit::say(&summary(&name, &wakes, out))?,
+    }
+    Ok(())
+}
+
+fn watch(bar: &ProgressBar, done: usize, of: usize) {
+    bar.set_length(of as u64);
+    bar.set_position(done as u64);
+}
+
+/// Distance between pixels \[m\]: what is asked for, or what the product says.
+fn spacing(product: &Product, asked: Option<f32>) -> Outcome<Option<f32>> {
+    if asked.is_some() || !product.has_places() {
+        return Ok(asked);
+    }
+    let (lines, pixels) = product.size();
+    let axes = product.axes(0.5 * lines as f64, 0.5 * pixels as f64)?;
+    Ok(Some(
+        (0.5 * (axes.line_spacing + axes.pixel_spacing)) as f32,
+    ))
+}
+
+fn land(product: &Product, options: &ProductArguments) -> Outcome<Option<LandMask>> {
+    if options.no_land || !product.has_places() {
+        return Ok(None);
+    }
+    let land = match &options.land {
+        Some(file) => Land::read(file)?,
+        None => Land::natural_earth(),
+    };
+    let mask = land.mask(product, options.coast)?;
+    Ok(Some(mask).filter(|mask| !mask.is_empty()))
+}
+
+/// A small picture of a product, and the same with its wakes.
+struct QuickLook {
+    plain: image::GrayImage,
+    drawn: RgbImage,
+}
+
+fn quick_look(product: &Product, found: &[Detection]) -> Outcome<QuickLook> {
+    let (lines, pixels) = product.size();
+    let step = lines.max(pixels).div_ceil(LONGEST);
+    let (rows, columns) = (lines / step, pixels / step);
+    let mut means = Vec::with_capacity(rows * columns);
+    for row in 0..rows {
+        let window = product.read_window(row * step..(row + 1) * step, 0..pixels)?;
+        for column in 0..columns {
+            let values =
+                (0..step).flat_map(|l| &window.line(l)[column * step..(column + 1) * step]);
+            let there = values.filter(|v| v.is_finite());
+            let (sum, count) = there.fold((0.0f64, 0u32), |(s, n), &v| (s + f64::from(v), n + 1));
+            let mean = sum / f64::from(count.max(1));
+            means.push(match product.values() {
+                Values::SigmaNought => mean.sqrt(),
+                Values::Samples => mean,
+            });
+        }
+    }
+    // Half grey is the median.
+    let mut sorted: Vec<f64> = means.iter().copied().filter(|&m| m > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
+    let level = |mean: &f64| (110.0 * mean / median).round().clamp(0.0, 255.0) as u8;
+    let levels: Vec<u8> = means.iter().map(level).collect();
+    let small = GreyImage::eight_bits(rows, columns, levels.clone())?;
+    let scaled = |one: &Detection| {
+        let factor = 1.0 / step as f32;
+        Detection {
+            wake: Wake {
+                tip: one.wake.tip.map(|x| (x + 0.5) * factor - 0.5),
+                length: one.wake.length * factor,
+                ..one.wake
+            },
+            ..*one
+        }
+    };
+    let sure = found
+        .iter()
+        .filter(|one| one.score >= Detector::OPERATING_POINT);
+    let sure: Vec<Detection> = sure.map(scaled).collect();
+    let mut drawing = Drawing::new(&small);
+    drawing.found(sure.iter());
+    let plain = image::GrayImage::from_raw(columns as u32, rows as u32, levels);
+    Ok(QuickLook {
+        plain: plain.ok_or("a picture of the wrong size")?,
+        drawn: drawing.into_picture(),
+    })
+}
+
+/// The wakes that are likely ones, a line each.
+fn summary(name: &str, wakes: &[MappedWake], out: &Path) -> String {
+    let sure: Vec<&MappedWake> = wakes.iter().filter(|wake| wake.sure).collect();
+    let mut text = format!("{name}: {} wakes", sure.len());
+    for wake in sure {
+        let place = wake.tip.map_or(
+            format!("line {:.0}, pixel {:.0}", wake.line, wake.pixel),
+            |[longitude, latitude]| format!("{latitude:.4}, {longitude:.4}"),
+        );
+        let number = |value: Option<f64>, unit: &str| {
+            value.map_or("unknown".to_owned(), |v| format!("{v:.1}{unit}"))
+        };
+        let echo = wake.echo.and_then(|echo| echo.radial_velocity);
+        text += &format!(
+            "\n  score {:.2}, {place}, heading {}, {} long, radial velocity {}",
+            wake.score,
+            number(wake.heading, " deg"),
+            number(wake.length, " m"),
+            number(echo, " m/s")
+        );
+    }
+    text + &format!("\nwritten to {}", out.display())
+}

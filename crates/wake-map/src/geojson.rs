@@ -1,0 +1,54 @@
+//! Wakes as GeoJSON (RFC 7946).
+
+use serde_json::{Map, Value, json};
+
+use crate::wake::MappedWake;
+
+/// A feature collection: a `LineString` from tip to end of each wake, and a `Point` for each echo; wakes without a place are left
+/// out.
+///
+/// - `image`: name of the image, a property of every feature
+#[must_use]
+pub fn geojson(wakes: &[MappedWake], image: &str) -> Value {
+    let mut features = Vec::new();
+    for (n, wake) in wakes.iter().enumerate() {
+        let (Some(tip), Some(end)) = (wake.tip, wake.end) else {
+            continue;
+        };
+        let mut properties = properties(wake);
+        properties.insert("id".to_owned(), json!(n + 1));
+        properties.insert("image".to_owned(), json!(image));
+        features.push(json!({
+            "type": "Feature",
+            "geometry": {"type": "LineString", "coordinates": [tip, end]},
+            "properties": properties,
+        }));
+        if let Some(echo) = &wake.echo {
+            features.push(json!({
+                "type": "Feature",
+                "geometry": {"type": "Point", "coordinates": [echo.longitude, echo.latitude]},
+                "properties": {
+                    "type": "echo", "id": n + 1, "image": image, "line": echo.line, "pixel": echo.pixel,
+                    "displacement_m": echo.displacement, "radial_velocity_m_s": echo.radial_velocity,
+                },
+            }));
+        }
+    }
+    json!({"type": "FeatureCollection", "features": features})
+}
+
+/// The properties of a wake, with their units in their names.
+pub(crate) fn properties(wake: &MappedWake) -> Map<String, Value> {
+    let echo = wake.echo.as_ref();
+    let properties = json!({
+        "type": "wake", "score": wake.score, "sure": wake.sure, "heading_deg": wake.heading, "length_m": wake.length,
+        "contrast_db": wake.contrast_db, "kind": wake.kind, "half_angle_deg": wake.half_angle,
+        "incidence_deg": wake.incidence, "time": wake.time, "line": wake.line, "pixel": wake.pixel,
+        "displacement_m": echo.and_then(|echo| echo.displacement),
+        "radial_velocity_m_s": echo.and_then(|echo| echo.radial_velocity),
+    });
+    match properties {
+        Value::Object(properties) => properties,
+        _ => Map::new(),
+    }
+}

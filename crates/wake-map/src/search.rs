@@ -1,0 +1,69 @@
+//! The search of a product, tile by tile.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use serde_json::json;
+use wake_detector::{Detection, Detector, Raster, Tile};
+use wake_geo::{LandMask, Product};
+
+use crate::error::Result;
+use crate::sea::SeaOf;
+use crate::state::State;
+
+/// How a product is searched.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Search<'a> {
+    /// Land that is left out.
+    pub land: Option<&'a LandMask>,
+    /// A file that notes every tile that was searched; a search that was stopped goes on from it.
+    pub state: Option<&'a Path>,
+    /// What else the search depends on, such as the weights and the least score: a file that notes something else is refused.
+    pub settings: &'a str,
+}
+
+/// The wakes of a product, the surest first, in its lines and pixels.
+///
+/// - `done`: told after every tile how many of how many are done; may be called by several threads
+///
+/// # Errors
+///
+/// [`Error::Product`](crate::Error::Product) for pixels that cannot be read, [`Error::OtherSearch`](crate::Error::OtherSearch)
+/// for a file of another search, [`Error::File`](crate::Error::File) for one that cannot be written.
+pub fn search(
+    product: &Product,
+    detector: &Detector,
+    options: Search<'_>,
+    done: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<Detection>> {
+    let sea = SeaOf {
+        product,
+        land: options.land,
+    };
+    let tiles = Tile::all(sea.rows(), sea.columns());
+    let identity = json!({
+        "product": product.path(), "lines": sea.rows(), "pixels": sea.columns(), "land": options.land.is_some(),
+        "settings": options.settings,
+    });
+    let state = options.state.map(|path| State::open(path, &identity));
+    let mut state = state.transpose()?;
+    let known = state.as_mut().map(|state| std::mem::take(&mut state.done));
+    let known = known.unwrap_or_default();
+    let finished = std::sync::atomic::AtomicUsize::new(known.len());
+    done(known.len(), tiles.len());
+    let one = |(n, tile): (usize, &Tile)| -> Result<Vec<Detection>> {
+        if let Some(found) = known.get(&n) {
+            return Ok(found.clone());
+        }
+        let found = detector.find_in(&sea, tile)?;
+        if let Some(state) = &state {
+            state.note(n, &found)?;
+        }
+        let finished = 1 + finished.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        done(finished, tiles.len());
+        Ok(found)
+    };
+    let found = tiles.par_iter().enumerate().map(one);
+    let found: Vec<Vec<Detection>> = found.collect::<Result<_>>()?;
+    Ok(Detector::merged(found.concat()))
+}

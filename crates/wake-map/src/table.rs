@@ -1,0 +1,50 @@
+//! Wakes as a table.
+
+use serde_json::Value;
+
+use crate::geojson::properties;
+use crate::wake::MappedWake;
+
+/// The columns of the table.
+const COLUMNS: [&str; 13] = [
+    "score",
+    "sure",
+    "heading_deg",
+    "length_m",
+    "contrast_db",
+    "kind",
+    "half_angle_deg",
+    "incidence_deg",
+    "time",
+    "line",
+    "pixel",
+    "displacement_m",
+    "radial_velocity_m_s",
+];
+
+/// Comma-separated values with a header: a line for each wake, the surest first; what is not known is empty.
+#[must_use]
+pub fn csv(wakes: &[MappedWake]) -> String {
+    let places = ["longitude", "latitude", "end_longitude", "end_latitude"];
+    let mut text = [&["id"][..], &places, &COLUMNS].concat().join(",") + "\n";
+    for (n, wake) in wakes.iter().enumerate() {
+        let ends = [wake.tip, wake.end].map(|place| place.map_or([None; 2], |p| p.map(Some)));
+        let places = ends.concat();
+        let places = places
+            .iter()
+            .map(|v| v.map_or(String::new(), |v| format!("{v:.6}")));
+        let properties = properties(wake);
+        let cell = |name: &&str| match &properties[*name] {
+            Value::Null => String::new(),
+            Value::String(text) => text.clone(),
+            value => value.to_string(),
+        };
+        let cells = std::iter::once((n + 1).to_string());
+        let cells: Vec<String> = cells
+            .chain(places)
+            .chain(COLUMNS.iter().map(cell))
+            .collect();
+        text.push_str(&(cells.join(",") + "\n"));
+    }
+    text
+}

@@ -1,0 +1,97 @@
+//! A wake as a place on the map.
+
+use serde::Serialize;
+use wake_detector::{Detection, Detector};
+use wake_geo::Product;
+
+use crate::echo::{Echo, echo};
+use crate::error::Result;
+use crate::profile::{Kind, profile};
+
+/// A wake with all that is known of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MappedWake {
+    /// How sure the detector is, 0 to 1: an order, not a probability.
+    pub score: f64,
+    /// Whether the score is above the detector's operating point.
+    pub sure: bool,
+    /// Line of the tip, where the wake begins.
+    pub line: f64,
+    /// Pixel of the tip.
+    pub pixel: f64,
+    /// (Longitude, latitude) of the tip \[degrees\]; `None` for an image without places.
+    pub tip: Option<[f64; 2]>,
+    /// (Longitude, latitude) of the end of what is seen \[degrees\].
+    pub end: Option<[f64; 2]>,
+    /// Direction of the ship, from the end of the wake to its tip, clockwise from true north \[degrees\]. Ahead and astern may be
+    /// taken for each other.
+    pub heading: Option<f64>,
+    /// Visible length \[m\].
+    pub length: Option<f64>,
+    /// (Pixel, line) of the end of what is seen.
+    pub end_px: [f64; 2],
+    /// Visible length \[pixels\].
+    pub length_px: f64,
+    /// Half the angle between the outer edges \[degrees\].
+    pub half_angle: f64,
+    /// Contrast of the line against the sea on both sides \[dB\].
+    pub contrast_db: Option<f64>,
+    /// What it looks like.
+    pub kind: Option<Kind>,
+    /// Incidence angle at the tip \[degrees\].
+    pub incidence: Option<f64>,
+    /// Time at which the tip was imaged, UTC.
+    pub time: Option<String>,
+    /// The ship's echo.
+    pub echo: Option<Echo>,
+}
+
+/// The wakes of a product with all that is known of them, in the same order.
+///
+/// # Errors
+///
+/// [`Error::Product`](crate::Error::Product) for places that cannot be computed.
+pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>> {
+    found.iter().map(|one| one_mapped(product, one)).collect()
+}
+
+fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
+    let wake = &one.wake;
+    let (lines, pixels) = product.size();
+    let inside = |[x, y]: [f32; 2]| {
+        let clamped = |value: f32, size: usize| f64::from(value).clamp(-0.5, size as f64 - 0.5);
+        (clamped(y, lines), clamped(x, pixels))
+    };
+    let (tip, end) = (inside(wake.tip), inside(wake.at(wake.length)));
+    let measured = profile(product, wake);
+    let mut mapped = MappedWake {
+        score: f64::from(one.score),
+        sure: one.score >= Detector::OPERATING_POINT,
+        line: f64::from(wake.tip[1]),
+        pixel: f64::from(wake.tip[0]),
+        tip: None,
+        end: None,
+        heading: None,
+        length: None,
+        end_px: wake.at(wake.length).map(f64::from),
+        length_px: f64::from(wake.length),
+        half_angle: f64::from(wake.half_angle_deg),
+        contrast_db: measured.map(|(db, _)| db),
+        kind: measured.map(|(_, kind)| kind),
+        incidence: None,
+        time: None,
+        echo: echo(product, wake),
+    };
+    if product.has_places() {
+        let [from, to] = [product.place(tip.0, tip.1)?, product.place(end.0, end.1)?];
+        let track = product.track(end, tip)?;
+        mapped.tip = Some([from.longitude, from.latitude]);
+        mapped.end = Some([to.longitude, to.latitude]);
+        mapped.heading = Some(track.azimuth);
+        mapped.length = Some(track.distance);
+        mapped.incidence = from.incidence;
+    }
+    let sentinel = product.sentinel1();
+    mapped.time = sentinel.map(|s| s.annotation().line_time(tip.0).to_string());
+    Ok(mapped)
+}

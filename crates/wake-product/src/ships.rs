@@ -1,0 +1,164 @@
+//! Ships on the map.
+
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use crate::error::{Error, Result};
+
+/// A ship under way, by its place on Earth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShipAt {
+    /// Latitude of midship on WGS84, north positive \[degrees\].
+    pub latitude: f64,
+    /// Longitude of midship, east positive \[degrees\].
+    pub longitude: f64,
+    /// Direction of travel, clockwise from true north \[degrees\].
+    pub heading: f64,
+    /// Speed \[m/s\].
+    pub speed: f64,
+    /// Length \[m\].
+    pub length: f64,
+    /// Beam \[m\].
+    pub beam: f64,
+    /// Draft \[m\].
+    pub draft: f64,
+}
+
+/// Most ships of a file.
+const MOST_SHIPS: usize = 10_000;
+/// Length over beam and length over draft where a file gives the length alone: those of the ship of the default scene.
+const SLENDERNESS: [f64; 2] = [7.5, 19.5];
+
+/// Reads ships from a GeoJSON file: `Point` features with the properties `heading`, `speed` and `length`, if they are known
+/// also `beam` and `draft`. Other properties are not looked at.
+///
+/// # Errors
+///
+/// [`Error::Ships`] with the number of the feature and what it lacks, [`Error::File`] for a file that cannot be read.
+pub fn read_ships(path: &Path) -> Result<Vec<ShipAt>> {
+    let text = whole_files::read_text(path)?;
+    let wrong = |why: String| Error::Ships {
+        path: path.to_owned(),
+        why,
+    };
+    let file: Value = serde_json::from_str(&text).map_err(|e| wrong(format!("no JSON: {e}")))?;
+    let Some(features) = file.get("features").and_then(Value::as_array) else {
+        return Err(wrong(
+            "no GeoJSON FeatureCollection: it has no list \"features\"".to_owned(),
+        ));
+    };
+    if features.len() > MOST_SHIPS {
+        let count = features.len();
+        return Err(wrong(format!(
+            "{count} features are above the limit of {MOST_SHIPS}; split the file"
+        )));
+    }
+    let ship = |(n, feature): (usize, &Value)| {
+        ship(feature).map_err(|why| wrong(format!("feature {}: {why}", n + 1)))
+    };
+    features.iter().enumerate().map(ship).collect()
+}
+
+fn ship(feature: &Value) -> Result<ShipAt, String> {
+    let geometry = &feature["geometry"];
+    if geometry["type"] != "Point" {
+        return Err("its geometry is no Point".to_owned());
+    }
+    let degrees = |n: usize, name: &str, most: f64| {
+        let value = geometry["coordinates"][n].as_f64();
+        let value = value.filter(|v| (-most..=most).contains(v));
+        value.ok_or_else(|| format!("its {name} is no number from -{most} to {most}"))
+    };
+    let empty = Map::new();
+    let properties = feature["properties"].as_object().unwrap_or(&empty);
+    let number = |key: &str, default: Option<f64>, range: [f64; 2]| -> Result<f64, String> {
+        let value = match (properties.get(key), default) {
+            (None | Some(Value::Null), Some(default)) => Some(default),
+            (value, _) => value.and_then(Value::as_f64),
+        };
+        let [least, most] = range;
+        let value = value.filter(|v| (least..=most).contains(v));
+        value.ok_or_else(|| format!("its property {key} is no number from {least} to {most}"))
+    };
+    let length = number("length", None, [1.0, 500.0])?;
+    Ok(ShipAt {
+        longitude: degrees(0, "longitude", 180.0)?,
+        latitude: degrees(1, "latitude", 90.0)?,
+        heading: number("heading", None, [-360.0, 360.0])?,
+        speed: number("speed", None, [0.0, 40.0])?,
+        length,
+        beam: number("beam", Some(length / SLENDERNESS[0]), [0.1, 100.0])?,
+        draft: number("draft", Some(length / SLENDERNESS[1]), [0.05, 40.0])?,
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<ShipAt>> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        read_ships(file.path())
+    }
+
+    fn feature(coordinates: &str, properties: &str) -> String {
+        format!(
+            r#"{{"type": "FeatureCollection", "features": [{{"type": "Feature", "geometry": {{"type": "Point",
+            "coordinates": {coordinates}}}, "properties": {properties}}}]}}"#
+        )
+    }
+
+    #[test]
+    fn a_ship_has_a_place_a_heading_and_a_length() {
+        let ships = read(&feature(
+            "[5.5, -40]",
+            r#"{"heading": 45, "speed": 7.5, "length": 150, "name": "x"}"#,
+        ));
+        let [ship] = &ships.unwrap()[..] else {
+            panic!()
+        };
+        assert_eq!(
+            (ship.longitude, ship.latitude, ship.heading),
+            (5.5, -40.0, 45.0)
+        );
+        assert_eq!((ship.speed, ship.length, ship.beam), (7.5, 150.0, 20.0));
+        let refused = [
+            (
+                "[200, 3]",
+                r#"{"heading": 45, "speed": 7, "length": 9}"#,
+                "longitude",
+            ),
+            (
+                "[2]",
+                r#"{"heading": 45, "speed": 7, "length": 9}"#,
+                "latitude",
+            ),
+            ("[2, 3]", r#"{"speed": 7, "length": 9}"#, "heading"),
+            (
+                "[2, 3]",
+                r#"{"heading": 45, "speed": 99, "length": 9}"#,
+                "speed",
+            ),
+            (
+                "[2, 3]",
+                r#"{"heading": 45, "speed": 7, "length": "long"}"#,
+                "length",
+            ),
+        ];
+        for (coordinates, properties, name) in refused {
+            let sentence = read(&feature(coordinates, properties))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                sentence.contains("feature 1") && sentence.contains(name),
+                "{sentence}"
+            );
+        }
+        for text in ["", "[1]", "{}", r#"{"features": [{}]}"#] {
+            read(text).unwrap_err();
+        }
+    }
+}
