@@ -21,7 +21,7 @@ const TRANSFER: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: 0.5585,
     relaxation_rate: 0.5,
-    steepness: 4.5,
+    action_slope: 4.5,
 };
 
 fn wake() -> KelvinWake {

@@ -551,7 +551,7 @@ mod tests {
             );
             assert!(!scene.sea.breaking && scene.sea.gust_strength == 0.0 && scene.ships.len() < 2);
             assert!((3.0..=7.0).contains(&scene.sea.wind_speed));
-            assert_eq!(scene.radar.noise_floor, None);
+            assert_eq!(scene.radar.nesz, None);
         }
         let detector = Recipe::detector().unwrap().scene;
         let mut sensors = BTreeSet::new();
@@ -559,7 +559,7 @@ mod tests {
             assert_eq!((scene.grid.rows, scene.grid.oversampling), (256, Some(2)));
             assert_eq!(scene.model, detector.model);
             assert!(scene.sea.breaking && scene.ships.iter().all(|ship| ship.echo && ship.edge));
-            assert!(scene.radar.noise_floor.is_some());
+            assert!(scene.radar.nesz.is_some());
             sensors.insert(format!("{:?}", scene.radar.sensor));
         }
         assert_eq!(sensors.len(), 7);
@@ -580,7 +580,7 @@ mod tests {
                 .iter()
                 .all(|s| (5.0..=25.0).contains(&s.grid.spacing))
         );
-        assert!(scenes.iter().all(|s| s.radar.noise_floor.is_some()));
+        assert!(scenes.iter().all(|s| s.radar.nesz.is_some()));
         for count in [
             some(&|s| s.ships.is_empty() && s.sea.slick_damping > 0.0),
             some(&|s| s.ships.is_empty() && s.sea.swell_height > 0.0),

@@ -103,7 +103,7 @@ mod tests {
                 depth: f64::INFINITY,
                 incidence: 0.6,
                 relaxation_rate: 1.0,
-                steepness: 4.5,
+                action_slope: 4.5,
             },
             tilt: [5.0, 0.0],
             bragg_share: 1.0,

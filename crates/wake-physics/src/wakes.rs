@@ -30,7 +30,7 @@ pub(crate) struct Wake {
 impl Wake {
     /// The wakes of all ships, in their order.
     ///
-    /// - `bragg`: response of the Bragg waves to a divergence \[s\], their steepness over their relaxation rate, `m_B`/μ
+    /// - `bragg`: response of the Bragg waves to a divergence \[s\], their action slope over their relaxation rate, `m_B`/μ
     pub(crate) fn of(scene: &Scene, bragg: f64) -> Vec<Self> {
         let one = |ship: &Ship| {
             let kelvin = kelvin(ship, scene.sea.depth, scene.sea.time);
@@ -111,12 +111,12 @@ mod tests {
     use crate::models::Models;
     use crate::waves::Transfer;
 
-    /// The Bragg waves' part of an edge's response is that of the hydrodynamic modulation: the steepness of their own
+    /// The Bragg waves' part of an edge's response is that of the hydrodynamic modulation: the action slope of their own
     /// spectrum, 4.93, 4.11 and 3.90 at L, C and X band for 5 m/s, 35° and a developed sea, over 0.04 (u*/c)² ω with Wu's
     /// u* = 0.16771 m/s, by hand 0.06041, 0.5020 and 1.0748 1/s.
     #[test]
     fn edges_answer_at_the_relaxation_rate_of_the_modulation() {
-        for (gigahertz, steepness, rate) in [
+        for (gigahertz, action_slope, rate) in [
             (1.27, 4.93, 0.06041),
             (5.405, 4.11, 0.5020),
             (9.65, 3.90, 1.0748),
@@ -136,23 +136,23 @@ mod tests {
                     panic!("a given response")
                 };
                 let Transfer {
-                    steepness,
+                    action_slope,
                     relaxation_rate,
                     ..
                 } = models.transfer;
-                assert!((bragg * relaxation_rate / steepness - 1.0).abs() < 1e-12);
+                assert!((bragg * relaxation_rate / action_slope - 1.0).abs() < 1e-12);
                 bragg
             };
-            // Half a unit of the last digit of steepness and rate.
-            let rounding = 0.005 / steepness + 1e-4;
+            // Half a unit of the last digit of the action slope and rate.
+            let rounding = 0.005 / action_slope + 1e-4;
             let found = bragg(&scene);
             assert!(
-                (found * rate / steepness - 1.0).abs() < rounding,
+                (found * rate / action_slope - 1.0).abs() < rounding,
                 "{gigahertz}: {found}"
             );
             // The key of a scene is the rate of both.
             scene.radar.relaxation_rate = Some(0.5);
-            assert!((bragg(&scene) * 0.5 / steepness - 1.0).abs() < rounding);
+            assert!((bragg(&scene) * 0.5 / action_slope - 1.0).abs() < rounding);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! How much brighter the sea is where a ship's waves roughen it that the pixels do not carry.
 
-use crate::kelvin::{KelvinWake, UnresolvedWaves};
+use crate::kelvin::{KelvinWake, SubpixelWake};
 use crate::models::Models;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::Term;
@@ -36,7 +36,7 @@ pub(super) struct ShortWaves {
 impl ShortWaves {
     /// Those of a sea whose models average over all its slopes; `None` if no such waves are drawn.
     pub(super) fn new(models: &Models, drawn: impl Fn(Term) -> bool) -> Option<Self> {
-        if !models.counts_unresolved {
+        if !models.counts_subpixel {
             return None;
         }
         let backscatter = models.backscatter(drawn(Term::TiltAverage), drawn(Term::Specular));
@@ -45,14 +45,14 @@ impl ShortWaves {
         (mean > 0.0).then(|| Self {
             backscatter,
             mean,
-            band: models.unresolved_band(),
+            band: models.subpixel_band(),
             table: OnceLock::new(),
         })
     }
 
     /// The waves of a ship that are steep enough to count.
     pub(super) fn of(&self, wake: &KelvinWake) -> Option<WavesOfShip<'_>> {
-        let waves = wake.unresolved(self.band)?;
+        let waves = wake.subpixel(self.band)?;
         let strongest = waves.steepest(0.5 * wake.hull.length());
         (strongest >= LEAST_VARIANCE).then_some(WavesOfShip { sea: self, waves })
     }
@@ -111,7 +111,7 @@ impl ShortWaves {
 #[derive(Debug)]
 pub(super) struct WavesOfShip<'s> {
     sea: &'s ShortWaves,
-    waves: UnresolvedWaves,
+    waves: SubpixelWake,
 }
 
 impl WavesOfShip<'_> {

@@ -128,12 +128,12 @@ impl Background {
             let (slopes, velocity) = survey.resolved_sea();
             models.average_over(&slopes, velocity);
         }
-        if drawn(Term::Bunching) {
+        if drawn(Term::VelocityBunching) {
             resolution = models.resolution().at(0.0);
         }
         resolution = resolution.hypot(own);
         let mut transfer = survey.modulation_of(&models);
-        if !drawn(Term::Bunching) {
+        if !drawn(Term::VelocityBunching) {
             transfer.range_to_velocity = 0.0;
         }
         let added: f64 = [Term::Breaking, Term::Noise]
@@ -144,19 +144,19 @@ impl Background {
             .sum();
         let mut background = Self {
             transfer,
-            raster: models.delivered,
-            largest: models.image.nyquist_wavenumber(),
+            raster: models.image,
+            largest: models.computed.nyquist_wavenumber(),
             share: 1.0 / (1.0 + added),
             resolution,
             range_resolution,
             square: match models.response {
-                None if models.is_refined() => models.delivered.spacing,
+                None if models.is_refined() => models.image.spacing,
                 _ => 0.0,
             },
             noise: 0.0,
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
-            edges_drawn: drawn(Term::Edge),
+            edges_drawn: drawn(Term::BrightEdge),
             short_waves: ShortWaves::new(&models, drawn),
             velocity,
         };

@@ -83,7 +83,7 @@ impl<'a> Estimates<'a> {
         let effect = match term {
             Term::Sea => self.waves(&self.sea),
             Term::Swell => self.waves(&self.swell),
-            Term::Edge => {
+            Term::BrightEdge => {
                 let [change, velocity] = self.survey.edge;
                 let shift = self.survey.modulation.range_to_velocity * velocity;
                 change + shift / self.width(self.survey.resolution.at(0.0)) * self.contrast
@@ -93,10 +93,10 @@ impl<'a> Estimates<'a> {
             Term::Gusts => self.survey.gusts * self.contrast.hypot(1.0),
             Term::Noise => self.survey.added[1],
             // What it smears away is at most all contrast; the speckle of neighbours is what it adds.
-            Term::Response => return self.contrast.max(self.survey.response),
+            Term::ImpulseResponse => return self.contrast.max(self.survey.response),
             Term::Kelvin => self.waves(&self.wake),
-            Term::Unresolved => {
-                let [change, wider] = self.survey.unresolved;
+            Term::SubpixelWake => {
+                let [change, wider] = self.survey.subpixel_wake;
                 change * self.contrast.hypot(1.0) + wider * self.contrast
             }
             Term::Turbulent => self.survey.damping * self.survey.modulation.bragg_share,
@@ -106,10 +106,10 @@ impl<'a> Estimates<'a> {
                 self.part(|m| m.range_bunching) + self.both(|w| self.range_shift(w)) * self.contrast
             }
             Term::Hydrodynamic => self.part(|m| m.hydrodynamic),
-            Term::Bunching => {
+            Term::VelocityBunching => {
                 self.part(|m| m.bunching) + self.both(|w| self.azimuth_shift(w)) * self.contrast
             }
-            Term::Coherence => self.coherence(),
+            Term::AzimuthSmear => self.coherence(),
             // Speckle multiplies: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
             Term::Speckle => return 2.0 / self.survey.looks.sqrt(),
         };
@@ -219,7 +219,7 @@ mod tests {
                     depth: f64::INFINITY,
                     incidence: 0.75f64.atan(),
                     relaxation_rate: 1.0,
-                    steepness: 4.0,
+                    action_slope: 4.0,
                 },
                 tilt: [5.0, 0.0],
                 bragg_share: 0.5,
@@ -233,7 +233,7 @@ mod tests {
             },
             damping: 0.11,
             edge: [0.12, 0.5],
-            unresolved: [0.13, 0.14],
+            subpixel_wake: [0.13, 0.14],
             rough_specular: 0.2,
             slicks: 0.15,
             gusts: 0.16,
@@ -278,24 +278,24 @@ mod tests {
                 Term::Sea => of_sea,
                 Term::Swell => of_swell,
                 Term::Kelvin => of_wake,
-                Term::Edge => 0.12 + 50.0 * 0.5 / width * c,
+                Term::BrightEdge => 0.12 + 50.0 * 0.5 / width * c,
                 Term::Slicks => 0.15 * 0.5,
                 Term::Breaking => 0.17,
                 Term::Gusts => 0.16 * product,
                 Term::Noise => 0.18,
-                Term::Unresolved => 0.13 * product + 0.14 * c,
+                Term::SubpixelWake => 0.13 * product + 0.14 * c,
                 Term::Turbulent => 0.11 * 0.5,
                 Term::TiltAverage => 0.21,
                 Term::Specular => 0.3,
                 Term::RangeBunching => 0.2 * 0.4 / 3.0 * (1.0 + c) + both(1),
                 Term::Hydrodynamic => 0.2 * 0.02f64.sqrt() * (1.0 + c),
-                Term::Bunching => 0.01 * 8.0 * (one_over_e + c) + both(0),
-                Term::Coherence => {
+                Term::VelocityBunching => 0.01 * 8.0 * (one_over_e + c) + both(0),
+                Term::AzimuthSmear => {
                     let lost = 0.01 * 8.0 * (one_over_e - (-moving).exp());
                     lost * product + 0.5 * (1.0 - 66.0 / wider) * 0.3
                 }
                 // These stand alone, and are no linear estimates.
-                Term::Response => (c - 1e-6) / 3.0,
+                Term::ImpulseResponse => (c - 1e-6) / 3.0,
                 Term::Speckle => (0.4 - 1e-6) / 3.0,
             };
             let expected = 3.0 * expected + 1e-6;
@@ -314,7 +314,7 @@ mod tests {
         // Speckle that neighbours share may be more than the contrast.
         smooth.response = 0.9;
         let estimates = Estimates::new(&smooth, BACKSCATTER);
-        assert!((estimates.of(Term::Response) - 0.9).abs() < 1e-15);
+        assert!((estimates.of(Term::ImpulseResponse) - 0.9).abs() < 1e-15);
     }
 
     /// Every term once, and what is absent says so of itself alone.

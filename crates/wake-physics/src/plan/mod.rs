@@ -118,8 +118,8 @@ impl Plan {
         let terms = terms::choose(&effects, &scene.model.terms, tolerance);
         let uses = |term| terms.iter().any(|t| t.term == term && t.used);
         let margin = survey.margin(models);
-        let raster = models.image.with_margin(margin[0], margin[1]);
-        let strips = strips(&raster, &models.delivered);
+        let raster = models.computed.with_margin(margin[0], margin[1]);
+        let strips = strips(&raster, &models.image);
         let sea_lattice = if uses(Term::Sea) {
             lattice_size(&models.sea, &raster)
         } else {
@@ -150,7 +150,7 @@ impl Plan {
         let directions = zones.map(|z| z.directions.map(f64::to_degrees));
         let nodes = |of: fn(&WakePlan) -> usize| wakes.iter().map(of).sum();
         Ok(Self {
-            image_pixels: models.delivered.len(),
+            image_pixels: models.image.len(),
             sizes: Sizes {
                 computed_spacing: raster.spacing,
                 strips,
@@ -172,12 +172,12 @@ impl Plan {
 
     /// The same for the mean over all seas: no sea is drawn, and what its waves do is averaged over.
     pub(crate) fn over_all_seas(mut self) -> Self {
-        let bunching = self.uses(Term::Bunching);
+        let bunching = self.uses(Term::VelocityBunching);
         for t in &mut self.terms {
             t.used = match t.term {
                 Term::Sea | Term::Swell => false,
                 Term::TiltAverage | Term::Specular => true,
-                Term::Coherence => t.used || bunching,
+                Term::AzimuthSmear => t.used || bunching,
                 _ => t.used,
             };
         }
@@ -334,7 +334,7 @@ mod tests {
             Term::Gusts,
             Term::TiltAverage,
             Term::Specular,
-            Term::Coherence,
+            Term::AzimuthSmear,
             Term::Kelvin,
         ] {
             assert!(mean.uses(term), "{term:?}");
@@ -343,7 +343,7 @@ mod tests {
         // Displaced pixels smear: coherence is averaged over where bunching is computed, and only there.
         for (terms, smeared) in [("[\"sea\", \"bunching\"]", true), ("[\"sea\"]", false)] {
             let of_list = plan(&[&format!("model.terms={terms}")]).over_all_seas();
-            assert_eq!(of_list.uses(Term::Coherence), smeared, "{terms}");
+            assert_eq!(of_list.uses(Term::AzimuthSmear), smeared, "{terms}");
         }
     }
 

@@ -32,7 +32,7 @@ pub(crate) struct Effect {
 /// estimates left out stays within their share of the tolerance; speckle, which is no part of the image before speckle, has
 /// the tolerance for itself. The impulse response decides on which pixels all is computed: it is used where it is there.
 pub(crate) fn choose(effects: &[Effect], terms: &Terms, tolerance: f64) -> Vec<PlannedTerm> {
-    let alone = [Term::Speckle, Term::Response];
+    let alone = [Term::Speckle, Term::ImpulseResponse];
     let mut order: Vec<&Effect> = effects
         .iter()
         .filter(|e| !alone.contains(&e.term))
@@ -109,7 +109,7 @@ mod tests {
             effect(Term::Sea, 0.3e-3),
             effect(Term::Kelvin, 0.15e-3),
             effect(Term::Specular, 0.1e-3),
-            effect(Term::Bunching, 1.0),
+            effect(Term::VelocityBunching, 1.0),
         ];
         let needed = Terms::Rule(TermRule::Needed);
         // 0.1 + 0.15 fit into 0.3 of 1; with 0.3 it would be 0.55.

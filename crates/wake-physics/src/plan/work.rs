@@ -129,23 +129,26 @@ impl Work {
         };
         let at_once = (rows * raster.columns) as f64;
         let moving = || models.wakes.iter().filter(|wake| wake.kelvin.speed > 0.0);
-        let [dark, edges] =
-            [(uses(Term::Turbulent), true), (uses(Term::Edge), false)].map(|(used, dark)| {
-                moving()
-                    .filter(|wake| used && (dark || wake.edge.is_some()))
-                    .map(|wake| wake.kelvin.track.turn().is_some())
-                    .collect::<Vec<bool>>()
-            });
+        let [dark, edges] = [
+            (uses(Term::Turbulent), true),
+            (uses(Term::BrightEdge), false),
+        ]
+        .map(|(used, dark)| {
+            moving()
+                .filter(|wake| used && (dark || wake.edge.is_some()))
+                .map(|wake| wake.kelvin.track.turn().is_some())
+                .collect::<Vec<bool>>()
+        });
         let turning = dark.iter().chain(&edges).filter(|turns| **turns).count();
         let waves = wakes.iter().filter(|wake| wake.nodes() > 0).count();
         let swell = uses(Term::Swell) && models.swell.is_some();
         let tolerance = scene.model.tolerance;
         // Transverse and divergent waves, both as steep as they can be.
-        let short_waves = when(uses(Term::Unresolved)) * 2.0 * LARGEST_SLOPE_VARIANCE;
+        let short_waves = when(uses(Term::SubpixelWake)) * 2.0 * LARGEST_SLOPE_VARIANCE;
         let leans = if uses(Term::RangeBunching) { 2.0 } else { 1.0 };
         let backscatter = models.backscatter(uses(Term::TiltAverage), false);
         let moves = uses(Term::Sea) || swell || waves > 0;
-        let coherent = uses(Term::Coherence);
+        let coherent = uses(Term::AzimuthSmear);
         let taps = leans * taps(models, survey, (coherent, moves), tolerance);
         let slopes = if moves {
             survey.resolved
@@ -158,16 +161,16 @@ impl Work {
             at_once,
             whole: match strips {
                 1 => [0.0; 2],
-                _ => [all, models.delivered.len() as f64],
+                _ => [all, models.image.len() as f64],
             },
-            image: models.delivered.len() as f64,
+            image: models.image.len() as f64,
             lattice: (lattice[0] * lattice[1]) as f64,
             sums: waves as f64 + when(swell),
             precise: tolerance < PRECISE,
             ships: [
                 dark.len() as f64,
                 edges.len() as f64,
-                when(uses(Term::Unresolved)) * models.unresolved.len() as f64,
+                when(uses(Term::SubpixelWake)) * models.subpixel_wakes.len() as f64,
             ],
             turning: turning as f64,
             patterns: when(uses(Term::Slicks)) + when(uses(Term::Gusts)),
@@ -181,8 +184,10 @@ impl Work {
                 ),
             ),
             steep: all * backscatter.steep_share(&survey.resolved_sea().0) * when(moves),
-            summed: (taps / leans * FARTHEST_MOVED) * (models.image.columns + BLOCK) as f64,
-            sources: models.response.map_or(0.0, |_| models.image.len() as f64),
+            summed: (taps / leans * FARTHEST_MOVED) * (models.computed.columns + BLOCK) as f64,
+            sources: models
+                .response
+                .map_or(0.0, |_| models.computed.len() as f64),
             looks: looks(scene, models, uses(Term::Speckle)),
             rings: wakes
                 .iter()
@@ -274,7 +279,7 @@ fn taps(models: &Models, survey: &Survey, (coherent, moves): (bool, bool), toler
         0.0
     };
     let tolerance = super::SHARES.kernels * tolerance;
-    imaging.taps(acceleration, models.image.spacing, tolerance)
+    imaging.taps(acceleration, models.computed.spacing, tolerance)
 }
 
 /// Looks that are drawn through an impulse response.

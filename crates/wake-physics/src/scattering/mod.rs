@@ -1,7 +1,7 @@
 //! Radar backscatter of the sea: the cross-section σ⁰ of each pixel from its slope.
 //!
 //! ```text
-//! σ⁰ = σ_Bragg(slope) · exp(m − ½ var m) · damping + σ_specular(slope)
+//! σ⁰ = σ_Bragg(slope) · exp(m − ½ var m) · remaining + σ_specular(slope)
 //! ```
 //!
 //! Waves come in three bands. Those a pixel resolves tilt its facet. Those between the pixel and the radar's

@@ -37,7 +37,7 @@ impl Terms {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, unresolved, turbulent, edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, bunching, coherence, noise, response, speckle"
+    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, subpixel_wake, turbulent, bright_edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, velocity_bunching, azimuth_smear, noise, impulse_response, speckle"
 )]
 pub enum Terms {
     /// By a rule.
@@ -57,6 +57,8 @@ pub enum TermRule {
 }
 
 /// One physical effect that can be computed or left out.
+///
+/// Scene files may also name the terms as they were named first: `unresolved`, `edge`, `bunching`, `coherence`, `response`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Term {
@@ -68,11 +70,13 @@ pub enum Term {
     Kelvin,
     /// The ship's waves that the computed pixels do not carry, as slopes and velocities of a variance: with an impulse
     /// response.
-    Unresolved,
+    #[serde(alias = "unresolved")]
+    SubpixelWake,
     /// The turbulent wake.
     Turbulent,
     /// The current of the turbulent wake and its bright edges.
-    Edge,
+    #[serde(alias = "edge")]
+    BrightEdge,
     /// Slicks.
     Slicks,
     /// The average of σ⁰ over the slopes of unresolved waves.
@@ -88,13 +92,16 @@ pub enum Term {
     /// Modulation of the Bragg waves by the currents of longer ones.
     Hydrodynamic,
     /// Azimuth shift by the line-of-sight velocity.
-    Bunching,
-    /// Loss of azimuth resolution by unresolved and accelerated motion.
-    Coherence,
+    #[serde(alias = "bunching")]
+    VelocityBunching,
+    /// Loss of azimuth resolution by subpixel and accelerated motion.
+    #[serde(alias = "coherence")]
+    AzimuthSmear,
     /// Noise of the radar.
     Noise,
     /// The radar's impulse response in range and azimuth.
-    Response,
+    #[serde(alias = "response")]
+    ImpulseResponse,
     /// Multi-look speckle.
     Speckle,
 }
@@ -105,9 +112,9 @@ impl Term {
         Self::Sea,
         Self::Swell,
         Self::Kelvin,
-        Self::Unresolved,
+        Self::SubpixelWake,
         Self::Turbulent,
-        Self::Edge,
+        Self::BrightEdge,
         Self::Slicks,
         Self::TiltAverage,
         Self::Specular,
@@ -115,10 +122,10 @@ impl Term {
         Self::Gusts,
         Self::RangeBunching,
         Self::Hydrodynamic,
-        Self::Bunching,
-        Self::Coherence,
+        Self::VelocityBunching,
+        Self::AzimuthSmear,
         Self::Noise,
-        Self::Response,
+        Self::ImpulseResponse,
         Self::Speckle,
     ];
 
@@ -129,9 +136,9 @@ impl Term {
             Self::Sea => "sea",
             Self::Swell => "swell",
             Self::Kelvin => "kelvin",
-            Self::Unresolved => "unresolved",
+            Self::SubpixelWake => "subpixel_wake",
             Self::Turbulent => "turbulent",
-            Self::Edge => "edge",
+            Self::BrightEdge => "bright_edge",
             Self::Slicks => "slicks",
             Self::TiltAverage => "tilt_average",
             Self::Specular => "specular",
@@ -139,10 +146,10 @@ impl Term {
             Self::Gusts => "gusts",
             Self::RangeBunching => "range_bunching",
             Self::Hydrodynamic => "hydrodynamic",
-            Self::Bunching => "bunching",
-            Self::Coherence => "coherence",
+            Self::VelocityBunching => "velocity_bunching",
+            Self::AzimuthSmear => "azimuth_smear",
             Self::Noise => "noise",
-            Self::Response => "response",
+            Self::ImpulseResponse => "impulse_response",
             Self::Speckle => "speckle",
         }
     }

@@ -69,7 +69,7 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
     if !models.is_refined() {
         return Ok(stages.direct_intensity(pixels));
     }
-    let parts = Parts::new(&models.image, &models.delivered);
+    let parts = Parts::new(&models.computed, &models.image);
     let fine: Vec<[usize; 2]> = pixels.iter().flat_map(|&pixel| parts.of(pixel)).collect();
     let mut direct = stages.direct_intensity(&fine);
     let pixels = direct.intensity.chunks(parts.count());
@@ -80,7 +80,7 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
 impl Stages<'_> {
     fn direct_intensity(&self, pixels: &[[usize; 2]]) -> DirectPixels {
         let workspace = &mut Workspace::default();
-        let image = &self.models.image;
+        let image = &self.models.computed;
         let mut backdrop = Backdrop::new(workspace, self.scene, self.models, self.plan);
         let sources = self.reaching(workspace, &mut backdrop, pixels);
         let at = |&[i, j]: &[usize; 2]| i * self.raster.columns + j;
@@ -89,9 +89,9 @@ impl Stages<'_> {
         let mut fields = self.harmonic_fields(workspace, &sources, &mut seconds);
         self.add_edge(&mut fields);
         self.turn_into_factors(&mut fields);
-        let damping = self.damping(workspace);
-        let unresolved = self.unresolved(workspace, &mut fields);
-        let (backscatter, facets) = self.facets(&fields, damping.as_ref(), unresolved.as_ref());
+        let remaining = self.bragg_remaining(workspace);
+        let subpixel = self.subpixel_wake(workspace, &mut fields);
+        let (backscatter, facets) = self.facets(&fields, remaining.as_ref(), subpixel.as_ref());
         let mut clock = Clock::start();
         let exact = backscatter.sigma0_pixels(&facets, &sources);
         seconds.backscatter = clock.lap();
@@ -99,7 +99,7 @@ impl Stages<'_> {
         for (source, value) in sources.iter().zip(exact) {
             all.values[at(source)] = value;
         }
-        self.modulate(&mut all, damping.as_ref(), &backdrop);
+        self.modulate(&mut all, remaining.as_ref(), &backdrop);
         // Where no wave was summed there is no source.
         let mut sigma0 = workspace.flat_field(&self.raster);
         for source in &sources {
@@ -136,11 +136,11 @@ impl Stages<'_> {
         self.add_swell(workspace, &mut fields);
         self.add_wake(workspace, &mut fields);
         self.add_edge(&mut fields);
-        self.unresolved(workspace, &mut fields);
+        self.subpixel_wake(workspace, &mut fields);
         let velocity = fields.radial_velocity(workspace, &self.raster, self.models.incidence);
         let power = Field::constant(&self.raster, 1.0);
         let (imaging, sources) = self.imaging(&power, &velocity, &fields);
-        reaching(&imaging, &sources, &self.models.image, pixels)
+        reaching(&imaging, &sources, &self.models.computed, pixels)
     }
 
     /// Sea, swell and wake by harmonic sums at some pixels; 0 at all others.
@@ -222,7 +222,7 @@ mod tests {
             "ship.edge=true",
             "sea.gust_strength=0.05",
             "sea.breaking=true",
-            "radar.noise_floor=-20",
+            "radar.nesz=-20",
             "sea.swell_height=1",
         ];
         let pixels = [[0, 0], [11, 9], [5, 4], [6, 4], [3, 8]];

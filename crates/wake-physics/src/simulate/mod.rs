@@ -90,7 +90,7 @@ impl Simulator {
         let what = (scene, models, plan);
         let how = (method, Wanted::Fields);
         let (drawn, exposure) = self.draw(what, how, (&mut clock, &mut seconds));
-        let mut speckled = self.workspace.field(&models.delivered);
+        let mut speckled = self.workspace.field(&models.image);
         speckled.values.copy_from_slice(&drawn.intensity.values);
         let speckling = Speckling::of(scene, models, exposure);
         let slc = if plan.uses(Term::Speckle) {
@@ -106,7 +106,7 @@ impl Simulator {
         let labels = prepared.labels();
         let fields = drawn.fields;
         let mut simulation = Simulation {
-            raster: prepared.models.delivered,
+            raster: prepared.models.image,
             elevation: fields.elevation,
             slope_x: fields.slope_x,
             slope_y: fields.slope_y,

@@ -23,10 +23,10 @@ impl Stages<'_> {
     pub(super) fn modulate(
         &self,
         sigma0: &mut Field,
-        damping: Option<&Field>,
+        bragg_remaining: Option<&Field>,
         backdrop: &Backdrop,
     ) {
-        self.add_breaking(sigma0, damping);
+        self.add_breaking(sigma0, bragg_remaining);
         for edge in self.edges() {
             edge.modulate(sigma0, &self.raster);
         }
@@ -36,13 +36,13 @@ impl Stages<'_> {
     }
 
     /// Adds the return of breaking waves, damped like the short ones.
-    fn add_breaking(&self, sigma0: &mut Field, damping: Option<&Field>) {
+    fn add_breaking(&self, sigma0: &mut Field, bragg_remaining: Option<&Field>) {
         if !self.plan.uses(Term::Breaking) {
             return;
         }
         let breaking = self.models.breaking as f32;
         let pixels = sigma0.values.par_iter_mut().with_min_len(1 << 14);
-        match damping {
+        match bragg_remaining {
             None => pixels.for_each(|s| *s += breaking),
             Some(left) => pixels
                 .zip(&left.values)
@@ -54,8 +54,8 @@ impl Stages<'_> {
     pub(super) fn facets<'f>(
         &self,
         fields: &'f SurfaceFields,
-        damping: Option<&'f Field>,
-        unresolved: Option<&'f [Field; 3]>,
+        bragg_remaining: Option<&'f Field>,
+        subpixel_variances: Option<&'f [Field; 3]>,
     ) -> (Backscatter, FacetFields<'f>) {
         let uses = |term| self.plan.uses(term);
         let backscatter = self
@@ -65,8 +65,8 @@ impl Stages<'_> {
             slope_x: &fields.slope_x,
             slope_y: &fields.slope_y,
             modulation: uses(Term::Hydrodynamic).then_some(&fields.modulation),
-            damping,
-            unresolved,
+            bragg_remaining,
+            subpixel_variances,
         };
         (backscatter, facets)
     }
@@ -75,10 +75,10 @@ impl Stages<'_> {
         &self,
         workspace: &mut Workspace,
         last_table: &mut Option<BackscatterTable>,
-        (fields, damping, unresolved): (&SurfaceFields, Option<&Field>, Option<&[Field; 3]>),
+        (fields, remaining, subpixel): (&SurfaceFields, Option<&Field>, Option<&[Field; 3]>),
         accuracy: &mut Accuracy,
     ) -> Field {
-        let (backscatter, facets) = self.facets(fields, damping, unresolved);
+        let (backscatter, facets) = self.facets(fields, remaining, subpixel);
         if self.method == Method::Direct {
             return backscatter.sigma0_field(&facets);
         }
@@ -116,14 +116,14 @@ impl Stages<'_> {
         let sources = Sources {
             raster: self.raster,
             sigma0,
-            radial_velocity: uses(Term::Bunching).then_some(radial_velocity),
-            radial_acceleration: uses(Term::Coherence).then_some(&fields.radial_acceleration),
+            radial_velocity: uses(Term::VelocityBunching).then_some(radial_velocity),
+            radial_acceleration: uses(Term::AzimuthSmear).then_some(&fields.radial_acceleration),
             elevation: uses(Term::RangeBunching).then_some(&fields.elevation),
         };
         let imaging = Imaging {
             range_to_velocity: self.models.range_to_velocity,
             incidence: self.models.incidence,
-            resolution: if uses(Term::Coherence) {
+            resolution: if uses(Term::AzimuthSmear) {
                 self.models.resolution()
             } else {
                 self.models.resolution_at_rest()
@@ -141,7 +141,7 @@ impl Stages<'_> {
         fields: &SurfaceFields,
     ) -> Field {
         let (imaging, sources) = self.imaging(sigma0, radial_velocity, fields);
-        let image = &self.image;
+        let image = &self.computed;
         let tolerance = SHARES.kernels * self.scene.model.tolerance;
         let mut intensity = match self.method {
             Method::Fast => imaging.image_in(workspace, &sources, image, tolerance),
@@ -156,7 +156,7 @@ impl Stages<'_> {
         if self.models.response.is_none() {
             let resolution = self.models.resolution_at_rest().nominal;
             let points = points(self.scene, self.models);
-            add_points(intensity, &self.image, &points, resolution);
+            add_points(intensity, &self.computed, &points, resolution);
         }
         if self.plan.uses(Term::Noise) {
             let noise = self.models.noise as f32;

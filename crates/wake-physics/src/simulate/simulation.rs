@@ -123,7 +123,7 @@ impl Simulation {
     /// The amplitude scale of a quick-look: fixed by the σ⁰ that the scene has on average, not by its pixels.
     #[must_use]
     pub fn quick_look(&self) -> GreyScale {
-        let noise = self.scene.radar.noise_floor;
+        let noise = self.scene.radar.nesz;
         let noise = noise.map_or(0.0, |db| 10f64.powf(0.1 * db));
         // A sea that returns nothing is black on any scale.
         GreyScale::amplitude_around((self.plan.mean_sigma0 + noise).max(1e-5))

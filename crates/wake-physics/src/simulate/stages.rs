@@ -33,13 +33,13 @@ pub(super) struct Stages<'a> {
     /// Whether no strip comes after this one.
     pub(super) last: bool,
     /// The computed image, or the rows of it.
-    pub(super) image: Raster,
+    pub(super) computed: Raster,
     /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
     /// same bits with and without the second.
     pub(super) quantities: [Vec<Quantity>; 2],
 }
 
-/// What a scene looks like before speckle: as computed, all but the image on the raster with its margin, or as delivered, all at
+/// What a scene looks like before speckle: as computed, all but the image on the raster with its margin, or as an image, all at
 /// the pixels of the image.
 #[derive(Default)]
 pub(super) struct Drawn {
@@ -68,7 +68,7 @@ impl Backdrop {
         plan: &Plan,
     ) -> Self {
         let [rows, columns] = plan.sizes.margin;
-        let whole = models.image.with_margin(rows, columns);
+        let whole = models.computed.with_margin(rows, columns);
         let seed_and_time = (scene.seed, scene.sea.time);
         let gusts = models.gusts.filter(|_| plan.uses(Term::Gusts));
         Self {
@@ -125,10 +125,13 @@ impl<'a> Stages<'a> {
             models,
             plan,
             method,
-            raster: models.image.with_margin(rows, columns).strip(&strip.raster),
+            raster: models
+                .computed
+                .with_margin(rows, columns)
+                .strip(&strip.raster),
             first_row: strip.raster.start,
-            last: strip.delivered.end == models.delivered.rows,
-            image: models.image.strip(&strip.image),
+            last: strip.image.end == models.image.rows,
+            computed: models.computed.strip(&strip.computed),
             quantities: quantities(plan, wanted),
         }
     }
@@ -149,18 +152,18 @@ impl<'a> Stages<'a> {
         seconds.kelvin += clock.lap();
         self.add_edge(&mut fields);
         self.turn_into_factors(&mut fields);
-        let damping = self.damping(workspace);
+        let remaining = self.bragg_remaining(workspace);
         seconds.turbulent += clock.lap();
-        let roughness = self.unresolved(workspace, &mut fields);
-        let damping_field = damping.as_ref();
+        let roughness = self.subpixel_wake(workspace, &mut fields);
+        let left = remaining.as_ref();
         let mut sigma0 = self.sigma0(
             workspace,
             last_table,
-            (&fields, damping_field, roughness.as_ref()),
+            (&fields, left, roughness.as_ref()),
             &mut accuracy,
         );
-        self.modulate(&mut sigma0, damping_field, backdrop);
-        let used = damping.into_iter().chain(roughness.into_iter().flatten());
+        self.modulate(&mut sigma0, left, backdrop);
+        let used = remaining.into_iter().chain(roughness.into_iter().flatten());
         used.for_each(|field| workspace.give(field));
         seconds.backscatter += clock.lap();
         let radial_velocity =
@@ -332,11 +335,11 @@ impl<'a> Stages<'a> {
     }
 
     /// What turbulent wakes and slicks leave of the short waves.
-    pub(super) fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
+    pub(super) fn bragg_remaining(&self, workspace: &mut Workspace) -> Option<Field> {
         let uses = |term| self.plan.uses(term);
         let slicks = self.models.slicks.filter(|_| uses(Term::Slicks));
         let [rows, columns] = self.plan.sizes.margin;
-        let whole = self.models.image.with_margin(rows, columns);
+        let whole = self.models.computed.with_margin(rows, columns);
         let wind_and_seed = (self.scene.sea.wind_speed, self.scene.seed);
         let slicks = slicks.map(|slicks| slicks.strip(&whole, &self.rows(), wind_and_seed));
         let wakes: &[Wake] = if uses(Term::Turbulent) {
@@ -366,18 +369,18 @@ impl<'a> Stages<'a> {
 
     /// Variances xx, xy and yy of the slopes of the ship's waves that the pixels do not carry. Their velocities smear the
     /// image as an acceleration would that defocuses as much: the mean square of both is that of one.
-    pub(super) fn unresolved(
+    pub(super) fn subpixel_wake(
         &self,
         workspace: &mut Workspace,
         fields: &mut SurfaceFields,
     ) -> Option<[Field; 3]> {
         let models = self.models;
-        if !self.plan.uses(Term::Unresolved) {
+        if !self.plan.uses(Term::SubpixelWake) {
             return None;
         }
         let raster = &self.raster;
         let mut variances = [(); 3].map(|()| workspace.flat_field(raster));
-        let per_velocity = if self.plan.uses(Term::Coherence) {
+        let per_velocity = if self.plan.uses(Term::AzimuthSmear) {
             models.defocus_of_velocity()
         } else {
             0.0
@@ -410,7 +413,7 @@ impl<'a> Stages<'a> {
 
     /// The edges that are drawn.
     pub(super) fn edges(&self) -> impl Iterator<Item = &WakeEdge> {
-        let drawn = self.plan.uses(Term::Edge);
+        let drawn = self.plan.uses(Term::BrightEdge);
         let edges = self
             .models
             .wakes

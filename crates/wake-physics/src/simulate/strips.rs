@@ -37,19 +37,19 @@ impl Simulator {
             let mut drawn =
                 stages.draw(workspace, &mut self.table, &mut backdrop, (clock, seconds));
             out.accuracy = out.accuracy.and(&drawn.accuracy);
-            let pixels = models.delivered.strip(&strip.delivered);
+            let pixels = models.image.strip(&strip.image);
             let intensity = std::mem::take(&mut drawn.intensity);
             if models.response.is_some() {
-                let rows = [strip.own.clone(), 0..models.image.rows];
+                let rows = [strip.own.clone(), 0..models.computed.rows];
                 put(workspace, &mut out.intensity, rows, intensity);
             } else {
-                let rows = [strip.delivered.clone(), 0..models.delivered.rows];
-                let intensity = means(workspace, intensity, &stages.image, &pixels);
+                let rows = [strip.image.clone(), 0..models.image.rows];
+                let intensity = means(workspace, intensity, &stages.computed, &pixels);
                 put(workspace, &mut out.intensity, rows, intensity);
             }
             if wanted == Wanted::Fields {
                 for (to, from) in out.outputs().into_iter().zip(drawn.outputs()) {
-                    let rows = [strip.delivered.clone(), 0..models.delivered.rows];
+                    let rows = [strip.image.clone(), 0..models.image.rows];
                     let part = means(workspace, std::mem::take(from), &stages.raster, &pixels);
                     put(workspace, to, rows, part);
                 }
@@ -209,17 +209,18 @@ mod tests {
                 let strips = Strip::all(&models, &plan);
                 let mut next = [0; 2];
                 for strip in &strips {
-                    assert_eq!([strip.delivered.start, strip.own.start], next, "{keys:?}");
-                    next = [strip.delivered.end, strip.own.end];
+                    assert_eq!([strip.image.start, strip.own.start], next, "{keys:?}");
+                    next = [strip.image.end, strip.own.end];
                     assert!(
-                        strip.image.start <= strip.own.start && strip.image.end >= strip.own.end
+                        strip.computed.start <= strip.own.start
+                            && strip.computed.end >= strip.own.end
                     );
                     // Rows of the margin count from the first one above the image.
-                    let above = (strip.image.start + margin) - strip.raster.start;
-                    let below = strip.raster.end - (strip.image.end + margin);
+                    let above = (strip.computed.start + margin) - strip.raster.start;
+                    let below = strip.raster.end - (strip.computed.end + margin);
                     assert!(above >= margin && below >= margin);
                 }
-                assert_eq!(next, [170, models.image.rows]);
+                assert_eq!(next, [170, models.computed.rows]);
             }
         }
     }

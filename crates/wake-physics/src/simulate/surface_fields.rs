@@ -29,12 +29,12 @@ pub(super) enum Wanted {
 /// The linear fields to be computed: those that the image needs, and those that are wanted besides.
 pub(super) fn quantities(plan: &Plan, wanted: Wanted) -> [Vec<Quantity>; 2] {
     let mut image = vec![Quantity::SlopeX, Quantity::SlopeY];
-    if plan.uses(Term::Bunching) {
+    if plan.uses(Term::VelocityBunching) {
         image.extend([Quantity::VelocityX, Quantity::VelocityZ]);
     }
     let single = [
         (Term::RangeBunching, Quantity::Elevation),
-        (Term::Coherence, Quantity::RadialAcceleration),
+        (Term::AzimuthSmear, Quantity::RadialAcceleration),
         (Term::Hydrodynamic, Quantity::Hydrodynamic),
     ];
     image.extend(

@@ -14,7 +14,7 @@ use crate::scene::{Scene, Term};
 use crate::track::Track;
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity};
 use std::f64::consts::{PI, SQRT_2};
-use strengths::{SLOPE_STEP, damping, edge, rough_specular, unresolved};
+use strengths::{SLOPE_STEP, damping, edge, rough_specular, subpixel_wake};
 
 /// Tolerance of the coarse wake that is only weighed.
 const COARSE: f64 = 0.1;
@@ -53,7 +53,7 @@ pub(crate) struct Survey {
     pub(crate) edge: [f64; 2],
     /// Roots of mean squares over the image: what the ship's unresolved waves change σ⁰ by, relative, and the share of
     /// the width of a point that their velocities add, 0 to 1.
-    pub(crate) unresolved: [f64; 2],
+    pub(crate) subpixel_wake: [f64; 2],
     /// Specular return where the ship's unresolved waves are, root of the mean square over the mean σ⁰; 0 without them.
     pub(crate) rough_specular: f64,
     /// Damping in slicks.
@@ -79,8 +79,8 @@ pub(crate) struct Survey {
 impl Survey {
     pub(crate) fn new(scene: &Scene, models: &Models) -> Self {
         // Half a cell of the sea's lattice more than the band: cells at its edge hold waves from beyond.
-        let half_cell = 1.0 / models.image.rows.min(models.image.columns) as f64;
-        let band = models.image.nyquist_wavenumber() * (1.0 + half_cell);
+        let half_cell = 1.0 / models.computed.rows.min(models.computed.columns) as f64;
+        let band = models.computed.nyquist_wavenumber() * (1.0 + half_cell);
         let swell = waves::swell(models.swell.as_ref(), models.transfer.depth, band);
         let wind_waves = waves::sea(&models.sea, band);
         let no_wind_waves = wind_waves.is_empty();
@@ -88,7 +88,7 @@ impl Survey {
         sea.extend_from_slice(&swell);
         let (mut wake, mut wake_slopes) = (Vec::new(), [SlopeCovariance::NONE; 2]);
         for one in &models.wakes {
-            let (waves, crowding) = sampled_wake(&one.kelvin, &models.image);
+            let (waves, crowding) = sampled_wake(&one.kelvin, &models.computed);
             let over_image = slopes(&waves);
             wake_slopes[0] = wake_slopes[0].plus(&over_image);
             wake_slopes[1] = wake_slopes[1].plus(&over_image.times(crowding));
@@ -110,7 +110,7 @@ impl Survey {
             sea,
             swell,
             edge: edge(models),
-            unresolved: unresolved(models, &backscatter),
+            subpixel_wake: subpixel_wake(models, &backscatter),
             rough_specular: if total > 0.0 {
                 rough_specular(models, &backscatter, &resolved) / total
             } else {
@@ -123,7 +123,7 @@ impl Survey {
             added: [over_mean(models.breaking), over_mean(models.noise)],
             response: models
                 .response
-                .map_or(0.0, |r| r.pixel_correlation(models.delivered.spacing)),
+                .map_or(0.0, |r| r.pixel_correlation(models.image.spacing)),
             wake,
             modulation: ModulationTransfer {
                 transfer: models.transfer,
@@ -136,7 +136,7 @@ impl Survey {
             damping: damping(models),
             mean,
             resolved,
-            spacing: models.image.spacing,
+            spacing: models.computed.spacing,
             looks: f64::from(scene.radar.looks),
             absent: Vec::new(),
         };
@@ -163,7 +163,7 @@ impl Survey {
         let flat = no_waves.then_some("there are no resolved waves");
         let still = (models.range_to_velocity == 0.0).then_some("R/V is 0");
         let bragg = no_bragg.then_some("there are no short waves to scatter");
-        let tilt = (models.unresolved_slopes() == SlopeCovariance::NONE)
+        let tilt = (models.subpixel_slopes() == SlopeCovariance::NONE)
             .then_some("no wave between pixel and Bragg waves");
         [
             (Term::Sea, sea),
@@ -172,8 +172,8 @@ impl Survey {
             (Term::TiltAverage, bragg.or(tilt)),
             (Term::RangeBunching, flat),
             (Term::Hydrodynamic, flat.or(bragg)),
-            (Term::Bunching, still.or(flat)),
-            (Term::Coherence, still.or(flat)),
+            (Term::VelocityBunching, still.or(flat)),
+            (Term::AzimuthSmear, still.or(flat)),
         ]
         .into_iter()
         .filter_map(|(term, why)| why.map(|why| (term, why)))
@@ -220,7 +220,7 @@ impl Survey {
         let width = self.resolution.at(acceleration) / (SQRT_2 * PI);
         let azimuth = (models.range_to_velocity * velocity).hypot(width);
         let range = deviation(Quantity::Elevation) / models.incidence.tan();
-        [azimuth, range].map(|d| (DEVIATIONS * d / models.image.spacing).ceil() as usize + 1)
+        [azimuth, range].map(|d| (DEVIATIONS * d / models.computed.spacing).ceil() as usize + 1)
     }
 
     /// Standard deviation of the acceleration toward the radar, where the wake is [m/s²].
@@ -245,26 +245,26 @@ impl Survey {
             notes.push(format!(
                 "waves on the arms of a wake ask for pixels of {asked:.2} m; {} m are computed: shorter waves count by the \
                  variances of their slopes and velocities where an impulse response is asked for, else not",
-                models.image.spacing
+                models.computed.spacing
             ));
         }
-        let spacing = models.delivered.spacing;
-        let divisions = (spacing / models.image.spacing).round();
+        let spacing = models.image.spacing;
+        let divisions = (spacing / models.computed.spacing).round();
         if let Some(response) = models.response.filter(|_| divisions > COARSE_PIXEL) {
             let [range, azimuth] = [response.range, response.azimuth].map(|axis| axis.resolution);
             notes.push(format!(
                 "a pixel of {spacing} m takes {divisions} x {divisions} computed ones, for the radar resolves {range:.1} x {azimuth:.1} m: for an image \
-                 averaged to such pixels set radar.range_resolution and radar.resolution to what that image resolves"
+                 averaged to such pixels set radar.range_resolution and radar.azimuth_resolution to what that image resolves"
             ));
         }
         let count = models.wakes.len();
         for (n, wake) in models.wakes.iter().enumerate() {
             let wavelength = wake.kelvin.transverse_wavelength();
-            if wake.kelvin.speed > 0.0 && 2.0 * models.image.spacing > wavelength {
+            if wake.kelvin.speed > 0.0 && 2.0 * models.computed.spacing > wavelength {
                 notes.push(format!(
                     "the transverse waves of the {} are {wavelength:.2} m long: a pixel of {} m carries none of them",
                     Scene::ship_name(n, count),
-                    models.image.spacing
+                    models.computed.spacing
                 ));
             }
         }
@@ -285,10 +285,10 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
         unseen.then_some("it does not reach the image")
     };
     let asked = |asked: bool| (!asked).then_some("not asked for");
-    let unresolved = match &models.unresolved[..] {
-        _ if !models.counts_unresolved => Some("not asked for"),
+    let subpixel = match &models.subpixel_wakes[..] {
+        _ if !models.counts_subpixel => Some("not asked for"),
         [] => Some("there is no ship, or no such wave of one"),
-        _ if survey.unresolved[0] == 0.0 => Some("it does not reach the image"),
+        _ if survey.subpixel_wake[0] == 0.0 => Some("it does not reach the image"),
         _ => None,
     };
     let swell = match &models.swell {
@@ -307,13 +307,13 @@ fn absent_extras(scene: &Scene, survey: &Survey, models: &Models) -> Vec<(Term, 
     };
     [
         (Term::Swell, swell),
-        (Term::Unresolved, unresolved),
-        (Term::Edge, edge),
+        (Term::SubpixelWake, subpixel),
+        (Term::BrightEdge, edge),
         (Term::Slicks, slicks),
         (Term::Breaking, asked(models.breaking > 0.0)),
         (Term::Gusts, asked(models.gusts.is_some())),
         (Term::Noise, asked(models.noise > 0.0)),
-        (Term::Response, response),
+        (Term::ImpulseResponse, response),
     ]
     .into_iter()
     .filter_map(|(term, why)| why.map(|why| (term, why)))
@@ -382,7 +382,7 @@ fn sampled_straight(wake: &KelvinWake, image: &Raster) -> (Vec<WaveSample>, f64)
 /// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate \[1\].
 pub(crate) fn modulation_variance(models: &Models) -> f64 {
     let band = models
-        .image
+        .computed
         .nyquist_wavenumber()
         .min(LARGEST_MODULATING_WAVENUMBER);
     let factor = |w: &WaveSample| {

@@ -1,6 +1,6 @@
 //! How much those terms change the image that no wave carries: the turbulent wake, its edges, waves that no pixel carries.
 
-use crate::kelvin::UnresolvedWaves;
+use crate::kelvin::SubpixelWake;
 use crate::models::Models;
 use crate::raster::Raster;
 use crate::scattering::{Backscatter, SlopeCovariance};
@@ -22,7 +22,7 @@ pub(super) fn damping(models: &Models) -> f64 {
     if models.wakes.iter().all(|wake| wake.turbulent.speed == 0.0) {
         return 0.0;
     }
-    rms_over(&models.image, |place| {
+    rms_over(&models.computed, |place| {
         let of = |wake: &Wake| {
             let seen = wake.turbulent.track.seen_from_ship(place);
             wake.turbulent.damping(seen)
@@ -53,8 +53,8 @@ pub(super) fn edge(models: &Models) -> [f64; 2] {
             to_port(seen)[0] * models.incidence.sin() * edge.velocity(seen)
         };
         [
-            rms_over(&models.image, change),
-            rms_over(&models.image, velocity),
+            rms_over(&models.computed, change),
+            rms_over(&models.computed, velocity),
         ]
     };
     let edges = models.wakes.iter().filter_map(|wake| wake.edge.as_ref());
@@ -64,9 +64,9 @@ pub(super) fn edge(models: &Models) -> [f64; 2] {
         .fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
 }
 
-/// What the waves of the ship that pixels do not carry change over the image, see [`Survey::unresolved`].
-pub(super) fn unresolved(models: &Models, backscatter: &Backscatter) -> [f64; 2] {
-    if models.unresolved.is_empty() {
+/// What the waves of the ship that pixels do not carry change over the image, see [`Survey::subpixel_wake`].
+pub(super) fn subpixel_wake(models: &Models, backscatter: &Backscatter) -> [f64; 2] {
+    if models.subpixel_wakes.is_empty() {
         return [0.0; 2];
     }
     let curvature = curvature_of_sigma(backscatter);
@@ -78,15 +78,15 @@ pub(super) fn unresolved(models: &Models, backscatter: &Backscatter) -> [f64; 2]
             .sum()
     };
     let narrow = models.resolution().at(0.0) / (SQRT_2 * PI);
-    let width = models.image.spacing.hypot(narrow);
+    let width = models.computed.spacing.hypot(narrow);
     let wider = |place| {
         let rough = models.roughness(place).unwrap_or_default();
         let smear = models.range_to_velocity.powi(2) * rough.radial(models.incidence);
         smear / (smear + width * width)
     };
     [
-        rms_over(&models.image, change),
-        rms_over(&models.image, wider),
+        rms_over(&models.computed, change),
+        rms_over(&models.computed, wider),
     ]
 }
 
@@ -100,9 +100,9 @@ pub(super) fn rough_specular(
     backscatter: &Backscatter,
     resolved: &SlopeCovariance,
 ) -> f64 {
-    let image = &models.delivered;
+    let image = &models.image;
     let [rows, columns] = [image.rows as f64, image.columns as f64];
-    let specular = |waves: &UnresolvedWaves, place: [f64; 2]| {
+    let specular = |waves: &SubpixelWake, place: [f64; 2]| {
         let [column, row] = image.pixel(place[0], place[1]);
         let inside = (-0.5..rows - 0.5).contains(&row) && (-0.5..columns - 0.5).contains(&column);
         let rough = waves.at(place).filter(|_| inside);
@@ -113,7 +113,7 @@ pub(super) fn rough_specular(
         })
     };
     let mut sum = 0.0;
-    for waves in &models.unresolved {
+    for waves in &models.subpixel_wakes {
         let track = waves.track();
         let step = track.farthest_astern(image) / RAY_POINTS as f64;
         for n in 0..RAY_POINTS * RAY_POINTS {

@@ -142,7 +142,7 @@ mod tests {
             depth: f64::INFINITY,
             incidence: 0.5,
             relaxation_rate: 1.0,
-            steepness: 4.5,
+            action_slope: 4.5,
         };
         let raster = Raster::image(401, 1, 0.5);
         let pixels: Vec<[usize; 2]> = (0..401).map(|i| [i, 0]).collect();

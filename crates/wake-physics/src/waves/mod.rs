@@ -120,8 +120,8 @@ pub struct Transfer {
     pub incidence: f64,
     /// Relaxation rate μ of the Bragg waves [1/s].
     pub relaxation_rate: f64,
-    /// Steepness `m_B` of the action spectrum of the Bragg waves \[1\], −∂ln(ωΨ/k)/∂ln k; 4.5 for Ψ ∝ k⁻⁴.
-    pub steepness: f64,
+    /// Slope `m_B` of the action spectrum of the Bragg waves \[1\], −∂ln(ωΨ/k)/∂ln k; 4.5 for Ψ ∝ k⁻⁴.
+    pub action_slope: f64,
 }
 
 /// Waves shorter than 5 m do not modulate the Bragg waves (chosen): above the relaxation rate the modulation is `m_B`
@@ -168,7 +168,7 @@ impl Transfer {
             Quantity::Hydrodynamic if k > LARGEST_MODULATING_WAVENUMBER => Complex64::ZERO,
             Quantity::Hydrodynamic => {
                 let gradient = i * kx * (horizontal * kx / k);
-                -self.steepness * gradient / (self.relaxation_rate - i * omega)
+                -self.action_slope * gradient / (self.relaxation_rate - i * omega)
             }
         }
     }
@@ -265,7 +265,7 @@ mod tests {
         depth: 12.0,
         incidence: 0.5,
         relaxation_rate: 0.7,
-        steepness: 4.5,
+        action_slope: 4.5,
     };
 
     fn value(quantity: Quantity, k: [f64; 2], [x, y, t]: [f64; 3]) -> f64 {

@@ -100,7 +100,7 @@ fn row(
         image,
         skewness: of(&|s| s.skewness),
         kurtosis: of(&|s| s.kurtosis),
-        steepness: std::array::from_fn(|n| of(&|s| s.steepness[n])),
+        steepness: std::array::from_fn(|n| of(&|s| s.derivative_skewness[n])),
         grouping: of(&|s| s.grouping),
         crest_variance: mean(&crests),
         seams: mean(&borders),

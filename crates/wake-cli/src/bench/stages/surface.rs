@@ -14,7 +14,7 @@ pub(crate) const TRANSFER: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: INCIDENCE,
     relaxation_rate: 1.7,
-    steepness: 4.5,
+    action_slope: 4.5,
 };
 
 pub(crate) fn spectrum() -> DirectionalSpectrum {

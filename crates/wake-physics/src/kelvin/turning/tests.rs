@@ -32,7 +32,7 @@ fn elevation(wake: &KelvinWake, pixels: &[[usize; 2]]) -> Vec<f64> {
         depth: wake.depth,
         incidence: 0.5,
         relaxation_rate: 1.0,
-        steepness: 4.5,
+        action_slope: 4.5,
     };
     let waves = wake.waves(&wake.plan(&raster(), 1e-3));
     assert!(waves.len() > 100);
