@@ -4,8 +4,8 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::{KelvinWake, fade_field};
-use wake_physics::nufft::synthesize;
-use wake_physics::waves::{Quantity, Transfer, matrix_product};
+use wake_physics::reference::{matrix_product, synthesize};
+use wake_physics::waves::{Quantity, Transfer};
 use wake_physics::{Raster, Track};
 
 const SIX: [Quantity; 6] = [

@@ -7,7 +7,7 @@ use crate::streams;
 use std::sync::Arc;
 use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
-use wake_physics::scene::paper_grid;
+use wake_physics::reference::paper_grid;
 use wake_text::{PartialScene, Wording};
 
 /// Number of scenes in the paper's grid.
@@ -439,6 +439,37 @@ mod tests {
             seen.insert((ship.echo, ship.edge));
         }
         assert_eq!(seen.len(), 4);
+    }
+
+    /// Either name of a key draws the same scenes, and manifests hold the first.
+    #[test]
+    fn keys_of_two_names_draw_the_same_scenes() {
+        let [first, new] = [
+            [
+                "draw.radar.noise_floor=[-28, -16]",
+                "scene.radar.resolution=7",
+                "draw.together=[{ \"radar.resolution\" = [4, 8] }]",
+            ],
+            [
+                "draw.radar.nesz=[-28, -16]",
+                "scene.radar.azimuth_resolution=7",
+                "draw.together=[{ \"radar.azimuth_resolution\" = [4, 8] }]",
+            ],
+        ]
+        .map(|changes| Recipe::default().with_assignments(&changes).unwrap());
+        assert_eq!(first, new);
+        let text = serde_json::to_string(&new).unwrap();
+        for key in [
+            "\"radar.noise_floor\"",
+            "\"radar.resolution\"",
+            "\"resolution\":7",
+        ] {
+            assert!(text.contains(key), "{key}: {text}");
+        }
+        assert!(!text.contains("nesz") && !text.contains("azimuth_resolution"));
+        let scene = Simulated::new(new, 3).unwrap().scene(0).unwrap();
+        assert!((4.0..=8.0).contains(&scene.radar.azimuth_resolution));
+        assert!((-28.0..=-16.0).contains(&scene.radar.nesz.unwrap()));
     }
 
     #[test]

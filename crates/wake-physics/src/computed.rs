@@ -14,7 +14,6 @@ use crate::kelvin::KelvinWake;
 use crate::raster::{Field, Raster};
 use crate::sar::ImpulseResponse;
 use crate::scene::Grid;
-use crate::wakes::Wake;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -45,13 +44,12 @@ impl Computed {
         grid: &Grid,
         image: &Raster,
         response: Option<&ImpulseResponse>,
-        wakes: &[Wake],
+        wakes: &[KelvinWake],
     ) -> Self {
         let divisions = |spacing: f64| (image.spacing / spacing * (1.0 - 1e-12)).ceil().max(1.0);
         let carried = response.map_or(1.0, |r| divisions(r.carrying_spacing()));
         let for_response = response.map_or(1.0, |r| divisions(r.largest_spacing()));
-        let cusp = |wake: &Wake| {
-            let wake = &wake.kelvin;
+        let cusp = |wake: &KelvinWake| {
             let spacing = wake.transverse_wavelength() / 1.5 / PIXELS_A_CUSP_WAVE;
             visible(wake, image, spacing).then_some(spacing)
         };

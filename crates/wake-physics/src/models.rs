@@ -2,20 +2,17 @@
 
 use crate::computed::Computed;
 use crate::constants::SPEED_OF_LIGHT;
-use crate::gusts::{Gusts, wind_exponent};
-use crate::kelvin::{Roughness, SubpixelWake};
+use crate::kelvin::KelvinWake;
 use crate::permittivity;
 use crate::raster::Raster;
 use crate::sar::impulse::Axis;
 use crate::sar::{AzimuthResolution, ImpulseResponse};
-use crate::scattering::breaking;
 use crate::scattering::hydrodynamic::{action_slope, relaxation_rate};
 use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale, bragg};
 use crate::scene::{Radar, Scene, Term};
-use crate::slicks::{STRONGEST_WIND, Slicks};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
 use crate::swell::Swell;
-use crate::wakes::Wake;
+use crate::wakes::kelvin_wake;
 use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
 use crate::window::Window;
@@ -51,20 +48,8 @@ pub(crate) struct Models {
     pub(crate) azimuth_resolution: f64,
     /// The swell, if there is one.
     pub(crate) swell: Option<Swell>,
-    /// The wakes, one a ship.
-    pub(crate) wakes: Vec<Wake>,
-    /// Whether the ships' waves below the pixels count.
-    pub(crate) counts_subpixel: bool,
-    /// The ships' waves below the pixels, ship by ship.
-    pub(crate) subpixel_wakes: Vec<SubpixelWake>,
-    /// Slicks, if the wind leaves them.
-    pub(crate) slicks: Option<Slicks>,
-    /// σ⁰ of breaking waves, 0 where it is not asked for.
-    pub(crate) breaking: f64,
-    /// Gusts and the exponent of the wind, if there are any.
-    pub(crate) gusts: Option<(Gusts, f64)>,
-    /// Noise of the radar as σ⁰.
-    pub(crate) noise: f64,
+    /// The Kelvin wakes, one a ship.
+    pub(crate) wakes: Vec<KelvinWake>,
     /// Sea below the pixels, as variances.
     pub(crate) subpixel: SubpixelVariance,
 }
@@ -92,7 +77,8 @@ impl Models {
             spectrum.wind(),
         );
         let relaxation_rate = relaxation(scene);
-        let wakes = Wake::of(scene, action_slope / relaxation_rate);
+        let kelvin = |ship| kelvin_wake(ship, scene.sea.depth, scene.sea.time);
+        let wakes: Vec<KelvinWake> = scene.ships.iter().map(kelvin).collect();
         let chosen = Computed::new(&scene.grid, &image, response.as_ref(), &wakes);
         let computed = chosen.raster;
         let incidence = scene.radar.incidence.to_radians();
@@ -109,9 +95,6 @@ impl Models {
             short_waves,
             spectrum.wind(),
         );
-        let counts_subpixel = counts_subpixel(scene);
-        let waves = wakes.iter().filter(|_| counts_subpixel);
-        let band = subpixel_band(&computed, &two_scale);
         let subpixel = DirectionalSpectrum::new(&WindSea {
             spectrum: crate::scene::SpectrumModel::Elfouhaily,
             ..sea
@@ -122,14 +105,6 @@ impl Models {
             asked_spacing: chosen.asked,
             response,
             swell: swell(scene),
-            slicks: slicks(scene),
-            breaking: if scene.sea.breaking {
-                breaking::backscatter(incidence, scene.sea.wind_speed)
-            } else {
-                0.0
-            },
-            gusts: gusts(scene),
-            noise: scene.radar.nesz.map_or(0.0, |db| 10f64.powf(0.1 * db)),
             incidence,
             range_to_velocity: scene.radar.range_to_velocity,
             wavelength: SPEED_OF_LIGHT / scene.radar.frequency,
@@ -139,10 +114,6 @@ impl Models {
                 relaxation_rate,
                 action_slope,
             },
-            counts_subpixel,
-            subpixel_wakes: waves
-                .filter_map(|wake| wake.kelvin.subpixel(band))
-                .collect(),
             two_scale,
             permittivity,
             azimuth_resolution: scene.radar.azimuth_resolution,
@@ -158,16 +129,8 @@ impl Models {
 
     /// Wavenumbers of the ships' waves that the pixels do not carry and that tilt shorter ones [rad/m].
     pub(crate) fn subpixel_band(&self) -> [f64; 2] {
-        subpixel_band(&self.computed, &self.two_scale)
-    }
-
-    /// What the ship's waves that the pixels do not carry have at a place (x, y) \[m\], if any reach it.
-    pub(crate) fn roughness(&self, place: [f64; 2]) -> Option<Roughness> {
-        let each = self
-            .subpixel_wakes
-            .iter()
-            .filter_map(|waves| waves.at(place));
-        each.reduce(|a, b| a.plus(&b))
+        let split = self.two_scale.split_wavenumber();
+        [self.computed.nyquist_wavenumber(), split]
     }
 
     /// Whether what is computed are not the pixels of the image.
@@ -210,6 +173,16 @@ impl Models {
             .two_scale
             .slopes_from(self.computed.nyquist_wavenumber());
         short.plus(&self.subpixel.averaged_slopes)
+    }
+
+    /// Why there is no wake, if so.
+    pub(crate) fn no_wake(&self) -> Option<&'static str> {
+        match &self.wakes[..] {
+            [] => Some("there is no ship"),
+            [wake] if wake.speed == 0.0 => Some("the ship is at rest"),
+            wakes if wakes.iter().all(|w| w.speed == 0.0) => Some("all ships are at rest"),
+            _ => None,
+        }
     }
 
     /// Whether the wind raises no waves that scatter.
@@ -304,42 +277,11 @@ fn response(scene: &Scene) -> Option<ImpulseResponse> {
     })
 }
 
-fn subpixel_band(image: &Raster, two_scale: &TwoScale) -> [f64; 2] {
-    [image.nyquist_wavenumber(), two_scale.split_wavenumber()]
-}
-
-/// Whether the waves that pixels do not carry count: where an impulse response is asked for, also if pixels of their own do
-/// as well. On the pixels of an image as they are they are left out, as in the model that this one started from.
-fn counts_subpixel(scene: &Scene) -> bool {
-    scene.radar.range_resolution.is_some() && scene.model.terms.allow(Term::SubpixelWake)
-}
-
 fn swell(scene: &Scene) -> Option<Swell> {
     let sea = &scene.sea;
     (sea.swell_height > 0.0 && scene.model.terms.allow(Term::Swell)).then(|| Swell {
         height: sea.swell_height,
         wavelength: sea.swell_length,
         toward: sea.swell_toward.rem_euclid(360.0).to_radians(),
-    })
-}
-
-fn slicks(scene: &Scene) -> Option<Slicks> {
-    let sea = &scene.sea;
-    (sea.slick_damping > 0.0 && sea.wind_speed <= STRONGEST_WIND).then_some(Slicks {
-        damping: sea.slick_damping,
-        width: sea.slick_width,
-        scale: sea.slick_scale,
-    })
-}
-
-fn gusts(scene: &Scene) -> Option<(Gusts, f64)> {
-    let sea = &scene.sea;
-    (sea.gust_strength > 0.0).then(|| {
-        let gusts = Gusts {
-            strength: sea.gust_strength,
-            scale: sea.gust_scale,
-            wind_toward: sea.wind_toward.rem_euclid(360.0).to_radians(),
-        };
-        (gusts, wind_exponent(scene.radar.frequency))
     })
 }

@@ -227,6 +227,11 @@ impl SubpixelWake {
         self.widest
     }
 
+    /// Length of the ship \[m\].
+    pub(crate) fn length(&self) -> f64 {
+        self.length
+    }
+
     /// The track of the ship.
     pub(crate) fn track(&self) -> &Track {
         &self.track

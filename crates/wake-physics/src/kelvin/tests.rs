@@ -1,4 +1,5 @@
 use super::*;
+use crate::kelvin::direct::direct_quadrature;
 use crate::nufft::synthesize;
 use crate::raster::Raster;
 use crate::waves::{Quantity, Transfer, harmonic_sum};

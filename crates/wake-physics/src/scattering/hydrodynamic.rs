@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const STEP: f64 = 1e-3;
 
 /// Slowest and fastest relaxation admitted [1/s], the range of a scene's `radar.relaxation_rate`.
-pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
+pub const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 
 /// Rate at which the Bragg waves return to equilibrium with the wind, taken as their rate of growth.
 ///
@@ -34,7 +34,7 @@ pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 ///
 /// Plant (1982), J. Geophys. Res. 87(C3), 1961, Eq. 3.
 #[must_use]
-pub(crate) fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
+pub fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
     let omega = angular_frequency(bragg_wavenumber, f64::INFINITY);
     let speed = omega / bragg_wavenumber;
     let growth = 0.04 * (friction_velocity / speed).powi(2) * omega;
@@ -57,7 +57,7 @@ pub(crate) fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> 
 ///
 /// Alpers and Hasselmann (1978), Boundary-Layer Meteorology 13 (the action balance); the spectrum is Elfouhaily's.
 #[must_use]
-pub(crate) fn action_slope(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [f64; 2]) -> f64 {
+pub fn action_slope(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [f64; 2]) -> f64 {
     let ln_action = |k: f64| {
         let density = spectrum.density([k, 0.0], wind);
         (angular_frequency(k, f64::INFINITY) * density / k).ln()
@@ -77,7 +77,7 @@ pub(crate) fn action_slope(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [
 /// a Gaussian m the mean 1.
 ///
 /// - `variance` var m of the sea
-pub(crate) fn to_bragg_factors(modulation: &mut Field, variance: f64) {
+pub fn to_bragg_factors(modulation: &mut Field, variance: f64) {
     let half = (0.5 * variance) as f32;
     let values = modulation.values.par_iter_mut().with_min_len(1 << 14);
     values.for_each(|m| *m = (*m - half).exp());

@@ -11,9 +11,10 @@
 //! Linear units, per unit area of the horizontal plane. The radar looks toward +x, so a slope ∂ζ/∂x > 0, which
 //! rises away from the radar, faces it and is bright.
 
-pub(crate) mod bragg;
+pub mod bragg;
 pub mod breaking;
-pub(crate) mod hydrodynamic;
+pub mod hydrodynamic;
+pub mod modulation;
 mod slope_lattice;
 mod slope_means;
 mod slopes;

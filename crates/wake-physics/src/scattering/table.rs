@@ -1,5 +1,6 @@
 //! σ⁰ as a table over two slopes: the fast way.
 
+use crate::numeric::vectorized;
 use crate::raster::Field;
 use crate::scattering::bicubic::Bicubic;
 use crate::scattering::facets::Facets;
@@ -7,7 +8,6 @@ use crate::scattering::slope_means::SlopeMeans;
 use crate::scattering::slopes::PrincipalAxes;
 use crate::scattering::table_error::{OF_MEANS, Weights, error_between_nodes};
 use crate::scattering::{Backscatter, FacetFields, SlopeCovariance};
-use crate::vectorize::vectorized;
 use rayon::prelude::*;
 
 /// First spacing of facets tried \[1\]: a quarter of the width of the roll-off near nadir.

@@ -5,13 +5,12 @@ mod file;
 mod forms;
 mod keys;
 mod model;
-mod paper;
+pub(crate) mod paper;
 pub mod sensor;
 
 use crate::window::Window;
 pub use keys::stored_key;
 pub use model::{Model, Term, TermRule, Terms};
-pub use paper::paper_grid;
 use serde::{Deserialize, Serialize};
 
 /// A ship, a sea and a radar over a grid of pixels.
@@ -156,6 +155,7 @@ impl Default for Sea {
 /// Wavenumber spectrum of the resolved waves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum SpectrumModel {
     /// Elfouhaily et al. (1997).
     Elfouhaily,
@@ -168,6 +168,7 @@ pub enum SpectrumModel {
 /// Directional spreading of the resolved waves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum SpreadingModel {
     /// cos-2s with the exponent of Hasselmann et al. (1980).
     Hasselmann,
@@ -259,6 +260,7 @@ impl Ship {
 /// Form of the hull.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum HullForm {
     /// Wigley's parabolic hull, block coefficient 4/9.
     Wigley,
@@ -352,6 +354,7 @@ impl Default for Radar {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[expect(missing_docs, reason = "the names of the satellites and their modes")]
+#[non_exhaustive]
 pub enum Sensor {
     #[serde(rename = "sentinel-1-iw")]
     Sentinel1Iw,

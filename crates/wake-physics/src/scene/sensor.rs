@@ -24,6 +24,7 @@ pub enum RangeResolution {
 
 /// What a sensor sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct SensorMode {
     /// Frequency \[Hz\].
     pub frequency: f64,

@@ -1,6 +1,7 @@
 //! From the mean intensity to the image with speckle.
 
 use crate::error::Result;
+use crate::kelvin::KelvinWake;
 use crate::models::Models;
 use crate::raster::{Field, Raster};
 use crate::sar::ImpulseResponse;
@@ -10,7 +11,6 @@ use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::speckle::speckle;
 use crate::scene::sensor::ambiguity_distance;
 use crate::scene::{Scene, Ship};
-use crate::wakes::Wake;
 use num_complex::Complex32;
 
 /// What the radar looks at before its impulse response.
@@ -66,10 +66,10 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     };
     let ships = scene.ships.iter().zip(&models.wakes).enumerate();
     let drawn = ships.filter(|(_, (ship, _))| ship.echo);
-    let of_ship = |(n, (ship, wake)): (usize, (&Ship, &Wake))| {
+    let of_ship = |(n, (ship, wake)): (usize, (&Ship, &KelvinWake))| {
         let heading = ship.heading_at(scene.sea.time);
         let echo = ShipEcho {
-            position: wake.kelvin.track.position,
+            position: wake.track.position,
             heading,
             length: ship.length,
             beam: ship.beam,

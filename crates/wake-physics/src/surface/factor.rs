@@ -3,7 +3,7 @@
 //! A real field has the half spectrum H(k) = ½(T(k) c(k) + T*(−k) c*(−k)). With E and O = ½(c(k) ± c*(−k))
 //! and the factors T of [`Transfer::factor`], each quantity needs one or both of E and O.
 
-use super::vector::Lane;
+use super::lane::Lane;
 use super::wave_lattice::WaveLattice;
 use crate::constants::{GRAVITY, KINEMATIC_SURFACE_TENSION};
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity, Transfer};

@@ -1,8 +1,6 @@
 //! Plane waves, what each carries, and the slow sum of them that everything fast is checked against.
 
-mod matrix_product;
-
-pub use matrix_product::matrix_product;
+pub(crate) mod matrix_product;
 
 use crate::raster::{Field, Raster};
 use num_complex::Complex64;
@@ -218,7 +216,7 @@ pub fn harmonic_sum(
 
 /// Amplitudes T·a of each quantity, one vector per quantity.
 #[must_use]
-pub fn strengths(
+pub(crate) fn strengths(
     waves: &PlaneWaves,
     transfer: &Transfer,
     quantities: &[Quantity],

@@ -2,7 +2,8 @@
 
 use burn::tensor::Device;
 use serde::Serialize;
-use wake_physics::measure::{SeaShape, crest_variance, sea_shape, seams};
+use wake_physics::measure::{SeaShape, crest_variance, sea_shape};
+use wake_physics::reference::seams;
 use wake_physics::{Field, Scene};
 
 use super::baseline::Baseline;
