@@ -4,8 +4,8 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::{KelvinWake, fade_field};
-use wake_physics::nufft::synthesize;
-use wake_physics::waves::{Quantity, Transfer, matrix_product};
+use wake_physics::reference::{matrix_product, synthesize};
+use wake_physics::waves::{Quantity, Transfer};
 use wake_physics::{Raster, Track};
 
 const SIX: [Quantity; 6] = [
@@ -21,7 +21,7 @@ const TRANSFER: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: 0.5585,
     relaxation_rate: 0.5,
-    steepness: 4.5,
+    action_slope: 4.5,
 };
 
 fn wake() -> KelvinWake {

@@ -22,7 +22,7 @@ const TRANSFER: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: 0.56,
     relaxation_rate: 0.3,
-    steepness: 4.5,
+    action_slope: 4.5,
 };
 
 fn spectrum() -> DirectionalSpectrum {

@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng, rngs::StdRng};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Instant;
-use wake_physics::scene::paper_grid;
+use wake_physics::reference::paper_grid;
 use wake_text::{TOKENS, Tokenizer, Wording};
 
 /// What both tokenizers are asked for: 77 ids.

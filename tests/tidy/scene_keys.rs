@@ -10,7 +10,7 @@ use serde_json::Value;
 use syn::visit::{self, Visit};
 use syn::{Attribute, Expr, ExprLit, Item, Lit, Meta};
 use wake_physics::scene::sensor::SensorMode;
-use wake_physics::scene::{Scene, Sensor};
+use wake_physics::scene::{Scene, Sensor, stored_key};
 use wake_physics::window::Window;
 use wake_physics::{Error, Result};
 
@@ -32,7 +32,7 @@ pub(crate) fn page(sources: &Path) -> (String, Vec<String>) {
                 row.key
             ));
         }
-        let pointer = format!("/{}", row.key.replace('.', "/"));
+        let pointer = format!("/{}", stored_key(&row.key).replace('.', "/"));
         let default = match default.pointer(&pointer) {
             Some(Value::String(word)) if word == "infinite" => "inf".to_owned(),
             Some(Value::String(word)) => word.clone(),
@@ -102,7 +102,7 @@ fn sensor_row(sensor: Sensor) -> String {
         mode.looks.1,
         window(mode.windows[0]),
         window(mode.windows[1]),
-        mode.noise_floor,
+        mode.nesz,
     )
 }
 
@@ -323,8 +323,8 @@ fn assigned(key: &str, value: &str) -> Result<Scene> {
         "radar.range_resolution=10",
         "ship.echo=true",
         "ship.edge=true",
-        "radar.ambiguity=-25",
-        "radar.pulse_rate=1000",
+        "radar.azimuth_ambiguity=-25",
+        "radar.prf=1000",
         &format!("{key}={value}"),
     ])
 }

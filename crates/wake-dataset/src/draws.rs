@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
-use wake_physics::scene::Ship;
+use wake_physics::scene::{Ship, stored_key};
 use whole_files::sentence;
 
 /// Distributions by the path of their value, such as `ship.speed`.
@@ -29,7 +29,8 @@ type Values = BTreeMap<String, Distribution>;
 /// ]
 /// ```
 ///
-/// A key's values depend on seed, index and key alone, not on which other keys there are.
+/// A key's values depend on seed, index and key alone, not on which other keys there are. A key of two names, such as
+/// `radar.nesz` and `radar.noise_floor`, is one key.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Draws {
     values: Values,
@@ -212,7 +213,7 @@ fn read(values: &mut Values, key: &str, value: &toml::Value) -> Result<()> {
             if let Some((_, expected)) = REFUSED.iter().find(|(path, _)| *path == key) {
                 return Err(refused(key, value, expected));
             }
-            values.insert(key.to_owned(), Distribution::parse(key, value)?);
+            values.insert(stored_key(key), Distribution::parse(key, value)?);
         }
     }
     Ok(())

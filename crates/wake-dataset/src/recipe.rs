@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::path::Path;
 use wake_physics::Scene;
 use wake_physics::grey::GreyScale;
-use wake_physics::scene::Grid;
+use wake_physics::scene::{Grid, stored_key};
 use whole_files::sentence;
 
 /// The recipe of a detector.
@@ -280,6 +280,7 @@ impl Recipe {
             None => self.draw.clone(),
         };
         let mut table = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
+        with_stored_keys(&mut changes);
         merge(&mut table, changes);
         let recipe: Self = table
             .try_into()
@@ -356,6 +357,21 @@ fn one_line(text: &str, error: &toml::de::Error) -> String {
         }
         None => error.to_string().trim().replace('\n', ", "),
     }
+}
+
+/// Gives the radar of a scene the keys that a serialized scene has.
+fn with_stored_keys(changes: &mut toml::Table) {
+    let scene = changes.get_mut("scene").and_then(toml::Value::as_table_mut);
+    let radar = scene.and_then(|scene| scene.get_mut("radar"));
+    let Some(radar) = radar.and_then(toml::Value::as_table_mut) else {
+        return;
+    };
+    let stored = |(key, value): (String, toml::Value)| {
+        let path = stored_key(&format!("radar.{key}"));
+        let key = path.strip_prefix("radar.").map_or(key, str::to_owned);
+        (key, value)
+    };
+    *radar = std::mem::take(radar).into_iter().map(stored).collect();
 }
 
 /// Puts the values of `changes` in the place of those of `table`, table by table.

@@ -7,7 +7,7 @@ use crate::streams;
 use std::sync::Arc;
 use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
-use wake_physics::scene::paper_grid;
+use wake_physics::reference::paper_grid;
 use wake_text::{PartialScene, Wording};
 
 /// Number of scenes in the paper's grid.
@@ -441,6 +441,37 @@ mod tests {
         assert_eq!(seen.len(), 4);
     }
 
+    /// Either name of a key draws the same scenes, and manifests hold the first.
+    #[test]
+    fn keys_of_two_names_draw_the_same_scenes() {
+        let [first, new] = [
+            [
+                "draw.radar.noise_floor=[-28, -16]",
+                "scene.radar.resolution=7",
+                "draw.together=[{ \"radar.resolution\" = [4, 8] }]",
+            ],
+            [
+                "draw.radar.nesz=[-28, -16]",
+                "scene.radar.azimuth_resolution=7",
+                "draw.together=[{ \"radar.azimuth_resolution\" = [4, 8] }]",
+            ],
+        ]
+        .map(|changes| Recipe::default().with_assignments(&changes).unwrap());
+        assert_eq!(first, new);
+        let text = serde_json::to_string(&new).unwrap();
+        for key in [
+            "\"radar.noise_floor\"",
+            "\"radar.resolution\"",
+            "\"resolution\":7",
+        ] {
+            assert!(text.contains(key), "{key}: {text}");
+        }
+        assert!(!text.contains("nesz") && !text.contains("azimuth_resolution"));
+        let scene = Simulated::new(new, 3).unwrap().scene(0).unwrap();
+        assert!((4.0..=8.0).contains(&scene.radar.azimuth_resolution));
+        assert!((-28.0..=-16.0).contains(&scene.radar.nesz.unwrap()));
+    }
+
     #[test]
     fn assignments_take_toml_values_and_bare_words() {
         let changes = [
@@ -551,7 +582,7 @@ mod tests {
             );
             assert!(!scene.sea.breaking && scene.sea.gust_strength == 0.0 && scene.ships.len() < 2);
             assert!((3.0..=7.0).contains(&scene.sea.wind_speed));
-            assert_eq!(scene.radar.noise_floor, None);
+            assert_eq!(scene.radar.nesz, None);
         }
         let detector = Recipe::detector().unwrap().scene;
         let mut sensors = BTreeSet::new();
@@ -559,7 +590,7 @@ mod tests {
             assert_eq!((scene.grid.rows, scene.grid.oversampling), (256, Some(2)));
             assert_eq!(scene.model, detector.model);
             assert!(scene.sea.breaking && scene.ships.iter().all(|ship| ship.echo && ship.edge));
-            assert!(scene.radar.noise_floor.is_some());
+            assert!(scene.radar.nesz.is_some());
             sensors.insert(format!("{:?}", scene.radar.sensor));
         }
         assert_eq!(sensors.len(), 7);
@@ -580,7 +611,7 @@ mod tests {
                 .iter()
                 .all(|s| (5.0..=25.0).contains(&s.grid.spacing))
         );
-        assert!(scenes.iter().all(|s| s.radar.noise_floor.is_some()));
+        assert!(scenes.iter().all(|s| s.radar.nesz.is_some()));
         for count in [
             some(&|s| s.ships.is_empty() && s.sea.slick_damping > 0.0),
             some(&|s| s.ships.is_empty() && s.sea.swell_height > 0.0),

@@ -14,7 +14,6 @@ use crate::kelvin::KelvinWake;
 use crate::raster::{Field, Raster};
 use crate::sar::ImpulseResponse;
 use crate::scene::Grid;
-use crate::wakes::Wake;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -45,13 +44,12 @@ impl Computed {
         grid: &Grid,
         image: &Raster,
         response: Option<&ImpulseResponse>,
-        wakes: &[Wake],
+        wakes: &[KelvinWake],
     ) -> Self {
         let divisions = |spacing: f64| (image.spacing / spacing * (1.0 - 1e-12)).ceil().max(1.0);
         let carried = response.map_or(1.0, |r| divisions(r.carrying_spacing()));
         let for_response = response.map_or(1.0, |r| divisions(r.largest_spacing()));
-        let cusp = |wake: &Wake| {
-            let wake = &wake.kelvin;
+        let cusp = |wake: &KelvinWake| {
             let spacing = wake.transverse_wavelength() / 1.5 / PIXELS_A_CUSP_WAVE;
             visible(wake, image, spacing).then_some(spacing)
         };
@@ -85,7 +83,7 @@ fn visible(wake: &KelvinWake, image: &Raster, spacing: f64) -> bool {
         .iter()
         .map(|c| -c[0])
         .fold(0.0, f64::max);
-    let waves = wake.unresolved([PI / image.spacing, PI / spacing]);
+    let waves = wake.subpixel([PI / image.spacing, PI / spacing]);
     astern > 0.0 && waves.is_some_and(|waves| waves.steepest(0.5 * astern) >= VISIBLE)
 }
 
@@ -202,7 +200,7 @@ mod tests {
             .with_assignments(&[&size[..], keys].concat())
             .unwrap();
         let models = Models::new(&scene);
-        (models.clone(), models.image.spacing)
+        (models.clone(), models.computed.spacing)
     }
 
     /// `λ_cusp` = 2π 6.5²/(1.5 · 9.807) = 18.05 m asks for 5.16 m: the fraction of the image's spacing below it.
@@ -229,7 +227,7 @@ mod tests {
         }
         // The waves of the default ship have 17 pixels as it is.
         let (models, _) = computed(&[]);
-        assert!(!models.is_refined() && models.image == models.delivered);
+        assert!(!models.is_refined() && models.computed == models.image);
     }
 
     /// Neither a slow ship nor a large image makes more pixels than the limits; what is asked for is known.

@@ -1,6 +1,9 @@
 //! Fields for other tools: `NumPy` arrays, TIFF with the size of the pixels, images and arrays of other crates.
 //!
-//! ```
+//! With the feature `png`:
+//!
+#![cfg_attr(feature = "png", doc = "```")]
+#![cfg_attr(not(feature = "png"), doc = "```ignore")]
 //! use wake_physics::{Field, Raster};
 //!
 //! let field = Field::from_fn(&Raster::image(2, 3, 1.0), |row, column| (10 * row + column) as f32);
@@ -11,6 +14,7 @@
 
 use crate::error::Result;
 use crate::raster::Field;
+#[cfg(feature = "png")]
 use image::{ImageBuffer, Luma};
 use std::path::Path;
 use whole_files::write_atomically;
@@ -96,6 +100,7 @@ fn tiff_of(raster: &crate::Raster, field: &Field) -> tiff::TiffResult<Vec<u8>> {
 /// # Panics
 ///
 /// If there are not rows × columns values.
+#[cfg(feature = "png")]
 impl From<Field> for ImageBuffer<Luma<f32>, Vec<f32>> {
     fn from(field: Field) -> Self {
         Self::from_raw(field.columns as u32, field.rows as u32, field.values)
@@ -103,6 +108,7 @@ impl From<Field> for ImageBuffer<Luma<f32>, Vec<f32>> {
     }
 }
 
+#[cfg(feature = "png")]
 impl From<ImageBuffer<Luma<f32>, Vec<f32>>> for Field {
     fn from(image: ImageBuffer<Luma<f32>, Vec<f32>>) -> Self {
         Self {
@@ -166,6 +172,7 @@ mod tests {
         assert_eq!(data[4 * 7..4 * 8], 11.5f32.to_le_bytes());
     }
 
+    #[cfg(feature = "png")]
     #[test]
     fn images_have_columns_and_rows_where_fields_have_them() {
         let image = ImageBuffer::from(field());

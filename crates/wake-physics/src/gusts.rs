@@ -128,7 +128,7 @@ impl Gusts {
 
     /// ∬Φ over the cell around wavenumber 0.
     fn in_cell(&self, step: [f64; 2]) -> f64 {
-        let rule = crate::quadrature::GaussLegendre::new(24);
+        let rule = crate::numeric::GaussLegendre::new(24);
         let [down, right] = step.map(|s| 0.5 * s);
         rule.integrate([-right, right], |kx| {
             rule.integrate([-down, down], |ky| self.density([kx, ky]))
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn the_density_integrates_to_the_variance() {
         let gusts = gusts();
-        let rule = crate::quadrature::GaussLegendre::new(40);
+        let rule = crate::numeric::GaussLegendre::new(40);
         let mut sum = 0.0;
         for ring in 0..40 {
             let k = |n: i32| 1e-5 * 1.5f64.powi(n);
@@ -241,7 +241,7 @@ mod tests {
                 assert!((f64::from(sigma0.at(4 * i, 4 * j + 2)) / factor(half) - 1.0).abs() < 1e-6);
             }
         }
-        let rule = crate::quadrature::GaussLegendre::new(60);
+        let rule = crate::numeric::GaussLegendre::new(60);
         let mean = rule.integrate([-9.0, 9.0], |z| {
             factor(0.06 * z) / 0.02 * (-0.5 * z * z).exp() / TAU.sqrt()
         });

@@ -10,7 +10,7 @@
 //!
 //! m = b = 0 is Wigley's parabolic hull with block coefficient 4/9.
 
-use crate::quadrature::GaussLegendre;
+use crate::numeric::GaussLegendre;
 use num_complex::Complex64;
 
 /// A hull symmetric fore and aft.

@@ -29,9 +29,10 @@
 //! | all | [`constants`], [`output`], [`export`], [`correlated`], [`dispersion`], [`window`] |
 //! | what is asked | [`scene`] |
 //! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`swell`], [`surface`] |
-//! | the ship | [`hull`], [`nufft`], [`kelvin`], [`turbulent`] |
+//! | the ship | [`hull`], [`kelvin`], [`turbulent`] |
 //! | the radar | [`permittivity`], [`scattering`], [`sar`], [`gusts`], [`slicks`] |
 //! | the image | [`grey`], [`labels`], [`picture`], [`measure`] |
+//! | tests and benches | [`reference`] |
 //!
 //! # Axes and units
 //!
@@ -54,9 +55,8 @@ struct Readme;
 // In the order of the data flow; docs/architecture.md is the same list.
 mod error;
 pub mod constants;
-mod vectorize;
+mod numeric;
 mod raster;
-mod quadrature;
 mod memory;
 mod workspace;
 pub mod output;
@@ -75,7 +75,7 @@ pub mod swell;
 pub mod surface;
 mod track;
 pub mod hull;
-pub mod nufft;
+mod nufft;
 pub mod kelvin;
 pub mod turbulent;
 pub mod permittivity;
@@ -84,16 +84,20 @@ pub mod sar;
 pub mod gusts;
 pub mod slicks;
 pub mod grey;
-mod modulation;
 mod wakes;
 mod computed;
+mod fields;
 mod models;
-mod survey;
+mod linear;
+mod effects;
 mod plan;
 pub mod labels;
+#[cfg(feature = "picture")]
 pub mod picture;
+mod prepared;
 mod simulate;
 pub mod measure;
+pub mod reference;
 
 pub use error::{Error, Result};
 pub use labels::{Labels, labels_of};

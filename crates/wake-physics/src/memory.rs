@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 pub(crate) fn check(
     [rows, columns]: [usize; 2],
     margin: [usize; 2],
-    (needed, advice): (u64, &'static str),
+    needed: u64,
+    advice: &'static str,
 ) -> Result<()> {
     if needed <= NEVER_ASKED {
         return Ok(());
@@ -146,9 +147,9 @@ mod tests {
 
     #[test]
     fn what_never_fits_is_refused_where_the_system_tells() {
-        assert!(check([1, 1], [0, 0], (0, "")).is_ok());
+        assert!(check([1, 1], [0, 0], 0, "").is_ok());
         if available().is_some() {
-            let message = check([9, 9], [0, 0], (u64::MAX, "lower grid.rows"))
+            let message = check([9, 9], [0, 0], u64::MAX, "lower grid.rows")
                 .unwrap_err()
                 .to_string();
             assert!(message.contains("grid.rows"), "{message}");

@@ -2,20 +2,17 @@
 
 use crate::computed::Computed;
 use crate::constants::SPEED_OF_LIGHT;
-use crate::gusts::{Gusts, wind_exponent};
-use crate::kelvin::{Roughness, UnresolvedWaves};
+use crate::kelvin::KelvinWake;
 use crate::permittivity;
 use crate::raster::Raster;
 use crate::sar::impulse::Axis;
 use crate::sar::{AzimuthResolution, ImpulseResponse};
-use crate::scattering::breaking;
-use crate::scattering::hydrodynamic::{relaxation_rate, steepness};
+use crate::scattering::hydrodynamic::{action_slope, relaxation_rate};
 use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale, bragg};
 use crate::scene::{Radar, Scene, Term};
-use crate::slicks::{STRONGEST_WIND, Slicks};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
 use crate::swell::Swell;
-use crate::wakes::Wake;
+use crate::wakes::kelvin_wake;
 use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
 use crate::window::Window;
@@ -26,9 +23,9 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 #[derive(Debug, Clone)]
 pub(crate) struct Models {
     /// Pixels that are computed: those of the image or finer ones, and the guard of an impulse response.
-    pub(crate) image: Raster,
+    pub(crate) computed: Raster,
     /// Pixels of the image.
-    pub(crate) delivered: Raster,
+    pub(crate) image: Raster,
     /// Spacing that the waves of a ship ask for \[m\], where what is computed is coarser.
     pub(crate) asked_spacing: Option<f64>,
     /// Impulse response in range and azimuth, if the scene asks for one.
@@ -51,43 +48,39 @@ pub(crate) struct Models {
     pub(crate) azimuth_resolution: f64,
     /// The swell, if there is one.
     pub(crate) swell: Option<Swell>,
-    /// The wakes, one a ship.
-    pub(crate) wakes: Vec<Wake>,
-    /// Whether the ships' waves that the pixels do not carry count.
-    pub(crate) counts_unresolved: bool,
-    /// They, ship by ship.
-    pub(crate) unresolved: Vec<UnresolvedWaves>,
-    /// Slicks, if the wind leaves them.
-    pub(crate) slicks: Option<Slicks>,
-    /// σ⁰ of breaking waves, 0 where it is not asked for.
-    pub(crate) breaking: f64,
-    /// Gusts and the exponent of the wind, if there are any.
-    pub(crate) gusts: Option<(Gusts, f64)>,
-    /// Noise of the radar as σ⁰.
-    pub(crate) noise: f64,
-    /// Standard deviation of the line-of-sight velocity of unresolved waves [m/s].
-    pub(crate) unresolved_velocity: f64,
-    /// Slopes of resolved waves that are averaged over nevertheless.
+    /// The Kelvin wakes, one a ship.
+    pub(crate) wakes: Vec<KelvinWake>,
+    /// Sea below the pixels, as variances.
+    pub(crate) subpixel: SubpixelVariance,
+}
+
+/// Variances of the waves of the sea that count without a phase.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SubpixelVariance {
+    /// Slopes of waves that pixels carry and that are averaged over nevertheless.
     averaged_slopes: SlopeCovariance,
+    /// Standard deviation of the line-of-sight velocity [m/s].
+    pub(crate) velocity: f64,
 }
 
 impl Models {
     pub(crate) fn new(scene: &Scene) -> Self {
         let sea = wind_sea(scene);
-        let delivered = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
+        let image = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
         let response = response(scene);
         let spectrum = DirectionalSpectrum::new(&sea);
         // Whatever spectrum the resolved waves have, the short ones are Elfouhaily's.
         let short_waves = Elfouhaily::new(scene.sea.wind_speed, scene.sea.fetch);
-        let steepness = steepness(
+        let action_slope = action_slope(
             &short_waves,
             bragg_wavenumber(&scene.radar),
             spectrum.wind(),
         );
         let relaxation_rate = relaxation(scene);
-        let wakes = Wake::of(scene, steepness / relaxation_rate);
-        let computed = Computed::new(&scene.grid, &delivered, response.as_ref(), &wakes);
-        let image = computed.raster;
+        let kelvin = |ship| kelvin_wake(ship, scene.sea.depth, scene.sea.time);
+        let wakes: Vec<KelvinWake> = scene.ships.iter().map(kelvin).collect();
+        let chosen = Computed::new(&scene.grid, &image, response.as_ref(), &wakes);
+        let computed = chosen.raster;
         let incidence = scene.radar.incidence.to_radians();
         let permittivity = permittivity::sea_water(
             scene.radar.frequency,
@@ -102,30 +95,16 @@ impl Models {
             short_waves,
             spectrum.wind(),
         );
-        let counts_unresolved = counts_unresolved(scene);
-        let waves = wakes.iter().filter(|_| counts_unresolved);
-        let band = unresolved_band(&image, &two_scale);
-        let unresolved = DirectionalSpectrum::new(&WindSea {
+        let subpixel = DirectionalSpectrum::new(&WindSea {
             spectrum: crate::scene::SpectrumModel::Elfouhaily,
             ..sea
         })
-        .moments(image.nyquist_wavenumber(), f64::INFINITY, incidence);
+        .moments(computed.nyquist_wavenumber(), f64::INFINITY, incidence);
         Self {
-            delivered,
-            asked_spacing: computed.asked,
+            image,
+            asked_spacing: chosen.asked,
             response,
             swell: swell(scene),
-            slicks: slicks(scene),
-            breaking: if scene.sea.breaking {
-                breaking::backscatter(incidence, scene.sea.wind_speed)
-            } else {
-                0.0
-            },
-            gusts: gusts(scene),
-            noise: scene
-                .radar
-                .noise_floor
-                .map_or(0.0, |db| 10f64.powf(0.1 * db)),
             incidence,
             range_to_velocity: scene.radar.range_to_velocity,
             wavelength: SPEED_OF_LIGHT / scene.radar.frequency,
@@ -133,37 +112,30 @@ impl Models {
                 depth: scene.sea.depth,
                 incidence,
                 relaxation_rate,
-                steepness,
+                action_slope,
             },
-            counts_unresolved,
-            unresolved: waves
-                .filter_map(|wake| wake.kelvin.unresolved(band))
-                .collect(),
             two_scale,
             permittivity,
-            azimuth_resolution: scene.radar.resolution,
+            azimuth_resolution: scene.radar.azimuth_resolution,
             sea: spectrum,
             wakes,
-            unresolved_velocity: unresolved.radial_velocity.sqrt(),
-            averaged_slopes: SlopeCovariance::NONE,
-            image,
+            subpixel: SubpixelVariance {
+                averaged_slopes: SlopeCovariance::NONE,
+                velocity: subpixel.radial_velocity.sqrt(),
+            },
+            computed,
         }
     }
 
     /// Wavenumbers of the ships' waves that the pixels do not carry and that tilt shorter ones [rad/m].
-    pub(crate) fn unresolved_band(&self) -> [f64; 2] {
-        unresolved_band(&self.image, &self.two_scale)
-    }
-
-    /// What the ship's waves that the pixels do not carry have at a place (x, y) \[m\], if any reach it.
-    pub(crate) fn roughness(&self, place: [f64; 2]) -> Option<Roughness> {
-        let each = self.unresolved.iter().filter_map(|waves| waves.at(place));
-        each.reduce(|a, b| a.plus(&b))
+    pub(crate) fn subpixel_band(&self) -> [f64; 2] {
+        let split = self.two_scale.split_wavenumber();
+        [self.computed.nyquist_wavenumber(), split]
     }
 
     /// Whether what is computed are not the pixels of the image.
     pub(crate) fn is_refined(&self) -> bool {
-        self.image != self.delivered
+        self.computed != self.image
     }
 
     /// Averages over resolved waves too, as if a pixel held them.
@@ -171,23 +143,24 @@ impl Models {
     /// - `slopes`: their covariance
     /// - `velocity`: standard deviation of their line-of-sight velocity [m/s]
     pub(crate) fn average_over(&mut self, slopes: &SlopeCovariance, velocity: f64) {
-        self.averaged_slopes = self.averaged_slopes.plus(slopes);
-        self.unresolved_velocity = self.unresolved_velocity.hypot(velocity);
+        let subpixel = &mut self.subpixel;
+        subpixel.averaged_slopes = subpixel.averaged_slopes.plus(slopes);
+        subpixel.velocity = subpixel.velocity.hypot(velocity);
     }
 
-    /// σ⁰ of facets, with or without the average over unresolved slopes and the specular return.
+    /// σ⁰ of facets, with or without the average over subpixel slopes and the specular return.
     pub(crate) fn backscatter(&self, tilt_average: bool, specular: bool) -> Backscatter {
-        let unresolved = self.unresolved_slopes();
-        let lobe = Specular::mirror_lobe(self.radar_wavenumber(), self.image.spacing);
+        let subpixel = self.subpixel_slopes();
+        let lobe = Specular::mirror_lobe(self.radar_wavenumber(), self.computed.spacing);
         Backscatter {
             two_scale: self.two_scale.clone(),
             tilt: if tilt_average {
-                unresolved
+                subpixel
             } else {
                 SlopeCovariance::NONE
             },
             specular: if specular {
-                Specular::new(self.permittivity, self.incidence, &unresolved, lobe)
+                Specular::new(self.permittivity, self.incidence, &subpixel, lobe)
             } else {
                 Specular::NONE
             },
@@ -195,9 +168,21 @@ impl Models {
     }
 
     /// Slopes of the waves between the pixel's and the radar's split wavenumber, and of those that are averaged over.
-    pub(crate) fn unresolved_slopes(&self) -> SlopeCovariance {
-        let short = self.two_scale.slopes_from(self.image.nyquist_wavenumber());
-        short.plus(&self.averaged_slopes)
+    pub(crate) fn subpixel_slopes(&self) -> SlopeCovariance {
+        let short = self
+            .two_scale
+            .slopes_from(self.computed.nyquist_wavenumber());
+        short.plus(&self.subpixel.averaged_slopes)
+    }
+
+    /// Why there is no wake, if so.
+    pub(crate) fn no_wake(&self) -> Option<&'static str> {
+        match &self.wakes[..] {
+            [] => Some("there is no ship"),
+            [wake] if wake.speed == 0.0 => Some("the ship is at rest"),
+            wakes if wakes.iter().all(|w| w.speed == 0.0) => Some("all ships are at rest"),
+            _ => None,
+        }
     }
 
     /// Whether the wind raises no waves that scatter.
@@ -213,7 +198,7 @@ impl Models {
             self.wavelength,
             self.range_to_velocity,
             (self.azimuth_resolution, 1),
-            self.unresolved_velocity,
+            self.subpixel.velocity,
         );
         AzimuthResolution {
             nominal: self.resolution_at_rest().nominal,
@@ -281,25 +266,15 @@ fn response(scene: &Scene) -> Option<ImpulseResponse> {
     let radar = &scene.radar;
     let resolution = radar
         .range_resolution
-        .filter(|_| scene.model.terms.allow(Term::Response))?;
+        .filter(|_| scene.model.terms.allow(Term::ImpulseResponse))?;
     let window = radar.window.unwrap_or(Window::Uniform);
     Some(ImpulseResponse {
         range: Axis { resolution, window },
         azimuth: Axis {
-            resolution: radar.resolution,
+            resolution: radar.azimuth_resolution,
             window: radar.azimuth_window.unwrap_or(window),
         },
     })
-}
-
-fn unresolved_band(image: &Raster, two_scale: &TwoScale) -> [f64; 2] {
-    [image.nyquist_wavenumber(), two_scale.split_wavenumber()]
-}
-
-/// Whether the waves that pixels do not carry count: where an impulse response is asked for, also if pixels of their own do
-/// as well. On the pixels of an image as they are they are left out, as in the model that this one started from.
-fn counts_unresolved(scene: &Scene) -> bool {
-    scene.radar.range_resolution.is_some() && scene.model.terms.allow(Term::Unresolved)
 }
 
 fn swell(scene: &Scene) -> Option<Swell> {
@@ -308,26 +283,5 @@ fn swell(scene: &Scene) -> Option<Swell> {
         height: sea.swell_height,
         wavelength: sea.swell_length,
         toward: sea.swell_toward.rem_euclid(360.0).to_radians(),
-    })
-}
-
-fn slicks(scene: &Scene) -> Option<Slicks> {
-    let sea = &scene.sea;
-    (sea.slick_damping > 0.0 && sea.wind_speed <= STRONGEST_WIND).then_some(Slicks {
-        damping: sea.slick_damping,
-        width: sea.slick_width,
-        scale: sea.slick_scale,
-    })
-}
-
-fn gusts(scene: &Scene) -> Option<(Gusts, f64)> {
-    let sea = &scene.sea;
-    (sea.gust_strength > 0.0).then(|| {
-        let gusts = Gusts {
-            strength: sea.gust_strength,
-            scale: sea.gust_scale,
-            wind_toward: sea.wind_toward.rem_euclid(360.0).to_radians(),
-        };
-        (gusts, wind_exponent(scene.radar.frequency))
     })
 }

@@ -2,15 +2,19 @@
 
 use crate::error::{Error, Result};
 use crate::raster::Field;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+#[cfg(feature = "picture")]
+use image::codecs::png::{CompressionType, FilterType};
+#[cfg(feature = "png")]
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use num_complex::Complex32;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use whole_files::{write_atomically, write_with};
+#[cfg(feature = "png")]
+use whole_files::write_atomically;
+use whole_files::write_with;
 
 /// Numbers that are turned into bytes at once.
 const PIECE: usize = 1 << 16;
@@ -36,6 +40,7 @@ fn file_error(action: &'static str, path: &Path, error: &dyn std::fmt::Display) 
 /// # Panics
 ///
 /// If there are not rows × columns pixels.
+#[cfg(feature = "png")]
 pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
     Ok(write_atomically(
         path,
@@ -54,6 +59,7 @@ pub fn write_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Res
 /// # Panics
 ///
 /// If there are not rows × columns pixels.
+#[cfg(feature = "png")]
 pub fn encode_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
@@ -66,6 +72,7 @@ pub fn encode_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Re
 /// and sooner packed.
 ///
 /// Mostly grey speckle: without filters the three equal bytes of a pixel compress to little more than one.
+#[cfg(feature = "picture")]
 pub(crate) fn write_rgb_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
     let colours = pixels.as_chunks::<3>().0;
     if colours.iter().all(|[r, g, b]| r == g && g == b) {
@@ -199,6 +206,7 @@ mod tests {
         assert_eq!(tensor.data(), expected);
     }
 
+    #[cfg(feature = "png")]
     #[test]
     fn pictures_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
@@ -210,6 +218,7 @@ mod tests {
     }
 
     /// A picture without colours is stored in one byte a pixel, one with a colour in three; both read back as they were.
+    #[cfg(feature = "picture")]
     #[test]
     fn pictures_keep_their_colours() {
         let folder = tempfile::tempdir().unwrap();

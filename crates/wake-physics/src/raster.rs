@@ -1,6 +1,6 @@
 //! Pixels and their places: the raster every stage works on, and the fields that live on it.
 
-use crate::vectorize::vectorized;
+use crate::numeric::vectorized;
 use rayon::prelude::*;
 
 /// Values that one task works on.

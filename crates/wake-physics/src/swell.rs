@@ -117,7 +117,7 @@ impl Swell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quadrature::GaussLegendre;
+    use crate::numeric::GaussLegendre;
 
     /// ∬Ψ = H²/16 and the mean direction, in polar coordinates, around a swell across the cut of atan2 too.
     #[test]

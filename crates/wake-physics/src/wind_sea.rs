@@ -274,7 +274,7 @@ mod tests {
                 depth,
                 incidence,
                 relaxation_rate: 1.0,
-                steepness: 4.5,
+                action_slope: 4.5,
             };
             let (low, high) = (0.05, 40.0);
             let (radii, angles) = (600, 720);

@@ -8,13 +8,16 @@
 //! ρ²(x) = |∫W² e^{2πifx} df / ∫W² df|²          correlation of the intensity of a rough surface at the distance x
 //! ```
 
-use crate::quadrature::GaussLegendre;
+use crate::numeric::{GaussLegendre, root};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
 /// The rule of the integrals over the window: exact to rounding up to the distance [`FARTHEST`].
 static RULE: LazyLock<GaussLegendre> = LazyLock::new(|| GaussLegendre::new(96));
+
+/// Steps of the searches for zeros.
+const HALVINGS: usize = 60;
 
 /// Farthest sidelobe looked at \[1/B\].
 const FARTHEST: f64 = 20.0;
@@ -76,7 +79,7 @@ impl Window {
     #[must_use]
     pub fn width(self) -> f64 {
         let half = |x: f64| self.response(x).powi(2) - 0.5;
-        2.0 * root(half, [0.0, self.first_null()])
+        2.0 * root(half, [0.0, self.first_null()], HALVINGS)
     }
 
     /// Highest sidelobe of h² over its peak \[dB\].
@@ -195,7 +198,7 @@ impl Window {
         while self.response(x + step) > 0.0 && x < FARTHEST {
             x += step;
         }
-        root(|x| self.response(x), [x, x + step])
+        root(|x| self.response(x), [x, x + step], HALVINGS)
     }
 }
 
@@ -211,19 +214,6 @@ fn equivalent(count: u32, correlation: impl Fn(u32) -> f64) -> f64 {
 /// ∫ over the bandwidth.
 fn over_band(f: impl Fn(f64) -> f64) -> f64 {
     RULE.integrate([-0.5, 0.5], f)
-}
-
-/// The zero of a function that falls from `from` to `to`, by bisection.
-fn root(f: impl Fn(f64) -> f64, [mut from, mut to]: [f64; 2]) -> f64 {
-    for _ in 0..60 {
-        let middle = 0.5 * (from + to);
-        if f(middle) > 0.0 {
-            from = middle;
-        } else {
-            to = middle;
-        }
-    }
-    0.5 * (from + to)
 }
 
 /// sin πx/(πx).

@@ -50,8 +50,8 @@ impl<'a> Scenes<'a> {
         let mut base = Scene::default().with_assignments(&assignments)?;
         base.ships.clear();
         // Noise is that of the product; ambiguities may lie in other blocks.
-        base.radar.noise_floor = None;
-        (base.radar.ambiguity, base.radar.pulse_rate) = (None, None);
+        base.radar.nesz = None;
+        (base.radar.azimuth_ambiguity, base.radar.prf) = (None, None);
         base.radar.frequency = sentinel.annotation().radar_frequency;
         base.sea.wind_speed = wind.speed;
         base.validate()?;

@@ -201,7 +201,8 @@ mod tests {
     use super::*;
     use crate::{Reading, TOKENS, Tokenizer};
     use proptest::prelude::*;
-    use wake_physics::scene::{Ship, paper_grid};
+    use wake_physics::reference::paper_grid;
+    use wake_physics::scene::Ship;
 
     /// Any valid ship, sea and radar, as far as a prompt speaks of them.
     fn scenes() -> impl Strategy<Value = Scene> {

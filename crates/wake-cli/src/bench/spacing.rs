@@ -38,7 +38,7 @@ fn scene(divisions: Option<u32>) -> Result<Scene> {
         "radar.incidence=35",
         "radar.range_to_velocity=115",
         "radar.range_resolution=20",
-        "radar.resolution=20",
+        "radar.azimuth_resolution=20",
         "ship.speed=6.5",
         "ship.position=[550, 550]",
     ];

@@ -102,7 +102,7 @@ fn harmonic_seconds(scene: &Scene) -> f64 {
         depth: scene.sea.depth,
         incidence: scene.radar.incidence.to_radians(),
         relaxation_rate: 1.0,
-        steepness: 4.5,
+        action_slope: 4.5,
     };
     let spectrum = DirectionalSpectrum::new(&WindSea {
         wind_speed: scene.sea.wind_speed,

@@ -55,7 +55,7 @@ fn manifest_of(numbers: [f64; 12]) -> Manifest {
 
 fn scene_of([a, b, c]: [f64; 3]) -> Scene {
     let mut scene = Scene::default();
-    (scene.sea.wind_speed, scene.radar.noise_floor) = (a, Some(b));
+    (scene.sea.wind_speed, scene.radar.nesz) = (a, Some(b));
     scene.ships[0].position = [b, c];
     scene
 }

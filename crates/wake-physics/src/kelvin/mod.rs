@@ -6,28 +6,27 @@
 //!
 //! with ξ forward of midship and η to port. The waves lie on one curve in the plane of wavenumbers, so the
 //! integral is a sum of plane waves as soon as its nodes are chosen ([`KelvinWake::plan`]); any field of
-//! them follows from [`synthesize`](crate::nufft::synthesize). Files: `steady` the curve, `rays` where each wave is seen and how far the arms open, `zones` which part
-//! of it reaches a raster, `panels` the nodes, `turning` those of a ship that turns, `fade` where the waves are shown, `unresolved` what pixels do
+//! them follows from [`synthesize`](crate::reference::synthesize). Files: `steady` the curve, `rays` where each wave is seen and how far the arms open, `zones` which part
+//! of it reaches a raster, `panels` the nodes, `turning` those of a ship that turns, `fade` where the waves are shown, `subpixel` what pixels do
 //! not carry, `resistance` the work the ship does for them, `direct` the slow integral that everything is checked against.
 
-mod direct;
+pub(crate) mod direct;
 mod fade;
 mod panels;
 mod rays;
 mod resistance;
 mod steady;
 mod turning;
-mod unresolved;
+mod subpixel;
 mod zones;
 
-pub use direct::direct_quadrature;
 pub use fade::{fade, fade_field};
 pub(crate) use fade::{fade_at, fill_fade};
 pub use panels::{WakePlan, Zone};
 pub(crate) use rays::Ray;
 pub use rays::{KELVIN_ANGLE, half_angle};
+pub(crate) use subpixel::{LARGEST_SLOPE_VARIANCE, Roughness, SubpixelWake};
 pub(crate) use turning::RingWork;
-pub(crate) use unresolved::{LARGEST_SLOPE_VARIANCE, Roughness, UnresolvedWaves};
 
 use crate::constants::GRAVITY;
 use crate::hull::Hull;

@@ -3,7 +3,7 @@
 use super::turning::{RingWork, Rings};
 use super::zones::{Piece, Reach};
 use super::{CUSP_ANGLE, KelvinWake};
-use crate::quadrature::{GaussLegendre, largest_phase};
+use crate::numeric::{GaussLegendre, largest_phase};
 use crate::raster::Raster;
 use crate::waves::PlaneWaves;
 use num_complex::Complex64;

@@ -2,6 +2,7 @@
 
 use super::KelvinWake;
 use super::steady::SteadyWaves;
+use crate::numeric::largest;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Kelvin's angle arcsin(1/3) \[rad\]: the arms of a wake in deep water leave the track at it.
@@ -97,33 +98,11 @@ pub fn half_angle(speed: f64, depth: f64) -> f64 {
         // F² = 1/(1 + excess).
         return (1.0 + excess).sqrt().min(1.0).asin();
     }
-    let largest = largest_value(SEARCH, |ln_u| {
+    let steepest = |ln_u: f64| {
         let [_, along, across] = waves.at(ln_u.exp()).rates;
         along.atan2(across)
-    });
-    largest.clamp(KELVIN_ANGLE, FRAC_PI_2)
-}
-
-/// The largest value of a function with one peak in an interval, by golden sections.
-fn largest_value([mut low, mut high]: [f64; 2], value: impl Fn(f64) -> f64) -> f64 {
-    let golden = 0.5 * (5f64.sqrt() - 1.0);
-    let inner = |low: f64, high: f64| [high - golden * (high - low), low + golden * (high - low)];
-    let mut at = inner(low, high);
-    let mut values = at.map(&value);
-    for _ in 0..STEPS {
-        if values[0] < values[1] {
-            low = at[0];
-            (at[0], values[0]) = (at[1], values[1]);
-            at[1] = inner(low, high)[1];
-            values[1] = value(at[1]);
-        } else {
-            high = at[1];
-            (at[1], values[1]) = (at[0], values[0]);
-            at[0] = inner(low, high)[0];
-            values[0] = value(at[0]);
-        }
-    }
-    values[0].max(values[1])
+    };
+    largest(steepest, SEARCH, STEPS).clamp(KELVIN_ANGLE, FRAC_PI_2)
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::kelvin::direct::direct_quadrature;
 use crate::nufft::synthesize;
 use crate::raster::Raster;
 use crate::waves::{Quantity, Transfer, harmonic_sum};
@@ -8,7 +9,7 @@ const DEEP: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: 0.5,
     relaxation_rate: 0.5,
-    steepness: 4.5,
+    action_slope: 4.5,
 };
 
 fn wake(hull: Hull, speed: f64, heading: f64) -> KelvinWake {

@@ -5,10 +5,14 @@
 //! curve. What lies outside may be cut off, if the cut is smooth over many periods.
 
 use super::steady::SteadyWaves;
-use crate::quadrature::GaussLegendre;
+use crate::numeric::{GaussLegendre, root, smallest_at};
 
 /// Samples of the curve between which a change of sign is looked for.
 const SAMPLES: usize = 400;
+
+/// Steps of the searches for zeros and valleys.
+const HALVINGS: usize = 50;
+const THIRDS: usize = 40;
 
 /// Places of interest, seen from the ship, and how fast phases turn there along the curve.
 #[derive(Debug, Clone)]
@@ -121,10 +125,16 @@ impl Reach {
                     seeds.push([at(i), at(after)]);
                 }
             } else if slow[i] <= slow[i.saturating_sub(1)] && slow[i] <= slow[after] {
-                seeds.push([smallest(|u| self.slowest(u), at(i.saturating_sub(1)), at(after)); 2]);
+                seeds.push(
+                    [smallest_at(
+                        |u| self.slowest(u),
+                        [at(i.saturating_sub(1)), at(after)],
+                        THIRDS,
+                    ); 2],
+                );
             }
             if middle(at(i)) * middle(at(after)) < 0.0 {
-                seeds.push([root(middle, at(i), at(after)); 2]);
+                seeds.push([root(middle, [at(i), at(after)], HALVINGS); 2]);
             }
         }
         seeds.push([to, to]);
@@ -191,33 +201,6 @@ fn merged(mut seeds: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     out
 }
 
-/// A zero of `f` between two points of unlike sign, by halving.
-fn root(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
-    let sign = f(a) > 0.0;
-    for _ in 0..50 {
-        let middle = 0.5 * (a + b);
-        if (f(middle) > 0.0) == sign {
-            a = middle;
-        } else {
-            b = middle;
-        }
-    }
-    0.5 * (a + b)
-}
-
-/// The place of the smallest value of a function with one valley, by thirds.
-fn smallest(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
-    for _ in 0..40 {
-        let (p, q) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
-        if f(p) < f(q) {
-            b = q;
-        } else {
-            a = p;
-        }
-    }
-    0.5 * (a + b)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -271,10 +254,10 @@ mod tests {
 
     #[test]
     fn zeros_and_valleys_are_found() {
-        assert!((root(|x| x.cos(), 1.0, 2.0) - PI / 2.0).abs() < 1e-14);
-        assert!((root(|x| -x.cos(), 1.0, 2.0) - PI / 2.0).abs() < 1e-14);
+        assert!((root(|x| x.cos(), [1.0, 2.0], HALVINGS) - PI / 2.0).abs() < 1e-14);
+        assert!((root(|x| -x.cos(), [1.0, 2.0], HALVINGS) - PI / 2.0).abs() < 1e-14);
         // Forty thirds of the interval.
-        let found = smallest(|x| (x - 0.3).abs(), -1.0, 2.0);
+        let found = smallest_at(|x| (x - 0.3).abs(), [-1.0, 2.0], THIRDS);
         assert!((found - 0.3).abs() < 3.0 * (2f64 / 3.0).powi(40));
     }
 }

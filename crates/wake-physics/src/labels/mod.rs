@@ -7,10 +7,13 @@
 mod clip;
 mod curve;
 mod dark_line;
+mod empty_list;
 mod short_waves;
 mod visibility;
 
+use crate::effects::Effects;
 use crate::kelvin::half_angle;
+use crate::linear::OpenSea;
 use crate::models::Models;
 use crate::raster::Raster;
 use crate::sar::geometry::{azimuth_displacement, direction, ship_radial_velocity};
@@ -171,27 +174,35 @@ pub struct WakeLabel {
 /// displacement over a wave is zero in linear theory.
 #[must_use]
 pub fn labels_of(scene: &Scene) -> Labels {
-    labels_with(scene, &Models::new(scene))
+    let models = Models::new(scene);
+    let effects = Effects::new(scene, &models);
+    labels_with(scene, &models, &effects, &OpenSea::new(&models))
 }
 
 /// Labels of a valid scene whose models are already built; see [`labels_of`].
-pub(crate) fn labels_with(scene: &Scene, models: &Models) -> Labels {
+pub(crate) fn labels_with(
+    scene: &Scene,
+    models: &Models,
+    effects: &Effects,
+    open: &OpenSea,
+) -> Labels {
     let grid = &scene.grid;
     let raster = Raster::image(grid.rows, grid.columns, grid.spacing);
-    let (sea, wakes) = Background::new(scene, models);
-    let ships = scene.ships.iter().zip(&wakes).map(|(ship, wake)| {
+    let sea = Background::new(scene, models, effects, open);
+    let ships = scene.ships.iter().enumerate().map(|(n, ship)| {
+        let wake = &models.wakes[n];
         let heading = ship.heading_at(scene.sea.time);
-        let frame = Frame::new(wake.kelvin.track.position, heading, &raster);
+        let frame = Frame::new(wake.track.position, heading, &raster);
         let opening = half_angle(ship.speed, scene.sea.depth);
         let extent = match &sea {
-            Some(sea) if ship.speed > 0.0 => sea.extent(wake, opening),
+            Some(sea) if ship.speed > 0.0 => sea.extent(n, opening),
             _ => Extent::NOTHING,
         };
         LabelledShip {
             ship: frame.ship(ship, echo_displacement(scene, ship)),
-            wake: match wake.kelvin.track.turn() {
+            wake: match wake.track.turn() {
                 None => frame.wake(ship, opening, &extent),
-                Some(_) => frame.curved_wake(&wake.kelvin, opening, &extent),
+                Some(_) => frame.curved_wake(wake, opening, &extent),
             },
         }
     });
@@ -408,37 +419,6 @@ fn extent_of(polygons: &[Polygon], axis: [f64; 2]) -> [f64; 2] {
         let [a, b] = polygon.extent(axis);
         [low.min(a), high.max(b)]
     })
-}
-
-/// `None` as an empty list.
-mod empty_list {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum List<T> {
-        Full(T),
-        Empty([(); 0]),
-    }
-
-    pub(super) fn serialize<T: Serialize, S: Serializer>(
-        value: &Option<T>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        match value {
-            Some(value) => value.serialize(serializer),
-            None => [(); 0].serialize(serializer),
-        }
-    }
-
-    pub(super) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<T>, D::Error> {
-        Ok(match List::deserialize(deserializer)? {
-            List::Full(value) => Some(value),
-            List::Empty([]) => None,
-        })
-    }
 }
 
 #[cfg(test)]

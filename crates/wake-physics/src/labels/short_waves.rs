@@ -1,6 +1,7 @@
 //! How much brighter the sea is where a ship's waves roughen it that the pixels do not carry.
 
-use crate::kelvin::{KelvinWake, UnresolvedWaves};
+use crate::effects::Effects;
+use crate::kelvin::{KelvinWake, SubpixelWake};
 use crate::models::Models;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::Term;
@@ -22,38 +23,41 @@ const VARIANCES: [f64; 12] = [
 
 /// What a variance of slopes makes of the mean σ⁰ of a sea.
 #[derive(Debug)]
-pub(super) struct ShortWaves {
+pub(super) struct ShortWaves<'a> {
+    effects: &'a Effects,
     /// Averaged over all slopes of the sea.
     backscatter: Backscatter,
     /// The mean σ⁰, Bragg and specular \[1\], above 0.
     mean: f64,
-    /// Wavenumbers of the waves that count [rad/m].
-    band: [f64; 2],
     /// ln of σ⁰ over its mean, by direction and variance; computed when the first waves count.
     table: OnceLock<[[f64; VARIANCES.len()]; DIRECTIONS]>,
 }
 
-impl ShortWaves {
+impl<'a> ShortWaves<'a> {
     /// Those of a sea whose models average over all its slopes; `None` if no such waves are drawn.
-    pub(super) fn new(models: &Models, drawn: impl Fn(Term) -> bool) -> Option<Self> {
-        if !models.counts_unresolved {
+    pub(super) fn new(
+        models: &Models,
+        effects: &'a Effects,
+        drawn: impl Fn(Term) -> bool,
+    ) -> Option<Self> {
+        if !effects.subpixel_wake.counted {
             return None;
         }
         let backscatter = models.backscatter(drawn(Term::TiltAverage), drawn(Term::Specular));
         let mean = backscatter.mean_over(&SlopeCovariance::NONE);
         let mean = mean[0] + mean[1];
         (mean > 0.0).then(|| Self {
+            effects,
             backscatter,
             mean,
-            band: models.unresolved_band(),
             table: OnceLock::new(),
         })
     }
 
     /// The waves of a ship that are steep enough to count.
-    pub(super) fn of(&self, wake: &KelvinWake) -> Option<WavesOfShip<'_>> {
-        let waves = wake.unresolved(self.band)?;
-        let strongest = waves.steepest(0.5 * wake.hull.length());
+    pub(super) fn of(&self, ship: usize) -> Option<WavesOfShip<'_>> {
+        let waves = self.effects.subpixel_wake.waves[ship].as_ref()?;
+        let strongest = waves.steepest(0.5 * waves.length());
         (strongest >= LEAST_VARIANCE).then_some(WavesOfShip { sea: self, waves })
     }
 
@@ -110,8 +114,8 @@ impl ShortWaves {
 /// The waves of one ship on a sea.
 #[derive(Debug)]
 pub(super) struct WavesOfShip<'s> {
-    sea: &'s ShortWaves,
-    waves: UnresolvedWaves,
+    sea: &'s ShortWaves<'s>,
+    waves: &'s SubpixelWake,
 }
 
 impl WavesOfShip<'_> {
@@ -180,8 +184,10 @@ mod tests {
                 format!("radar.incidence={incidence}"),
             ];
             let set = set.each_ref().map(String::as_str);
-            let models = Models::new(&Scene::default().with_assignments(&set).unwrap());
-            let sea = ShortWaves::new(&models, |_| true).unwrap();
+            let scene = Scene::default().with_assignments(&set).unwrap();
+            let models = Models::new(&scene);
+            let effects = Effects::new(&scene, &models);
+            let sea = ShortWaves::new(&models, &effects, |_| true).unwrap();
             for degrees in [4.0f64, 22.0, 52.0, 97.0, 128.0, 171.0] {
                 for variance in [0.001, 0.003, 0.0085, 0.015, 0.0225, 0.03] {
                     let (sin, cos) = degrees.to_radians().sin_cos();

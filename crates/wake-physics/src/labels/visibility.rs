@@ -2,16 +2,16 @@
 
 use super::dark_line::DarkLine;
 use super::short_waves::{Profile, ShortWaves};
+use crate::effects::Effects;
 use crate::kelvin::{KelvinWake, Ray};
+use crate::linear::{OpenSea, over_mean};
 use crate::models::Models;
-use crate::modulation::{ModulationTransfer, smear};
 use crate::raster::Raster;
+use crate::scattering::modulation::{ModulationTransfer, smear};
 use crate::scene::{Scene, Term};
-use crate::survey::Survey;
 use crate::track::Track;
 use crate::turbulent::TurbulentWake;
 use crate::turbulent::current::WakeEdge;
-use crate::wakes::Wake;
 use crate::window::sinc;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -83,7 +83,9 @@ struct ImagedRay {
 
 /// The sea that a wake is seen against.
 #[derive(Debug)]
-pub(super) struct Background {
+pub(super) struct Background<'a> {
+    models: &'a Models,
+    effects: &'a Effects,
     transfer: ModulationTransfer,
     raster: Raster,
     /// Largest wavenumber that the computed pixels carry [rad/m].
@@ -102,66 +104,67 @@ pub(super) struct Background {
     dark_line_drawn: bool,
     edges_drawn: bool,
     /// What the waves make that the pixels do not carry, if they are drawn.
-    short_waves: Option<ShortWaves>,
+    short_waves: Option<ShortWaves<'a>>,
     /// Mean velocity toward the radar [m/s].
     pub(super) velocity: f64,
 }
 
-impl Background {
-    /// The open sea of a scene, `None` if the image is dark, and the wakes of its ships.
-    ///
-    /// - `models`: the models of the scene
-    pub(super) fn new(scene: &Scene, models: &Models) -> (Option<Self>, Vec<Wake>) {
-        let mut models = models.clone();
-        let wakes = std::mem::take(&mut models.wakes);
+impl<'a> Background<'a> {
+    /// The open sea of a scene, `None` if the image is dark.
+    pub(super) fn new(
+        scene: &Scene,
+        models: &'a Models,
+        effects: &'a Effects,
+        open: &OpenSea,
+    ) -> Option<Self> {
         let drawn = |term| scene.model.terms.allow(term);
-        let survey = Survey::new(scene, &models);
-        if survey.mean[0] + survey.mean[1] <= 0.0 {
-            return (None, wakes);
+        if open.mean[0] + open.mean[1] <= 0.0 {
+            return None;
         }
-        let velocity = survey.mean_velocity(scene, &models);
         let [range_resolution, own] = models.response.map_or([0.0; 2], |response| {
             [response.range, response.azimuth].map(|axis| OF_HALF_POWER * axis.resolution)
         });
         let mut resolution = models.resolution_at_rest().nominal;
-        if drawn(Term::Sea) {
-            let (slopes, velocity) = survey.resolved_sea();
-            models.average_over(&slopes, velocity);
-        }
-        if drawn(Term::Bunching) {
-            resolution = models.resolution().at(0.0);
+        let averaged = match drawn(Term::Sea) {
+            true => open.averaged(models),
+            false => models.clone(),
+        };
+        if drawn(Term::VelocityBunching) {
+            resolution = averaged.resolution().at(0.0);
         }
         resolution = resolution.hypot(own);
-        let mut transfer = survey.modulation_of(&models);
-        if !drawn(Term::Bunching) {
+        let mut transfer = open.modulation_of(&averaged);
+        if !drawn(Term::VelocityBunching) {
             transfer.range_to_velocity = 0.0;
         }
         let added: f64 = [Term::Breaking, Term::Noise]
             .into_iter()
-            .zip(survey.added)
+            .zip(effects.added())
             .filter(|(term, _)| drawn(*term))
-            .map(|(_, added)| added)
+            .map(|(_, sigma0)| over_mean(sigma0, open.mean))
             .sum();
         let mut background = Self {
+            models,
+            effects,
             transfer,
-            raster: models.delivered,
-            largest: models.image.nyquist_wavenumber(),
+            raster: models.image,
+            largest: models.computed.nyquist_wavenumber(),
             share: 1.0 / (1.0 + added),
             resolution,
             range_resolution,
             square: match models.response {
-                None if models.is_refined() => models.delivered.spacing,
+                None if models.is_refined() => models.image.spacing,
                 _ => 0.0,
             },
             noise: 0.0,
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
-            edges_drawn: drawn(Term::Edge),
-            short_waves: ShortWaves::new(&models, drawn),
-            velocity,
+            edges_drawn: drawn(Term::BrightEdge),
+            short_waves: ShortWaves::new(&averaged, effects, drawn),
+            velocity: open.mean_velocity(scene, models),
         };
-        let sea: f64 = survey
-            .sea
+        let sea: f64 = open
+            .waves
             .iter()
             .filter(|_| drawn(Term::Sea))
             .map(|w| w.variance * background.modulation(w.k, w.omega))
@@ -172,7 +175,7 @@ impl Background {
             0.0
         };
         background.noise = (sea + speckle).sqrt().max(LEAST_NOISE);
-        (Some(background), wakes)
+        Some(background)
     }
 
     /// Mean square of the relative change of the image by a wave of unit mean square elevation [1/m²].
@@ -185,12 +188,13 @@ impl Background {
     }
 
     /// How far a wake is seen that opens by `half_angle` \[rad\].
-    pub(super) fn extent(&self, wake: &Wake, half_angle: f64) -> Extent {
+    pub(super) fn extent(&self, ship: usize, half_angle: f64) -> Extent {
         let step = WINDOW as f64 * self.raster.spacing;
-        let band = self.dark_line(wake.turbulent, wake.edge);
-        let wake = &wake.kelvin;
+        let edge = self.effects.bright_edge.edges[ship];
+        let band = self.dark_line(self.effects.turbulent.wakes[ship], edge);
+        let wake = &self.models.wakes[ship];
         let rays = self.rays(wake);
-        let short = self.short_waves.as_ref().and_then(|short| short.of(wake));
+        let short = self.short_waves.as_ref().and_then(|short| short.of(ship));
         let turns = wake.track.turn().is_some();
         let half_length = 0.5 * wake.hull.length();
         let mut extent = Extent::NOTHING;

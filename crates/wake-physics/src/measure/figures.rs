@@ -115,7 +115,7 @@ impl StatedSpeckle {
                 }
             })
         };
-        let azimuth = radar.range_resolution.map(|_| radar.resolution);
+        let azimuth = radar.range_resolution.map(|_| radar.azimuth_resolution);
         Self {
             looks,
             along_rows: lags(radar.range_resolution, window),
@@ -140,7 +140,7 @@ mod tests {
         assert!(white.along_rows.iter().all(|lag| lag.abs() < 1e-15));
         (scene.radar.window, scene.radar.azimuth_window) = (Some(Window::Uniform), None);
         (scene.radar.looks, scene.radar.look_overlap) = (1, None);
-        (scene.radar.range_resolution, scene.radar.resolution) = (Some(4.0), 8.0);
+        (scene.radar.range_resolution, scene.radar.azimuth_resolution) = (Some(4.0), 8.0);
         let cell = Window::Uniform.width();
         let stated = StatedSpeckle::of(&scene, 4.0 / cell);
         let half = amplitude_correlation(1.0, (2.0 / std::f64::consts::PI).powi(2));

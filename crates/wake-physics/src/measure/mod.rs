@@ -20,7 +20,7 @@ mod median;
 mod open_sea;
 mod profile;
 mod radial;
-mod shape;
+pub(crate) mod shape;
 mod smooth;
 mod spectrum;
 mod stationary;
@@ -36,7 +36,7 @@ pub use median::median;
 pub use open_sea::{OpenSea, open_sea};
 pub use profile::{Streak, WakeAxis, WakeProfile, wake_arms, wake_profile};
 pub use radial::{Binning, RadialSpectrum, radial_spectrum};
-pub use shape::{SeaShape, crest_variance, sea_shape, seams};
+pub use shape::{SeaShape, crest_variance, sea_shape};
 pub use texture::{Texture, amplitude_correlation, texture};
 pub use wake::{WakeMeasurement, kelvin_wedge, measure_wake};
 

@@ -23,7 +23,7 @@ pub struct SeaShape {
     pub kurtosis: f64,
     /// Skewness of the derivative along range, along azimuth, and along the wind \[1\]: above 0 where values rise more
     /// steeply than they fall.
-    pub steepness: [f64; 3],
+    pub derivative_skewness: [f64; 3],
     /// Standard deviation over mean of the local energy \[1\]: large where waves come in groups.
     pub grouping: f64,
 }
@@ -67,7 +67,7 @@ pub fn sea_shape(field: &Field, wind_toward: f64) -> Option<SeaShape> {
     Some(SeaShape {
         skewness: skewness(&deviations.values),
         kurtosis: moment(&deviations.values, 4) / (variance * variance) - 3.0,
-        steepness: [along([1.0, 0.0]), along([0.0, 1.0]), along([sin, cos])],
+        derivative_skewness: [along([1.0, 0.0]), along([0.0, 1.0]), along([sin, cos])],
         grouping: spread.sqrt() / level,
     })
 }
@@ -199,8 +199,8 @@ mod tests {
         let n = (SIDE * SIDE) as f64;
         assert!(shape.skewness.abs() < 5.0 * (6.0 / n).sqrt(), "{shape:?}");
         assert!(shape.kurtosis.abs() < 5.0 * (24.0 / n).sqrt(), "{shape:?}");
-        for steepness in shape.steepness {
-            assert!(steepness.abs() < 10.0 * (6.0 / n).sqrt(), "{shape:?}");
+        for skewness in shape.derivative_skewness {
+            assert!(skewness.abs() < 10.0 * (6.0 / n).sqrt(), "{shape:?}");
         }
         // The square of a normal number has the variance 2, which a bell of σ divides by 4πσ².
         let expected = (2.0 / (4.0 * PI * BELL * BELL)).sqrt();
@@ -236,21 +236,21 @@ mod tests {
         // Slopes 4 on a quarter and −4/3 on the rest: ⟨d³⟩/⟨d²⟩^{3/2} = (2/√3), less at the 4 of 64 pixels of the bends.
         let expected = 2.0 / 3f64.sqrt();
         assert!(
-            (range.steepness[0] / expected - 1.0).abs() < 0.08,
+            (range.derivative_skewness[0] / expected - 1.0).abs() < 0.08,
             "{range:?}"
         );
         assert!(
-            (range.steepness[2] - range.steepness[0]).abs() < 1e-6,
+            (range.derivative_skewness[2] - range.derivative_skewness[0]).abs() < 1e-6,
             "{range:?}"
         );
-        assert!(range.steepness[1].abs() < 1e-9, "{range:?}");
+        assert!(range.derivative_skewness[1].abs() < 1e-9, "{range:?}");
         let azimuth = sea_shape(&field(|i, _| saw(-(i as f64) / 64.0)), PI).unwrap();
         assert!(
-            (azimuth.steepness[1] / expected - 1.0).abs() < 0.08,
+            (azimuth.derivative_skewness[1] / expected - 1.0).abs() < 0.08,
             "{azimuth:?}"
         );
         assert!(
-            (azimuth.steepness[2] + azimuth.steepness[1]).abs() < 1e-6,
+            (azimuth.derivative_skewness[2] + azimuth.derivative_skewness[1]).abs() < 1e-6,
             "{azimuth:?}"
         );
     }

@@ -112,7 +112,7 @@ impl Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quadrature::GaussLegendre;
+    use crate::numeric::GaussLegendre;
 
     /// A sum over the lattice of the spread wave, corrected, is the wave to the error the kernel states.
     #[test]

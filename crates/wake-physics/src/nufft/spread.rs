@@ -2,7 +2,7 @@
 
 use super::kernel::{Kernel, WIDEST};
 use crate::fft::Real;
-use crate::vectorize::vectorized;
+use crate::numeric::vectorized;
 use num_complex::Complex;
 use rayon::prelude::*;
 

@@ -16,7 +16,7 @@ const TRANSFER: Transfer = Transfer {
     depth: f64::INFINITY,
     incidence: 0.56,
     relaxation_rate: 0.5,
-    steepness: 4.5,
+    action_slope: 4.5,
 };
 
 /// Waves all over the band with deterministic, unrelated phases.

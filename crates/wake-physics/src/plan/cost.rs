@@ -1,7 +1,6 @@
 //! What a simulation costs, before it runs.
 
-use super::advice::Advice;
-use super::work::Work;
+use super::work::{Advice, Work};
 use std::fmt;
 
 /// Seconds of a core above which a user should know first: chosen.

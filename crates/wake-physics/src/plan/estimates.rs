@@ -1,12 +1,11 @@
 //! What leaving each term out would change: estimates by the modulation transfer functions.
 
-use super::terms::Effect;
-use crate::modulation::{Modulation, WaveSample, rms, smear};
-use crate::scene::Term;
-use crate::survey::Survey;
-use crate::waves::Quantity;
-use num_complex::Complex64;
-use std::f64::consts::{PI, SQRT_2};
+use super::terms::Weighed;
+use crate::effects::{Effects, Weight};
+use crate::linear::Amplitudes;
+use crate::models::Models;
+use crate::scattering::SlopeCovariance;
+use crate::scene::{Scene, Term};
 
 /// An estimate is this many times the linear root mean square: one draw of a random sea may be rougher than its mean,
 /// bunching gathers what changes, and waves of finite height are not quite linear. No proof makes it a bound.
@@ -15,236 +14,174 @@ const SAFETY: f64 = 3.0;
 /// What the rounding of `f32` fields may change, whatever is left out: a few times 6e-8 of each of several fields.
 const ROUNDING: f64 = 1e-6;
 
-/// A wave with what it does to the image.
-struct Weighed<'a> {
-    wave: &'a WaveSample,
-    modulation: Modulation,
-    /// Smear without the defocus of accelerated pixels: some pixels are not accelerated.
-    sharpest: f64,
-}
-
-impl AsRef<WaveSample> for Weighed<'_> {
-    fn as_ref(&self) -> &WaveSample {
-        self.wave
-    }
-}
-
-/// The waves of a survey, weighed once for all terms.
-struct Estimates<'a> {
-    survey: &'a Survey,
-    /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
-    backscatter: [f64; 2],
-    sea: Vec<Weighed<'a>>,
-    swell: Vec<Weighed<'a>>,
-    wake: Vec<Weighed<'a>>,
-    /// Standard deviation over mean of the image.
-    contrast: f64,
-}
-
-/// One effect a term, in the order of the data flow.
-///
-/// - `backscatter`: relative root mean square change of σ⁰ without tilt average, and without specular return
-pub(super) fn effects(survey: &Survey, backscatter: [f64; 2]) -> Vec<Effect> {
-    let estimates = Estimates::new(survey, backscatter);
-    let absent = |term| survey.absent.iter().find(|(absent, _)| *absent == term);
-    let effect = |&term: &Term| Effect {
-        term,
-        estimate: estimates.of(term),
-        absent: absent(term).map(|(_, why)| *why),
+/// Every term with what it changes, in the order of the data flow.
+pub(super) fn weighed(
+    scene: &Scene,
+    models: &Models,
+    effects: &Effects,
+    amplitudes: &Amplitudes<'_>,
+) -> Vec<Weighed> {
+    let linear = |weight: Weight| Weight {
+        estimate: SAFETY * weight.estimate + ROUNDING,
+        ..weight
     };
-    Term::ALL.iter().map(effect).collect()
+    let one = |&term: &Term| {
+        let effect = effects.each().find(|effect| effect.term() == term);
+        let weight = match (effect, term) {
+            (Some(effect), _) => linear(effect.weigh(models, amplitudes)),
+            (None, Term::ImpulseResponse) => response(scene, models, amplitudes.contrast),
+            (None, Term::Speckle) => speckle(scene),
+            (None, term) => linear(Weight {
+                absent: absent(term, models, amplitudes),
+                estimate: match term {
+                    Term::Specular => {
+                        let rough = effects.subpixel_wake.specular(models, amplitudes);
+                        estimate(term, amplitudes).max(rough)
+                    }
+                    _ => estimate(term, amplitudes),
+                },
+            }),
+        };
+        Weighed { term, weight }
+    };
+    Term::ALL.iter().map(one).collect()
 }
 
-impl<'a> Estimates<'a> {
-    fn new(survey: &'a Survey, backscatter: [f64; 2]) -> Self {
-        let at_rest = survey.resolution.at(0.0);
-        let weighed = |waves: &'a [WaveSample]| -> Vec<Weighed<'a>> {
-            let one = |wave: &'a WaveSample| Weighed {
-                wave,
-                modulation: survey.modulation.at(wave.k, wave.omega),
-                sharpest: smear(wave.k[1], at_rest),
-            };
-            waves.iter().map(one).collect()
-        };
-        let (sea, wake) = (weighed(&survey.sea), weighed(&survey.wake));
-        let swell = weighed(&survey.swell);
-        let contrast = linear(&sea).hypot(linear(&wake)).hypot(backscatter[1]);
-        Self {
-            survey,
-            backscatter,
-            sea,
-            swell,
-            wake,
-            contrast,
+/// Relative root mean square change of the image without one of the terms that every scene has.
+fn estimate(term: Term, a: &Amplitudes<'_>) -> f64 {
+    match term {
+        Term::Sea => a.waves(&a.sea),
+        Term::Kelvin => a.waves(&a.wake),
+        Term::TiltAverage => a.backscatter[0],
+        Term::Specular => a.backscatter[1],
+        Term::RangeBunching => {
+            a.part(|m| m.range_bunching) + a.both(|w| a.range_shift(w)) * a.contrast
         }
-    }
-
-    fn of(&self, term: Term) -> f64 {
-        let effect = match term {
-            Term::Sea => self.waves(&self.sea),
-            Term::Swell => self.waves(&self.swell),
-            Term::Edge => {
-                let [change, velocity] = self.survey.edge;
-                let shift = self.survey.modulation.range_to_velocity * velocity;
-                change + shift / self.width(self.survey.resolution.at(0.0)) * self.contrast
-            }
-            Term::Slicks => self.survey.slicks * self.survey.modulation.bragg_share,
-            Term::Breaking => self.survey.added[0],
-            Term::Gusts => self.survey.gusts * self.contrast.hypot(1.0),
-            Term::Noise => self.survey.added[1],
-            // What it smears away is at most all contrast; the speckle of neighbours is what it adds.
-            Term::Response => return self.contrast.max(self.survey.response),
-            Term::Kelvin => self.waves(&self.wake),
-            Term::Unresolved => {
-                let [change, wider] = self.survey.unresolved;
-                change * self.contrast.hypot(1.0) + wider * self.contrast
-            }
-            Term::Turbulent => self.survey.damping * self.survey.modulation.bragg_share,
-            Term::TiltAverage => self.backscatter[0],
-            Term::Specular => self.backscatter[1].max(self.survey.rough_specular),
-            Term::RangeBunching => {
-                self.part(|m| m.range_bunching) + self.both(|w| self.range_shift(w)) * self.contrast
-            }
-            Term::Hydrodynamic => self.part(|m| m.hydrodynamic),
-            Term::Bunching => {
-                self.part(|m| m.bunching) + self.both(|w| self.azimuth_shift(w)) * self.contrast
-            }
-            Term::Coherence => self.coherence(),
-            // Speckle multiplies: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
-            Term::Speckle => return 2.0 / self.survey.looks.sqrt(),
-        };
-        SAFETY * effect + ROUNDING
-    }
-
-    /// Width of a point of azimuth resolution ρ on the pixels \[m\].
-    fn width(&self, resolution: f64) -> f64 {
-        self.survey.spacing.hypot(resolution / (SQRT_2 * PI))
-    }
-
-    fn both(&self, of: impl Fn(&[Weighed<'_>]) -> f64) -> f64 {
-        of(&self.sea).hypot(of(&self.wake))
-    }
-
-    /// Modulation by waves as imaged, with the second order of the tilt and the shifts of all else.
-    fn waves(&self, waves: &[Weighed<'_>]) -> f64 {
-        let variance = |axis: usize| -> f64 {
-            let square = |w: &Weighed<'_>| w.wave.variance * w.wave.k[axis].powi(2);
-            waves.iter().map(square).sum()
-        };
-        let curvature = self.survey.curvature;
-        let tilt = curvature[0] * variance(0) + curvature[1] * variance(1);
-        let shift = self.azimuth_shift(waves).hypot(self.range_shift(waves));
-        (linear(waves) + tilt) * self.contrast.hypot(1.0) + shift * self.contrast
-    }
-
-    /// One effect of all waves, in the image: smeared in azimuth where it stands alone; where the image has
-    /// contrast of its own, their product is there too, at other wavenumbers and so not smeared alike.
-    fn part(&self, of: impl Fn(&Modulation) -> Complex64) -> f64 {
-        let imaged = |waves: &[Weighed<'_>]| {
-            let alone = rms(waves, |w| of(&w.modulation) * w.sharpest);
-            alone + self.contrast * rms(waves, |w| of(&w.modulation))
-        };
-        self.both(imaged)
-    }
-
-    /// The change of the smear of everything that is imaged.
-    fn coherence(&self) -> f64 {
-        let survey = self.survey;
-        let transfer = &survey.modulation.transfer;
-        let accelerations = |waves: &[Weighed<'_>]| {
-            rms(waves, |w| {
-                transfer.factor(Quantity::RadialAcceleration, w.wave.k, w.wave.omega)
-            })
-        };
-        let nominal = survey.resolution.nominal;
-        let moving = survey.resolution.at(self.both(accelerations));
-        let change = |waves: &[Weighed<'_>]| {
-            rms(waves, |w| {
-                let lost = smear(w.wave.k[1], nominal) - smear(w.wave.k[1], moving);
-                w.modulation.total() * lost
-            })
-        };
-        // A spot of width w spread to w' loses about (1 − w²/w'²)/2 of its height.
-        let widths = [nominal, moving].map(|rho| self.width(rho));
-        let spots = 0.5 * (1.0 - (widths[0] / widths[1]).powi(2));
-        self.both(change) * self.contrast.hypot(1.0) + spots * self.backscatter[1]
-    }
-
-    /// Displacements in azimuth over the width of what is displaced.
-    fn azimuth_shift(&self, waves: &[Weighed<'_>]) -> f64 {
-        let modulation = &self.survey.modulation;
-        let velocity = rms(waves, |w| {
-            modulation.transfer.radial(w.wave.k, w.wave.omega)
-        });
-        let width = self.width(self.survey.resolution.at(0.0));
-        modulation.range_to_velocity * velocity / width
-    }
-
-    /// Displacements in range over the width of what is displaced.
-    fn range_shift(&self, waves: &[Weighed<'_>]) -> f64 {
-        let incidence = self.survey.modulation.transfer.incidence;
-        rms(waves, |_| Complex64::ONE) / (incidence.tan() * self.survey.spacing)
+        Term::Hydrodynamic => a.part(|m| m.hydrodynamic),
+        Term::VelocityBunching => {
+            a.part(|m| m.bunching) + a.both(|w| a.azimuth_shift(w)) * a.contrast
+        }
+        Term::AzimuthSmear => a.azimuth_smear(),
+        _ => 0.0,
     }
 }
 
-/// Modulation by all effects, as imaged.
-fn linear(waves: &[Weighed<'_>]) -> f64 {
-    rms(waves, |w| w.modulation.total() * w.sharpest)
+/// Why a scene has nothing of such a term.
+fn absent(term: Term, models: &Models, amplitudes: &Amplitudes<'_>) -> Option<&'static str> {
+    let first = amplitudes.first;
+    let flat = first.is_flat().then_some("there are no resolved waves");
+    let still = (models.range_to_velocity == 0.0).then_some("R/V is 0");
+    let no_bragg = models.short_waves_vanish();
+    let bragg = no_bragg.then_some("there are no short waves to scatter");
+    match term {
+        Term::Sea => {
+            let none = first.open.no_wind_waves();
+            none.then_some("no wind wave that a pixel carries")
+        }
+        Term::Kelvin => {
+            let unseen = first.wake.is_empty();
+            let unseen = unseen.then_some("no wave that a pixel carries reaches the image");
+            models.no_wake().or(unseen)
+        }
+        Term::TiltAverage => {
+            let none = models.subpixel_slopes() == SlopeCovariance::NONE;
+            bragg.or(none.then_some("no wave between pixel and Bragg waves"))
+        }
+        Term::RangeBunching => flat,
+        Term::Hydrodynamic => flat.or(bragg),
+        Term::VelocityBunching | Term::AzimuthSmear => still.or(flat),
+        _ => None,
+    }
+}
+
+/// What the impulse response smears away is at most all contrast; the speckle of neighbours is what it adds.
+fn response(scene: &Scene, models: &Models, contrast: f64) -> Weight {
+    let spacing = models.image.spacing;
+    let correlation = models
+        .response
+        .map_or(0.0, |response| response.pixel_correlation(spacing));
+    Weight {
+        absent: match (&models.response, scene.radar.range_resolution) {
+            (Some(_), _) => None,
+            (None, None) => Some("not asked for"),
+            (None, Some(_)) => Some("not in model.terms"),
+        },
+        estimate: contrast.max(correlation),
+    }
+}
+
+/// Speckle multiplies: its share of the speckled image is √(1 + cv²)/√looks, with cv below √3.
+fn speckle(scene: &Scene) -> Weight {
+    Weight {
+        absent: None,
+        estimate: 2.0 / f64::from(scene.radar.looks).sqrt(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modulation::ModulationTransfer;
+    use crate::effects::{bright_edge, subpixel_wake, turbulent};
+    use crate::linear::WaveSample;
+    use crate::linear::{FirstOrder, OpenSea};
     use crate::sar::AzimuthResolution;
-    use crate::scattering::SlopeCovariance;
+    use crate::scattering::modulation::ModulationTransfer;
     use crate::waves::Transfer;
+    use std::f64::consts::PI;
 
     const BACKSCATTER: [f64; 2] = [0.21, 0.3];
 
     /// One wave of the sea along range and one of the wake along azimuth, both of ω = 1/s, tan θ = 3/4, and numbers of
     /// their own for all else.
-    fn survey() -> Survey {
+    fn first() -> FirstOrder {
         let wave = |k, variance| WaveSample {
             k,
             omega: 1.0,
             variance,
         };
-        Survey {
-            sea: vec![wave([0.1, 0.0], 0.04)],
-            swell: vec![wave([0.1, 0.0], 0.01)],
-            wake: vec![wave([0.0, 0.2], 1e-4)],
-            modulation: ModulationTransfer {
-                transfer: Transfer {
-                    depth: f64::INFINITY,
-                    incidence: 0.75f64.atan(),
-                    relaxation_rate: 1.0,
-                    steepness: 4.0,
-                },
-                tilt: [5.0, 0.0],
-                bragg_share: 0.5,
-                range_to_velocity: 50.0,
+        let modulation = ModulationTransfer {
+            transfer: Transfer {
+                depth: f64::INFINITY,
+                incidence: 0.75f64.atan(),
+                relaxation_rate: 1.0,
+                action_slope: 4.0,
             },
-            curvature: [3.0, 7.0],
+            tilt: [5.0, 0.0],
+            bragg_share: 0.5,
+            range_to_velocity: 50.0,
+        };
+        let models = Models::new(&Scene::default());
+        FirstOrder {
+            open: OpenSea {
+                waves: vec![wave([0.1, 0.0], 0.04)],
+                swell: vec![wave([0.1, 0.0], 0.01)],
+                curvature: [3.0, 7.0],
+                modulation,
+                ..OpenSea::new(&models)
+            },
+            wake: vec![wave([0.0, 0.2], 1e-4)],
+            modulation,
             resolution: AzimuthResolution {
                 nominal: 10.0 * PI,
                 coherence: 0.0,
                 defocus: 50.0 * PI,
             },
-            damping: 0.11,
-            edge: [0.12, 0.5],
-            unresolved: [0.13, 0.14],
-            rough_specular: 0.2,
-            slicks: 0.15,
-            gusts: 0.16,
-            added: [0.17, 0.18],
-            response: 0.19,
             mean: [1.0, 1.0],
             resolved: SlopeCovariance::NONE,
+            modulation_variance: 0.0,
             spacing: 4.0,
-            looks: 25.0,
-            absent: vec![(Term::Kelvin, "there is no ship")],
         }
+    }
+
+    /// What is left of an estimate without its safety and rounding.
+    fn of_effect(scene: &[&str], term: Term, amplitudes: &Amplitudes<'_>) -> f64 {
+        let scene = Scene::default().with_assignments(scene).unwrap();
+        let models = Models::new(&scene);
+        let effects = Effects::new(&scene, &models);
+        let effect = effects.each().find(|effect| effect.term() == term);
+        let weight = effect.unwrap().weigh(&models, amplitudes);
+        assert_eq!(weight.absent, None, "{term:?}");
+        weight.estimate
     }
 
     /// Worked out by hand. Modulation of the sea's wave: tilt 0.5 i, range bunching 0.4/3 i, hydrodynamic
@@ -272,60 +209,156 @@ mod tests {
         // Half as high: a quarter of the second order.
         let of_swell =
             (0.5 * sea + 3.0 * 0.01 * 0.01) * product + 0.5 * sea_shift[0].hypot(sea_shift[1]) * c;
-        let survey = survey();
-        for effect in effects(&survey, BACKSCATTER) {
-            let expected = match effect.term {
-                Term::Sea => of_sea,
-                Term::Swell => of_swell,
-                Term::Kelvin => of_wake,
-                Term::Edge => 0.12 + 50.0 * 0.5 / width * c,
-                Term::Slicks => 0.15 * 0.5,
-                Term::Breaking => 0.17,
-                Term::Gusts => 0.16 * product,
-                Term::Noise => 0.18,
-                Term::Unresolved => 0.13 * product + 0.14 * c,
-                Term::Turbulent => 0.11 * 0.5,
-                Term::TiltAverage => 0.21,
-                Term::Specular => 0.3,
-                Term::RangeBunching => 0.2 * 0.4 / 3.0 * (1.0 + c) + both(1),
-                Term::Hydrodynamic => 0.2 * 0.02f64.sqrt() * (1.0 + c),
-                Term::Bunching => 0.01 * 8.0 * (one_over_e + c) + both(0),
-                Term::Coherence => {
-                    let lost = 0.01 * 8.0 * (one_over_e - (-moving).exp());
-                    lost * product + 0.5 * (1.0 - 66.0 / wider) * 0.3
-                }
-                // These stand alone, and are no linear estimates.
-                Term::Response => (c - 1e-6) / 3.0,
-                Term::Speckle => (0.4 - 1e-6) / 3.0,
-            };
-            let expected = 3.0 * expected + 1e-6;
+        let first = first();
+        let a = &Amplitudes::with(&first, BACKSCATTER);
+        // Noise of 10 log 0.36 dB over a mean of 2.
+        let noise = format!("radar.nesz={}", 10.0 * 0.36f64.log10());
+        let gusts = 0.16 / crate::gusts::wind_exponent(9.6e9);
+        let gusts = format!("sea.gust_strength={gusts}");
+        let optional = |keys: &[&str], term| of_effect(keys, term, a);
+        for (term, found, expected) in [
+            (Term::Sea, estimate(Term::Sea, a), of_sea),
+            (
+                Term::Swell,
+                optional(&["sea.swell_height=1"], Term::Swell),
+                of_swell,
+            ),
+            (Term::Kelvin, estimate(Term::Kelvin, a), of_wake),
+            (
+                Term::BrightEdge,
+                bright_edge::estimate([0.12, 0.5], a),
+                0.12 + 50.0 * 0.5 / width * c,
+            ),
+            (
+                Term::Slicks,
+                optional(&["sea.slick_damping=0.15"], Term::Slicks),
+                0.15 * 0.5,
+            ),
+            (
+                Term::Gusts,
+                optional(&[&gusts], Term::Gusts),
+                0.16 * product,
+            ),
+            (Term::Noise, optional(&[&noise], Term::Noise), 0.18),
+            (
+                Term::SubpixelWake,
+                subpixel_wake::estimate([0.13, 0.14], a),
+                0.13 * product + 0.14 * c,
+            ),
+            (Term::Turbulent, turbulent::estimate(0.11, a), 0.11 * 0.5),
+            (Term::TiltAverage, estimate(Term::TiltAverage, a), 0.21),
+            (Term::Specular, estimate(Term::Specular, a), 0.3),
+            (
+                Term::RangeBunching,
+                estimate(Term::RangeBunching, a),
+                0.2 * 0.4 / 3.0 * (1.0 + c) + both(1),
+            ),
+            (
+                Term::Hydrodynamic,
+                estimate(Term::Hydrodynamic, a),
+                0.2 * 0.02f64.sqrt() * (1.0 + c),
+            ),
+            (
+                Term::VelocityBunching,
+                estimate(Term::VelocityBunching, a),
+                0.01 * 8.0 * (one_over_e + c) + both(0),
+            ),
+            (Term::AzimuthSmear, estimate(Term::AzimuthSmear, a), {
+                let lost = 0.01 * 8.0 * (one_over_e - (-moving).exp());
+                lost * product + 0.5 * (1.0 - 66.0 / wider) * 0.3
+            }),
+        ] {
             assert!(
-                (effect.estimate / expected - 1.0).abs() < 1e-12,
-                "{:?}: {} {expected}",
-                effect.term,
-                effect.estimate
+                (found / expected - 1.0).abs() < 1e-12,
+                "{term:?}: {found} {expected}"
             );
         }
-        // Where a ship's waves roughen the sea, its specular return is more than that of the sea alone.
-        let mut smooth = survey;
-        smooth.rough_specular = 0.4;
-        let estimates = Estimates::new(&smooth, BACKSCATTER);
-        assert!((estimates.of(Term::Specular) - (3.0 * 0.4 + 1e-6)).abs() < 1e-12);
-        // Speckle that neighbours share may be more than the contrast.
-        smooth.response = 0.9;
-        let estimates = Estimates::new(&smooth, BACKSCATTER);
-        assert!((estimates.of(Term::Response) - 0.9).abs() < 1e-15);
+        let breaking = ["sea.breaking=true", "sea.wind_speed=10"];
+        let scene = Scene::default().with_assignments(&breaking).unwrap();
+        let models = Models::new(&scene);
+        let effects = Effects::new(&scene, &models);
+        let found = optional(&breaking, Term::Breaking);
+        assert!((found / (effects.breaking.sigma0 / 2.0) - 1.0).abs() < 1e-12);
+        // Together they are three times as much, and what rounding changes; response and speckle stand alone.
+        for Weighed { term, weight } in weighed(&scene, &models, &effects, a) {
+            let expected = match term {
+                Term::Sea => 3.0 * of_sea + 1e-6,
+                Term::Specular => 3.0 * 0.3 + 1e-6,
+                Term::Breaking => 3.0 * found + 1e-6,
+                Term::ImpulseResponse => c,
+                // Four looks.
+                Term::Speckle => 1.0,
+                _ => continue,
+            };
+            assert!(
+                (weight.estimate / expected - 1.0).abs() < 1e-12,
+                "{term:?}: {weight:?} {expected}"
+            );
+        }
+    }
+
+    /// Speckle that neighbours share may be more than the contrast.
+    #[test]
+    fn a_response_changes_the_contrast_or_the_speckle() {
+        let keys = ["radar.range_resolution=40", "radar.azimuth_resolution=40"];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        let models = Models::new(&scene);
+        let correlation = models.response.unwrap().pixel_correlation(2.5);
+        assert!((0.5..1.0).contains(&correlation));
+        for (contrast, expected) in [(0.1, correlation), (2.0, 2.0)] {
+            let weight = response(&scene, &models, contrast);
+            assert!((weight.estimate - expected).abs() < 1e-15 && weight.absent.is_none());
+        }
+    }
+
+    /// Where a ship's waves roughen the sea, its specular return is more than that of the sea alone.
+    #[test]
+    fn rough_places_count_where_they_return_more() {
+        let keys = [
+            "radar.sensor=sentinel-1-iw",
+            "radar.incidence=31",
+            "sea.wind_speed=3",
+        ];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        let models = Models::new(&scene);
+        let effects = Effects::new(&scene, &models);
+        let first = FirstOrder::new(&models, OpenSea::new(&models));
+        let rough = effects
+            .subpixel_wake
+            .specular(&models, &Amplitudes::new(&first));
+        assert!(rough > 0.0);
+        for sea in [0.0, 0.5 * rough, 2.0 * rough] {
+            let amplitudes = Amplitudes::with(&first, [0.0, sea]);
+            let all = weighed(&scene, &models, &effects, &amplitudes);
+            let specular = all.iter().find(|one| one.term == Term::Specular).unwrap();
+            let expected = SAFETY * sea.max(rough) + ROUNDING;
+            assert!((specular.weight.estimate - expected).abs() < 1e-15 * expected.max(1.0));
+        }
     }
 
     /// Every term once, and what is absent says so of itself alone.
     #[test]
     fn what_is_absent_is_told_of_its_own_term() {
-        let effects = effects(&survey(), BACKSCATTER);
-        let terms: Vec<Term> = effects.iter().map(|e| e.term).collect();
+        let scene = Scene::default();
+        let models = Models::new(&scene);
+        let effects = Effects::new(&scene, &models);
+        let first = FirstOrder::new(&models, OpenSea::new(&models));
+        let all = weighed(&scene, &models, &effects, &Amplitudes::new(&first));
+        let terms: Vec<Term> = all.iter().map(|one| one.term).collect();
         assert_eq!(terms, Term::ALL);
-        for effect in effects {
-            let reason = (effect.term == Term::Kelvin).then_some("there is no ship");
-            assert_eq!(effect.absent, reason, "{:?}", effect.term);
+        for Weighed { term, weight } in all {
+            let optional = [
+                Term::Swell,
+                Term::SubpixelWake,
+                Term::BrightEdge,
+                Term::Slicks,
+                Term::Breaking,
+                Term::Gusts,
+                Term::Noise,
+                Term::ImpulseResponse,
+            ];
+            let reason = optional.contains(&term).then_some("not asked for");
+            assert_eq!(weight.absent, reason, "{term:?}");
         }
     }
 }

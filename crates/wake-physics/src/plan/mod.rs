@@ -3,31 +3,28 @@
 //! A plan is complete when it is returned and never changed. What the methods then reach is
 //! [`Accuracy`](crate::Accuracy).
 
-mod advice;
-mod budget;
 mod cost;
 mod estimates;
+mod notes;
+mod sizes;
 mod terms;
 mod work;
 
-pub(crate) use budget::SHARES;
 pub use cost::Cost;
+pub use sizes::Sizes;
 pub use terms::PlannedTerm;
+pub(crate) use terms::SHARES;
 
+use crate::effects::Effects;
 use crate::error::Result;
 use crate::kelvin::WakePlan;
+use crate::linear::{Amplitudes, FirstOrder, OpenSea};
 use crate::memory;
 use crate::models::Models;
-use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::surface::lattice_size;
-use crate::survey::{Survey, modulation_variance};
-use serde::Serialize;
-use work::Work;
-
-/// Pixels that are computed at once, margins included; more are computed in strips of at most half as many (chosen: about a
-/// gibibyte of fields, and an image of 4096 × 4096 pixels is one strip).
-const MOST_AT_ONCE: usize = 1 << 25;
+use sizes::strips;
+use work::{Counts, Work};
 
 /// The plan of a simulation.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,35 +45,6 @@ pub struct Plan {
     pub(crate) mean_sigma0: f64,
     /// Variance of the hydrodynamic modulation by the resolved sea \[1\].
     pub(crate) modulation_variance: f64,
-}
-
-/// How much is computed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Sizes {
-    /// Spacing of the computed pixels \[m\]: that of the image or an integer fraction of it.
-    pub computed_spacing: f64,
-    /// Strips of rows that are computed one after the other.
-    pub strips: usize,
-    /// Rows and columns added on each side of the image.
-    pub margin: [usize; 2],
-    /// Rows and columns computed.
-    pub computed: [usize; 2],
-    /// Largest resolved wavenumber [rad/m].
-    pub band: f64,
-    /// Rows and columns of the periodic lattice of the sea; 0 without a sea.
-    pub sea_lattice: [usize; 2],
-    /// Plane waves of the Kelvin wakes: transverse and divergent.
-    pub wake_nodes: [usize; 2],
-    /// Ranges of the direction of wake waves to the track \[deg\].
-    pub wake_directions: Vec<[f64; 2]>,
-}
-
-/// Number of strips of rows of an image.
-fn strips(computed: &Raster, image: &Raster) -> usize {
-    if computed.len() <= MOST_AT_ONCE {
-        return 1;
-    }
-    (2 * computed.len()).div_ceil(MOST_AT_ONCE).min(image.rows)
 }
 
 impl Plan {
@@ -107,77 +75,86 @@ impl Plan {
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.validate()?;
         let models = Models::new(scene);
-        Self::of(scene, &models, &Survey::new(scene, &models))
+        let effects = Effects::new(scene, &models);
+        let first = FirstOrder::new(&models, OpenSea::new(&models));
+        Self::of(scene, &models, &effects, &first)
     }
 
-    pub(crate) fn of(scene: &Scene, models: &Models, survey: &Survey) -> Result<Self> {
+    pub(crate) fn of(
+        scene: &Scene,
+        models: &Models,
+        effects: &Effects,
+        first: &FirstOrder,
+    ) -> Result<Self> {
         let tolerance = scene.model.tolerance;
-        let sensitivity = models.backscatter(true, true).sensitivity(&survey.resolved);
-        let backscatter = [sensitivity.tilt_average, sensitivity.specular];
-        let effects = estimates::effects(survey, backscatter);
-        let terms = terms::choose(&effects, &scene.model.terms, tolerance);
+        let weighed = estimates::weighed(scene, models, effects, &Amplitudes::new(first));
+        let terms = terms::choose(&weighed, &scene.model.terms, tolerance);
         let uses = |term| terms.iter().any(|t| t.term == term && t.used);
-        let margin = survey.margin(models);
-        let raster = models.image.with_margin(margin[0], margin[1]);
-        let strips = strips(&raster, &models.delivered);
-        let sea_lattice = if uses(Term::Sea) {
-            lattice_size(&models.sea, &raster)
-        } else {
-            [0, 0]
+        let margin = first.margin(models);
+        let raster = models.computed.with_margin(margin[0], margin[1]);
+        let mut sizes = Sizes {
+            computed_spacing: raster.spacing,
+            strips: strips(&raster, &models.image),
+            margin,
+            computed: [raster.rows, raster.columns],
+            band: raster.nyquist_wavenumber(),
+            sea_lattice: match uses(Term::Sea) {
+                true => lattice_size(&models.sea, &raster),
+                false => [0, 0],
+            },
+            wake_nodes: [0, 0],
+            wake_directions: Vec::new(),
         };
-        let work = |wakes: &[WakePlan]| {
-            let what = (scene, models, survey);
-            Work::of(what, &raster, (strips, margin[0]), sea_lattice, uses, wakes)
-        };
-        let fits = |work: &Work| {
+        let measured = |wakes: &[WakePlan]| -> Result<Work> {
+            let counts = Counts {
+                scene,
+                models,
+                effects,
+                first,
+                sizes: &sizes,
+                wakes,
+            };
+            let work = Work::of(&counts, uses);
             let (needed, advice) = work.bytes();
             let size = [scene.grid.rows, scene.grid.columns];
-            memory::check(size, margin, (needed, advice.text()))
+            memory::check(size, margin, needed, advice.text())?;
+            Ok(work)
         };
         // Before the waves of the wakes are looked at, which takes longer the more pixels there are.
-        fits(&work(&[]))?;
+        measured(&[])?;
         // Each ship's share, so that all of them keep the tolerance together.
         let share = SHARES.wake_nodes / models.wakes.len().max(1) as f64;
         let wakes = models.wakes.iter().filter(|_| uses(Term::Kelvin));
         let wakes = wakes.map(|wake| {
-            let plan = wake.kelvin.plan(&raster, share * tolerance);
-            wake.kelvin.with_ring_work(plan)
+            let plan = wake.plan(&raster, share * tolerance);
+            wake.with_ring_work(plan)
         });
         let wakes: Vec<WakePlan> = wakes.collect();
-        let work = work(&wakes);
-        fits(&work)?;
-        let zones = wakes.iter().flat_map(|wake| &wake.zones);
-        let directions = zones.map(|z| z.directions.map(f64::to_degrees));
+        let work = measured(&wakes)?;
         let nodes = |of: fn(&WakePlan) -> usize| wakes.iter().map(of).sum();
+        sizes.wake_nodes = [nodes(|w| w.transverse_nodes), nodes(|w| w.divergent_nodes)];
+        let zones = wakes.iter().flat_map(|wake| &wake.zones);
+        sizes.wake_directions = zones.map(|z| z.directions.map(f64::to_degrees)).collect();
         Ok(Self {
-            image_pixels: models.delivered.len(),
-            sizes: Sizes {
-                computed_spacing: raster.spacing,
-                strips,
-                margin,
-                computed: [raster.rows, raster.columns],
-                band: raster.nyquist_wavenumber(),
-                sea_lattice,
-                wake_nodes: [nodes(|w| w.transverse_nodes), nodes(|w| w.divergent_nodes)],
-                wake_directions: directions.collect(),
-            },
+            image_pixels: models.image.len(),
+            sizes,
             terms,
             work,
-            notes: survey.notes(scene, models),
+            notes: notes::notes(scene, models),
             wakes,
-            mean_sigma0: survey.mean[0] + survey.mean[1],
-            modulation_variance: modulation_variance(models),
+            mean_sigma0: first.mean_sigma0(),
+            modulation_variance: first.modulation_variance,
         })
     }
 
     /// The same for the mean over all seas: no sea is drawn, and what its waves do is averaged over.
     pub(crate) fn over_all_seas(mut self) -> Self {
-        let bunching = self.uses(Term::Bunching);
+        let bunching = self.uses(Term::VelocityBunching);
         for t in &mut self.terms {
             t.used = match t.term {
                 Term::Sea | Term::Swell => false,
                 Term::TiltAverage | Term::Specular => true,
-                Term::Coherence => t.used || bunching,
+                Term::AzimuthSmear => t.used || bunching,
                 _ => t.used,
             };
         }
@@ -219,6 +196,7 @@ impl std::fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::Raster;
 
     fn raster(rows: usize, columns: usize) -> Raster {
         Raster::image(rows, columns, 5.0)
@@ -334,7 +312,7 @@ mod tests {
             Term::Gusts,
             Term::TiltAverage,
             Term::Specular,
-            Term::Coherence,
+            Term::AzimuthSmear,
             Term::Kelvin,
         ] {
             assert!(mean.uses(term), "{term:?}");
@@ -343,7 +321,7 @@ mod tests {
         // Displaced pixels smear: coherence is averaged over where bunching is computed, and only there.
         for (terms, smeared) in [("[\"sea\", \"bunching\"]", true), ("[\"sea\"]", false)] {
             let of_list = plan(&[&format!("model.terms={terms}")]).over_all_seas();
-            assert_eq!(of_list.uses(Term::Coherence), smeared, "{terms}");
+            assert_eq!(of_list.uses(Term::AzimuthSmear), smeared, "{terms}");
         }
     }
 
@@ -411,10 +389,10 @@ mod tests {
             .with_assignments(&["radar.incidence=15"])
             .unwrap();
         let models = Models::new(&scene);
-        let survey = Survey::new(&scene, &models);
-        let [bragg, specular] = survey.mean;
+        let first = FirstOrder::new(&models, OpenSea::new(&models));
+        let [bragg, specular] = first.mean;
         assert!(bragg > 0.0 && specular > 0.1 * bragg);
-        let plan = Plan::of(&scene, &models, &survey).unwrap();
+        let plan = Plan::new(&scene).unwrap();
         assert!((plan.mean_sigma0 / (bragg + specular) - 1.0).abs() < 1e-15);
     }
 }

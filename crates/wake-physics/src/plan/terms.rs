@@ -1,8 +1,37 @@
-//! Which terms are computed: the choice, given what each would change.
+//! The error budget, and which terms are computed: the choice, given what each would change.
 
-use super::SHARES;
+use crate::effects::Weight;
 use crate::scene::{Term, TermRule, Terms};
 use serde::Serialize;
+
+/// Shares of the tolerance \[1\].
+///
+/// The sources know nothing of each other and their errors rarely have one sign at one pixel; even where they have, the
+/// shares together make up the tolerance. The split follows how cost grows, and was not tuned by measurement: most goes to
+/// the terms left out, which save whole stages, and to the table, whose nodes grow with error^(−1/4) along each axis;
+/// little to nodes, sums and kernels, whose cost grows with the logarithm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Budget {
+    /// Terms left out, by estimate.
+    pub(crate) terms: f64,
+    /// Nodes of the wake integral.
+    pub(crate) wake_nodes: f64,
+    /// Sums of waves on the raster, largest error of a field over its root mean square.
+    pub(crate) fields: f64,
+    /// The table of σ⁰, largest error over the mean.
+    pub(crate) table: f64,
+    /// The kernels of the imaging, mean error over the mean.
+    pub(crate) kernels: f64,
+}
+
+/// The one budget there is.
+pub(crate) const SHARES: Budget = Budget {
+    terms: 0.3,
+    wake_nodes: 0.1,
+    fields: 0.15,
+    table: 0.3,
+    kernels: 0.15,
+};
 
 /// One term of the plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,36 +48,34 @@ pub struct PlannedTerm {
     pub why: String,
 }
 
-/// What leaving a term out would change, and why the scene has nothing of it if so.
+/// A term with what it changes.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Effect {
+pub(crate) struct Weighed {
     pub(crate) term: Term,
-    pub(crate) estimate: f64,
-    /// `Some` where the scene does not have the term at all: the estimate is 0 exactly.
-    pub(crate) absent: Option<&'static str>,
+    pub(crate) weight: Weight,
 }
 
 /// Chooses terms. By rule "needed" terms are left out from the smallest estimate up, as long as the sum of the
 /// estimates left out stays within their share of the tolerance; speckle, which is no part of the image before speckle, has
 /// the tolerance for itself. The impulse response decides on which pixels all is computed: it is used where it is there.
-pub(crate) fn choose(effects: &[Effect], terms: &Terms, tolerance: f64) -> Vec<PlannedTerm> {
-    let alone = [Term::Speckle, Term::Response];
-    let mut order: Vec<&Effect> = effects
+pub(crate) fn choose(effects: &[Weighed], terms: &Terms, tolerance: f64) -> Vec<PlannedTerm> {
+    let alone = [Term::Speckle, Term::ImpulseResponse];
+    let mut order: Vec<&Weighed> = effects
         .iter()
         .filter(|e| !alone.contains(&e.term))
         .collect();
-    order.sort_by(|a, b| a.estimate.total_cmp(&b.estimate));
+    order.sort_by(|a, b| a.weight.estimate.total_cmp(&b.weight.estimate));
     let mut left_out = Vec::new();
     let mut sum = 0.0;
     for effect in order {
-        sum += effect.estimate;
+        sum += effect.weight.estimate;
         if sum <= SHARES.terms * tolerance {
             left_out.push(effect.term);
         }
     }
     if effects
         .iter()
-        .any(|e| e.term == Term::Speckle && e.estimate <= tolerance)
+        .any(|e| e.term == Term::Speckle && e.weight.estimate <= tolerance)
     {
         left_out.push(Term::Speckle);
     }
@@ -58,8 +85,8 @@ pub(crate) fn choose(effects: &[Effect], terms: &Terms, tolerance: f64) -> Vec<P
         .collect()
 }
 
-fn planned(effect: &Effect, terms: &Terms, below_budget: bool) -> PlannedTerm {
-    let (used, why) = match (effect.absent, terms) {
+fn planned(effect: &Weighed, terms: &Terms, below_budget: bool) -> PlannedTerm {
+    let (used, why) = match (effect.weight.absent, terms) {
         (Some(reason), _) => (false, reason.to_owned()),
         (None, Terms::List(list)) if list.contains(&effect.term) => (true, "asked for".to_owned()),
         (None, Terms::List(_)) => (false, "not in model.terms".to_owned()),
@@ -75,10 +102,9 @@ fn planned(effect: &Effect, terms: &Terms, below_budget: bool) -> PlannedTerm {
     PlannedTerm {
         term: effect.term,
         used,
-        estimate: if effect.absent.is_some() {
-            0.0
-        } else {
-            effect.estimate
+        estimate: match effect.weight.absent {
+            Some(_) => 0.0,
+            None => effect.weight.estimate,
         },
         why,
     }
@@ -88,15 +114,31 @@ fn planned(effect: &Effect, terms: &Terms, below_budget: bool) -> PlannedTerm {
 mod tests {
     use super::*;
 
-    fn effect(term: Term, estimate: f64) -> Effect {
-        Effect {
+    /// All shares, none forgotten (a new one does not compile here), are positive and no more than the tolerance.
+    #[test]
+    fn the_shares_are_at_most_the_tolerance() {
+        let Budget {
+            terms,
+            wake_nodes,
+            fields,
+            table,
+            kernels,
+        } = SHARES;
+        let shares = [terms, wake_nodes, fields, table, kernels];
+        assert!(shares.iter().all(|&share| share > 0.0));
+        // Sums of five decimal fractions round by a few 1e-16.
+        assert!(shares.iter().sum::<f64>() <= 1.0 + 1e-15);
+    }
+
+    fn effect(term: Term, estimate: f64) -> Weighed {
+        let absent = None;
+        Weighed {
             term,
-            estimate,
-            absent: None,
+            weight: Weight { absent, estimate },
         }
     }
 
-    fn used(effects: &[Effect], terms: &Terms) -> Vec<bool> {
+    fn used(effects: &[Weighed], terms: &Terms) -> Vec<bool> {
         choose(effects, terms, 1e-3)
             .iter()
             .map(|t| t.used)
@@ -109,7 +151,7 @@ mod tests {
             effect(Term::Sea, 0.3e-3),
             effect(Term::Kelvin, 0.15e-3),
             effect(Term::Specular, 0.1e-3),
-            effect(Term::Bunching, 1.0),
+            effect(Term::VelocityBunching, 1.0),
         ];
         let needed = Terms::Rule(TermRule::Needed);
         // 0.1 + 0.15 fit into 0.3 of 1; with 0.3 it would be 0.55.
@@ -131,7 +173,7 @@ mod tests {
     #[test]
     fn what_is_not_there_is_never_used_and_counts_nothing() {
         let mut absent = effect(Term::Kelvin, f64::NAN);
-        absent.absent = Some("there is no ship");
+        absent.weight.absent = Some("there is no ship");
         for terms in [Terms::Rule(TermRule::All), Terms::List(vec![Term::Kelvin])] {
             let plan = choose(&[absent.clone()], &terms, 1e-3);
             assert!(!plan[0].used && plan[0].estimate == 0.0);

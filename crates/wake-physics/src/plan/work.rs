@@ -1,14 +1,15 @@
 //! What the stages of a simulation will do, counted before they do it: operations, the time they take, and memory.
 
-use super::advice::Advice;
+use super::sizes::Sizes;
+use super::terms::SHARES;
+use crate::effects::Effects;
 use crate::kelvin::{LARGEST_SLOPE_VARIANCE, RingWork, WakePlan};
+use crate::linear::FirstOrder;
 use crate::models::Models;
 use crate::nufft::WAVES_AT_ONCE;
-use crate::raster::Raster;
 use crate::sar::Imaging;
 use crate::scattering::{BackscatterTable, SlopeCovariance};
 use crate::scene::{Scene, Term};
-use crate::survey::Survey;
 
 /// Tolerance below which sums of waves are transformed in double precision: of the order of `f32`'s rounding over the share
 /// that a sum has.
@@ -17,6 +18,35 @@ const PRECISE: f64 = 5e-4;
 /// Accelerations of the fastest pixels over their standard deviation, and columns that a thread sums at once.
 const FARTHEST_MOVED: f64 = 5.0;
 const BLOCK: usize = 64;
+
+/// What makes a scene cheaper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Advice {
+    /// Most is for pixels.
+    Pixels,
+    /// Most is for the waves of ships that turn.
+    Turn,
+    /// Most is for looks through an impulse response.
+    Looks,
+    /// Most is for the table of σ⁰.
+    Tolerance,
+}
+
+impl Advice {
+    /// What to change, beginning with a verb.
+    pub(crate) fn text(self) -> &'static str {
+        match self {
+            Self::Pixels => {
+                "lower grid.rows, grid.columns, grid.oversampling or radar.range_to_velocity, or raise grid.spacing"
+            }
+            Self::Turn => {
+                "set ship.turn_rate to 0 or farther from it, for most is for the waves of a wide turn, or raise grid.spacing"
+            }
+            Self::Looks => "lower radar.looks or grid.oversampling",
+            Self::Tolerance => "raise model.tolerance",
+        }
+    }
+}
 
 /// Counts of what the stages work on.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -57,7 +87,7 @@ pub(crate) struct Work {
 
 /// Seconds of a core for each of what is counted, measured on x86-64 with AVX-512 at 2 to 3 GHz.
 mod seconds {
-    /// Survey, plan and labels of a scene; what a ship adds to them.
+    /// First-order theory, plan and labels of a scene; what a ship adds to them.
     pub(super) const SCENE: f64 = 0.004;
     pub(super) const SHIP: f64 = 0.02;
     /// A pixel: σ⁰ and the fields; what one tap of the imaging adds.
@@ -110,64 +140,86 @@ mod bytes {
     pub(super) const SPREAD: [f64; 2] = [560.0, 900.0];
 }
 
+/// What work is counted from.
+pub(super) struct Counts<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) models: &'a Models,
+    pub(super) effects: &'a Effects,
+    pub(super) first: &'a FirstOrder,
+    pub(super) sizes: &'a Sizes,
+    /// The waves of the ships, once they are planned.
+    pub(super) wakes: &'a [WakePlan],
+}
+
 impl Work {
     /// Counts the work of a scene by its plan.
-    pub(super) fn of(
-        (scene, models, survey): (&Scene, &Models, &Survey),
-        raster: &Raster,
-        (strips, margin): (usize, usize),
-        lattice: [usize; 2],
-        uses: impl Fn(Term) -> bool,
-        wakes: &[WakePlan],
-    ) -> Self {
+    pub(super) fn of(counts: &Counts<'_>, uses: impl Fn(Term) -> bool) -> Self {
+        let Counts {
+            scene,
+            models,
+            effects,
+            first,
+            sizes,
+            wakes,
+        } = *counts;
         let when = |is: bool| f64::from(u8::from(is));
-        let all = raster.len() as f64;
-        let rows = match strips {
-            1 => raster.rows,
+        let ([computed_rows, columns], [margin, _]) = (sizes.computed, sizes.margin);
+        let pixels = computed_rows * columns;
+        let all = pixels as f64;
+        let rows = match sizes.strips {
+            1 => computed_rows,
             // A margin and the overlap on both sides of a strip.
-            _ => raster.rows / strips + 6 * margin,
+            strips => computed_rows / strips + 6 * margin,
         };
-        let at_once = (rows * raster.columns) as f64;
-        let moving = || models.wakes.iter().filter(|wake| wake.kelvin.speed > 0.0);
-        let [dark, edges] =
-            [(uses(Term::Turbulent), true), (uses(Term::Edge), false)].map(|(used, dark)| {
-                moving()
-                    .filter(|wake| used && (dark || wake.edge.is_some()))
-                    .map(|wake| wake.kelvin.track.turn().is_some())
-                    .collect::<Vec<bool>>()
-            });
-        let turning = dark.iter().chain(&edges).filter(|turns| **turns).count();
+        let at_once = (rows * columns) as f64;
+        let turns = |n: usize| models.wakes[n].track.turn().is_some();
+        let moving = (0..models.wakes.len()).filter(|&n| models.wakes[n].speed > 0.0);
+        let dark: Vec<usize> = match uses(Term::Turbulent) {
+            true => moving.clone().collect(),
+            false => Vec::new(),
+        };
+        let edged = |n: &usize| effects.bright_edge.edges[*n].is_some();
+        let edges: Vec<usize> = match uses(Term::BrightEdge) {
+            true => moving.filter(edged).collect(),
+            false => Vec::new(),
+        };
+        let turning = dark.iter().chain(&edges).filter(|&&n| turns(n)).count();
         let waves = wakes.iter().filter(|wake| wake.nodes() > 0).count();
         let swell = uses(Term::Swell) && models.swell.is_some();
         let tolerance = scene.model.tolerance;
         // Transverse and divergent waves, both as steep as they can be.
-        let short_waves = when(uses(Term::Unresolved)) * 2.0 * LARGEST_SLOPE_VARIANCE;
+        let short_waves = when(uses(Term::SubpixelWake)) * 2.0 * LARGEST_SLOPE_VARIANCE;
         let leans = if uses(Term::RangeBunching) { 2.0 } else { 1.0 };
         let backscatter = models.backscatter(uses(Term::TiltAverage), false);
         let moves = uses(Term::Sea) || swell || waves > 0;
-        let coherent = uses(Term::Coherence);
-        let taps = leans * taps(models, survey, (coherent, moves), tolerance);
+        let coherent = uses(Term::AzimuthSmear);
+        let acceleration = match coherent && moves {
+            true => first.acceleration(),
+            false => 0.0,
+        };
+        let taps = leans * taps(models, coherent, acceleration, tolerance);
         let slopes = if moves {
-            survey.resolved
+            first.resolved
         } else {
             SlopeCovariance::NONE
         };
-        let strip = strips as f64;
+        let strip = sizes.strips as f64;
+        let subpixel = effects.subpixel_wake.waves.iter().flatten().count();
         Self {
             computed: strip * at_once,
             at_once,
-            whole: match strips {
+            whole: match sizes.strips {
                 1 => [0.0; 2],
-                _ => [all, models.delivered.len() as f64],
+                _ => [all, models.image.len() as f64],
             },
-            image: models.delivered.len() as f64,
-            lattice: (lattice[0] * lattice[1]) as f64,
+            image: models.image.len() as f64,
+            lattice: (sizes.sea_lattice[0] * sizes.sea_lattice[1]) as f64,
             sums: waves as f64 + when(swell),
             precise: tolerance < PRECISE,
             ships: [
                 dark.len() as f64,
                 edges.len() as f64,
-                when(uses(Term::Unresolved)) * models.unresolved.len() as f64,
+                when(uses(Term::SubpixelWake)) * subpixel as f64,
             ],
             turning: turning as f64,
             patterns: when(uses(Term::Slicks)) + when(uses(Term::Gusts)),
@@ -175,14 +227,13 @@ impl Work {
             table: BackscatterTable::foreseen(
                 &backscatter,
                 (&slopes, short_waves),
-                (
-                    super::SHARES.table * tolerance * (survey.mean[0] + survey.mean[1]),
-                    raster.len(),
-                ),
+                (SHARES.table * tolerance * first.mean_sigma0(), pixels),
             ),
-            steep: all * backscatter.steep_share(&survey.resolved_sea().0) * when(moves),
-            summed: (taps / leans * FARTHEST_MOVED) * (models.image.columns + BLOCK) as f64,
-            sources: models.response.map_or(0.0, |_| models.image.len() as f64),
+            steep: all * backscatter.steep_share(&first.open.slopes) * when(moves),
+            summed: (taps / leans * FARTHEST_MOVED) * (models.computed.columns + BLOCK) as f64,
+            sources: models
+                .response
+                .map_or(0.0, |_| models.computed.len() as f64),
             looks: looks(scene, models, uses(Term::Speckle)),
             rings: wakes
                 .iter()
@@ -257,24 +308,18 @@ impl Work {
     }
 }
 
-/// Pixels over which the imaging spreads one that moves as most do.
-fn taps(models: &Models, survey: &Survey, (coherent, moves): (bool, bool), tolerance: f64) -> f64 {
+/// Pixels over which the imaging spreads one of an acceleration [m/s²].
+fn taps(models: &Models, coherent: bool, acceleration: f64, tolerance: f64) -> f64 {
     let imaging = Imaging {
         range_to_velocity: models.range_to_velocity,
         incidence: models.incidence,
-        resolution: if coherent {
-            models.resolution()
-        } else {
-            models.resolution_at_rest()
+        resolution: match coherent {
+            true => models.resolution(),
+            false => models.resolution_at_rest(),
         },
     };
-    let acceleration = if coherent && moves {
-        survey.acceleration()
-    } else {
-        0.0
-    };
-    let tolerance = super::SHARES.kernels * tolerance;
-    imaging.taps(acceleration, models.image.spacing, tolerance)
+    let tolerance = SHARES.kernels * tolerance;
+    imaging.taps(acceleration, models.computed.spacing, tolerance)
 }
 
 /// Looks that are drawn through an impulse response.

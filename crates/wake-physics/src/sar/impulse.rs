@@ -10,10 +10,9 @@
 //! its image integrates to σ.
 
 use crate::fft::{self, LowPass};
+use crate::numeric::vector::{cos_sin, ln_f32, vectorized};
 use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
-use crate::surface::vector::{cos_sin, ln};
-use crate::vectorize::vectorized;
 use crate::window::Window;
 use num_complex::Complex32;
 use rand::Rng;
@@ -373,7 +372,7 @@ fn rough_row(intensity: &[f32], (seed, line): (u64, u64), row: &mut [Complex32])
             for ((value, &intensity), bits) in row.iter_mut().zip(intensity).zip(&bits) {
                 let uniform =
                     ((*bits as u32 >> 1) as i32 as f32 + 0.5) * f32::from_bits((127 - 31) << 23);
-                let length = (-intensity * ln(uniform)).max(0.0).sqrt();
+                let length = (-intensity * ln_f32(uniform)).max(0.0).sqrt();
                 let [cos, sin] = cos_sin((*bits >> 32) as u32);
                 *value = Complex32::new(length * cos, length * sin);
             }

@@ -96,7 +96,7 @@ fn single_look_is_the_sum_over_its_scatterers() {
                     .response((x + f64::from(n) * period) * bandwidth)
             })
             .sum();
-        let rule = crate::quadrature::GaussLegendre::new(96);
+        let rule = crate::numeric::GaussLegendre::new(96);
         let mean = rule.integrate([-0.5, 0.5], |f| axis.window.weight(f));
         gain * mean * bandwidth * raster.spacing * sum
     };

@@ -9,7 +9,7 @@
 
 pub(crate) mod bunching;
 pub mod coherence;
-pub mod direct;
+pub(crate) mod direct;
 pub(crate) mod echo;
 pub mod geometry;
 pub mod impulse;

@@ -1,5 +1,6 @@
 //! Gaussian taps, and how few of them are needed: the arithmetic inside the fast sum.
 
+use crate::numeric::vector::exp2_f32;
 use std::f64::consts::PI;
 
 /// Taps are computed in groups of this many.
@@ -86,7 +87,7 @@ pub(super) fn gaussian(taps: &mut [f32], centre: f32, scale: f32) -> f32 {
     for group in taps.as_chunks_mut::<LANES>().0 {
         *group = std::array::from_fn(|lane| {
             let d = first + lane as f32;
-            exp2(-d * d * scale)
+            exp2_f32(-d * d * scale)
         });
         for (sum, tap) in sums.iter_mut().zip(*group) {
             *sum += tap;
@@ -94,21 +95,6 @@ pub(super) fn gaussian(taps: &mut [f32], centre: f32, scale: f32) -> f32 {
         first += LANES as f32;
     }
     sums.iter().sum()
-}
-
-/// 2ˣ for x ≤ 0, relative error below 3e-7; 2⁻¹²⁶ for all below −126. Plain arithmetic, so that it vectorises.
-#[inline(always)]
-fn exp2(x: f32) -> f32 {
-    // Adding 1.5·2²³ leaves the nearest integer in the low bits.
-    const ROUND: f32 = 12_582_912.0;
-    let x = if x > -126.0 { x } else { -126.0 };
-    let rounded = x + ROUND;
-    let power = f32::from_bits(rounded.to_bits().wrapping_add(127) << 23);
-    let y = (x - (rounded - ROUND)) * std::f32::consts::LN_2;
-    // Taylor series; |y| ≤ ln 2/2, the first term left out is 1.2e-7.
-    let series = 1.0 / 120.0 + y * (1.0 / 720.0);
-    let series = 1.0 / 6.0 + y * (1.0 / 24.0 + y * series);
-    power * (1.0 + y * (1.0 + y * (0.5 + y * series)))
 }
 
 #[cfg(test)]
@@ -124,16 +110,6 @@ mod tests {
             assert!(found >= z && found < z + 0.04, "{found}");
         }
     }
-
-    #[test]
-    fn powers_of_two() {
-        for i in 0..=12_700 {
-            let x = -0.01 * i as f32;
-            let exact = f64::from(x).max(-126.0).exp2();
-            assert!((f64::from(exp2(x)) / exact - 1.0).abs() < 3e-7, "x {x}");
-        }
-    }
-
     /// The two Gaussians together are the one, at every place between the steps, for all tolerances.
     #[test]
     fn two_gaussians_make_one() {

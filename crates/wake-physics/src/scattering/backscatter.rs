@@ -17,10 +17,10 @@ pub struct FacetFields<'a> {
     /// Factor on the Bragg return by hydrodynamic modulation \[1\], where it counts: exp(m − ½ var m).
     pub modulation: Option<&'a Field>,
     /// Share of the Bragg waves that the turbulent wake leaves, 0 to 1, where it counts.
-    pub damping: Option<&'a Field>,
+    pub bragg_remaining: Option<&'a Field>,
     /// Slopes that the pixels do not carry besides those of the sea, by place: variances xx, xy and yy \[1\], where they
     /// count.
-    pub unresolved: Option<&'a [Field; 3]>,
+    pub subpixel_variances: Option<&'a [Field; 3]>,
 }
 
 impl<'a> FacetFields<'a> {
@@ -31,8 +31,8 @@ impl<'a> FacetFields<'a> {
             slope_x,
             slope_y,
             modulation: None,
-            damping: None,
-            unresolved: None,
+            bragg_remaining: None,
+            subpixel_variances: None,
         }
     }
 
@@ -45,16 +45,19 @@ impl<'a> FacetFields<'a> {
         ]
     }
 
-    /// Unresolved slopes at pixel `n`, where there are any.
+    /// Subpixel slopes at pixel `n`, where there are any.
     #[inline(always)]
-    pub(crate) fn unresolved(&self, n: usize) -> Option<SlopeCovariance> {
-        let [xx, xy, yy] = self.unresolved?.each_ref().map(|f| f64::from(f.values[n]));
+    pub(crate) fn subpixel_variance(&self, n: usize) -> Option<SlopeCovariance> {
+        let [xx, xy, yy] = self
+            .subpixel_variances?
+            .each_ref()
+            .map(|f| f64::from(f.values[n]));
         (xx + yy > 0.0).then_some(SlopeCovariance { xx, xy, yy })
     }
 
     /// Largest variance of the unresolved slopes in all.
-    pub(crate) fn largest_unresolved(&self) -> f64 {
-        let largest = self.unresolved.map_or(0.0, |[xx, _, yy]| {
+    pub(crate) fn largest_subpixel_variance(&self) -> f64 {
+        let largest = self.subpixel_variances.map_or(0.0, |[xx, _, yy]| {
             let sums = xx.values.par_iter().zip(&yy.values).map(|(xx, yy)| xx + yy);
             sums.reduce(|| 0.0, f32::max)
         });
@@ -65,8 +68,8 @@ impl<'a> FacetFields<'a> {
     #[inline(always)]
     pub(crate) fn combine(&self, n: usize, [bragg, specular]: [f64; 2]) -> f32 {
         let modulation = self.modulation.map_or(1.0, |m| m.values[n]);
-        let damping = self.damping.map_or(1.0, |d| d.values[n]);
-        (bragg * f64::from(modulation * damping) + specular) as f32
+        let remaining = self.bragg_remaining.map_or(1.0, |left| left.values[n]);
+        (bragg * f64::from(modulation * remaining) + specular) as f32
     }
 }
 
@@ -133,7 +136,7 @@ impl Backscatter {
             .map(|&[row, column]| {
                 let n = row * columns + column;
                 let slope = fields.slope(n);
-                let parts = match fields.unresolved(n) {
+                let parts = match fields.subpixel_variance(n) {
                     None => self.parts(slope),
                     Some(more) => [
                         self.two_scale.tilt_averaged(slope, &self.tilt.plus(&more)),

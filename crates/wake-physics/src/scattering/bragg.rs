@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 /// First-order scattering coefficients of a slightly rough dielectric plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Coefficients {
+pub struct Coefficients {
     /// `g_VV`, vertical polarization both ways \[1\].
     pub vv: Complex64,
     /// `g_HH`, horizontal polarization both ways \[1\].
@@ -27,7 +27,7 @@ pub(crate) struct Coefficients {
 /// for large |ε|).
 #[must_use]
 #[inline(always)]
-pub(crate) fn coefficients(permittivity: Complex64, cos_incidence: f64) -> Coefficients {
+pub fn coefficients(permittivity: Complex64, cos_incidence: f64) -> Coefficients {
     let (e, cos) = (permittivity, cos_incidence);
     let sin2 = 1.0 - cos * cos;
     let root = square_root(e - sin2);
@@ -50,7 +50,7 @@ fn square_root(z: Complex64) -> Complex64 {
 ///
 /// - `radar_wavenumber` `k_e` = 2π/λ [rad/m], `incidence` θ \[rad\]
 #[must_use]
-pub(crate) fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
+pub fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
     2.0 * radar_wavenumber * incidence.sin()
 }
 
@@ -69,12 +69,7 @@ pub(crate) fn wavenumber(radar_wavenumber: f64, incidence: f64) -> f64 {
 /// Valenzuela (1978), Eq. 4.2; Romeiser et al. (1997), J. Geophys. Res. 102, 25237, Eq. 1, in another notation.
 #[must_use]
 #[inline(always)]
-pub(crate) fn cross_section(
-    radar_wavenumber: f64,
-    cos_incidence: f64,
-    gain: f64,
-    density: f64,
-) -> f64 {
+pub fn cross_section(radar_wavenumber: f64, cos_incidence: f64, gain: f64, density: f64) -> f64 {
     16.0 * PI * (radar_wavenumber * cos_incidence).powi(4) * gain * density
 }
 

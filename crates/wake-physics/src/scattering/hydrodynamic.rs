@@ -10,11 +10,11 @@ use crate::raster::Field;
 use crate::spectrum::Elfouhaily;
 use rayon::prelude::*;
 
-/// Step in ln k of the difference that gives the steepness \[1\].
+/// Step in ln k of the difference that gives the action slope \[1\].
 const STEP: f64 = 1e-3;
 
 /// Slowest and fastest relaxation admitted [1/s], the range of a scene's `radar.relaxation_rate`.
-pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
+pub const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 
 /// Rate at which the Bragg waves return to equilibrium with the wind, taken as their rate of growth.
 ///
@@ -34,14 +34,14 @@ pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 ///
 /// Plant (1982), J. Geophys. Res. 87(C3), 1961, Eq. 3.
 #[must_use]
-pub(crate) fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
+pub fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> f64 {
     let omega = angular_frequency(bragg_wavenumber, f64::INFINITY);
     let speed = omega / bragg_wavenumber;
     let growth = 0.04 * (friction_velocity / speed).powi(2) * omega;
     growth.clamp(RELAXATION_RANGE[0], RELAXATION_RANGE[1])
 }
 
-/// Steepness of the action spectrum of the Bragg waves, by which they answer to a strain of the current.
+/// Slope of the action spectrum of the Bragg waves, by which they answer to a strain of the current.
 ///
 /// ```text
 /// m_B = −∂ln N/∂ln k  at k_B,     N = ω Ψ/k
@@ -57,7 +57,7 @@ pub(crate) fn relaxation_rate(friction_velocity: f64, bragg_wavenumber: f64) -> 
 ///
 /// Alpers and Hasselmann (1978), Boundary-Layer Meteorology 13 (the action balance); the spectrum is Elfouhaily's.
 #[must_use]
-pub(crate) fn steepness(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [f64; 2]) -> f64 {
+pub fn action_slope(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [f64; 2]) -> f64 {
     let ln_action = |k: f64| {
         let density = spectrum.density([k, 0.0], wind);
         (angular_frequency(k, f64::INFINITY) * density / k).ln()
@@ -77,7 +77,7 @@ pub(crate) fn steepness(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [f64
 /// a Gaussian m the mean 1.
 ///
 /// - `variance` var m of the sea
-pub(crate) fn to_bragg_factors(modulation: &mut Field, variance: f64) {
+pub fn to_bragg_factors(modulation: &mut Field, variance: f64) {
     let half = (0.5 * variance) as f32;
     let values = modulation.values.par_iter_mut().with_min_len(1 << 14);
     values.for_each(|m| *m = (*m - half).exp());
@@ -140,7 +140,7 @@ mod tests {
     /// The table of the reference at 35° for winds of 3, 5, 7, 10 m/s of a fully developed
     /// sea, upwind, with two decimals: computed by another program from the same spectrum.
     #[test]
-    fn steepness_is_that_of_the_table() {
+    fn the_action_slope_is_that_of_the_table() {
         for (frequency, expected) in [
             (1.27e9, [4.83, 4.93, 4.64, 4.12]),
             (3.2e9, [5.17, 4.52, 4.03, 3.87]),
@@ -151,7 +151,7 @@ mod tests {
             let bragg = crate::scattering::bragg::wavenumber(k_e, 35f64.to_radians());
             for (wind_speed, value) in [3.0, 5.0, 7.0, 10.0].into_iter().zip(expected) {
                 let spectrum = Elfouhaily::of_age(wind_speed, FULLY_DEVELOPED, DragLaw::Wu);
-                let found = steepness(&spectrum, bragg, [1.0, 0.0]);
+                let found = action_slope(&spectrum, bragg, [1.0, 0.0]);
                 // Half a unit of the last decimal given.
                 assert!(
                     (found - value).abs() <= 0.005,
@@ -163,9 +163,9 @@ mod tests {
 
     /// Without wind there are no short waves, and nothing to modulate.
     #[test]
-    fn no_short_waves_have_no_steepness() {
+    fn no_short_waves_have_no_action_slope() {
         assert_eq!(
-            steepness(&Elfouhaily::new(0.0, 4e4), 200.0, [1.0, 0.0]),
+            action_slope(&Elfouhaily::new(0.0, 4e4), 200.0, [1.0, 0.0]),
             0.0
         );
     }

@@ -1,7 +1,7 @@
 //! Radar backscatter of the sea: the cross-section σ⁰ of each pixel from its slope.
 //!
 //! ```text
-//! σ⁰ = σ_Bragg(slope) · exp(m − ½ var m) · damping + σ_specular(slope)
+//! σ⁰ = σ_Bragg(slope) · exp(m − ½ var m) · remaining + σ_specular(slope)
 //! ```
 //!
 //! Waves come in three bands. Those a pixel resolves tilt its facet. Those between the pixel and the radar's
@@ -11,9 +11,10 @@
 //! Linear units, per unit area of the horizontal plane. The radar looks toward +x, so a slope ∂ζ/∂x > 0, which
 //! rises away from the radar, faces it and is bright.
 
-pub(crate) mod bragg;
+pub mod bragg;
 pub mod breaking;
-pub(crate) mod hydrodynamic;
+pub mod hydrodynamic;
+pub mod modulation;
 mod slope_lattice;
 mod slope_means;
 mod slopes;

@@ -1,6 +1,6 @@
 //! Gaussian slopes: their covariance, its axes and its density.
 
-use crate::vectorize::exp;
+use crate::numeric::vector::exp;
 use std::f64::consts::PI;
 
 /// Covariance of the slopes ∂ζ/∂x, ∂ζ/∂y of a band of waves \[1\].

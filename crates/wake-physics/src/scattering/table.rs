@@ -1,5 +1,6 @@
 //! σ⁰ as a table over two slopes: the fast way.
 
+use crate::numeric::vectorized;
 use crate::raster::Field;
 use crate::scattering::bicubic::Bicubic;
 use crate::scattering::facets::Facets;
@@ -7,7 +8,6 @@ use crate::scattering::slope_means::SlopeMeans;
 use crate::scattering::slopes::PrincipalAxes;
 use crate::scattering::table_error::{OF_MEANS, Weights, error_between_nodes};
 use crate::scattering::{Backscatter, FacetFields, SlopeCovariance};
-use crate::vectorize::vectorized;
 use rayon::prelude::*;
 
 /// First spacing of facets tried \[1\]: a quarter of the width of the roll-off near nadir.
@@ -118,7 +118,7 @@ impl BackscatterTable {
         let slopes = [facets.slope_x, facets.slope_y].map(|field| &field.values[..]);
         let made_for = MadeFor {
             facets: extent(&axes, slopes),
-            variance: facets.largest_unresolved(),
+            variance: facets.largest_subpixel_variance(),
             error,
             most_nodes: most_nodes(facets.slope_x.values.len()),
         };
@@ -301,7 +301,7 @@ impl BackscatterTable {
                 for (n, bragg) in (first..).zip(&mut *bragg) {
                     *bragg = self.bragg(fields.slope(n));
                 }
-                if fields.unresolved.is_some() {
+                if fields.subpixel_variances.is_some() {
                     return self.roughened_row(fields, first, bragg, out);
                 }
                 for ((n, &mut bragg), value) in (first..).zip(bragg).zip(out) {
@@ -343,7 +343,7 @@ impl BackscatterTable {
         let specular = &self.backscatter.specular;
         for ((n, &bragg), value) in (first..).zip(bragg).zip(out) {
             let slope = fields.slope(n);
-            let parts = match fields.unresolved(n).zip(self.means.as_ref()) {
+            let parts = match fields.subpixel_variance(n).zip(self.means.as_ref()) {
                 None => [bragg, specular.sigma0(slope)],
                 Some((more, means)) => [
                     {
@@ -649,7 +649,7 @@ mod tests {
         };
         let unresolved = [of(|c| c.xx), of(|c| c.xy), of(|c| c.yy)];
         let facets = FacetFields {
-            unresolved: Some(&unresolved),
+            subpixel_variances: Some(&unresolved),
             ..FacetFields::of_slopes(&x, &y)
         };
         for case in [DEFAULT, c_band, l_band] {
@@ -701,7 +701,7 @@ mod tests {
             columns: 3,
             values: vec![1.5, 0.0, 1.0],
         };
-        let damping = Field {
+        let remaining = Field {
             rows: 1,
             columns: 3,
             values: vec![1.0, 1.0, 0.25],
@@ -710,7 +710,7 @@ mod tests {
             BackscatterTable::covering(backscatter, &FacetFields::of_slopes(&flat, &flat), 1e-3);
         let sigma0 = table.sigma0_field(&FacetFields {
             modulation: Some(&modulation),
-            damping: Some(&damping),
+            bragg_remaining: Some(&remaining),
             ..FacetFields::of_slopes(&flat, &flat)
         });
         let [bragg, specular] = table.lookup([0.0; 2]);

@@ -1,10 +1,10 @@
 //! The two-scale model: short waves that scatter, carried on facets that tilt.
 
+use crate::numeric::vector::{exp, vectorized};
 use crate::scattering::Polarization;
 use crate::scattering::bragg::{coefficients, cross_section};
 use crate::scattering::slopes::{SlopeCovariance, gaussian_nodes};
 use crate::spectrum::Elfouhaily;
-use crate::vectorize::{exp, vectorized};
 use num_complex::Complex64;
 
 /// Split wavenumber over radar wavenumber, `k_d`/`k_e` \[1\]. Longer waves tilt facets, shorter ones scatter.

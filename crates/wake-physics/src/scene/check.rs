@@ -185,7 +185,13 @@ impl Radar {
             200.0,
             "s",
         )?;
-        in_range("radar.resolution", self.resolution, 0.5, 100.0, "m")?;
+        in_range(
+            "radar.azimuth_resolution",
+            self.azimuth_resolution,
+            0.5,
+            100.0,
+            "m",
+        )?;
         in_range("radar.looks", f64::from(self.looks), 1.0, 1000.0, "")?;
         optional(
             "radar.range_resolution",
@@ -194,9 +200,14 @@ impl Radar {
             "m",
         )?;
         optional("radar.look_overlap", self.look_overlap, [0.0, 0.9], "")?;
-        optional("radar.noise_floor", self.noise_floor, [-60.0, 20.0], "dB")?;
-        optional("radar.ambiguity", self.ambiguity, [-60.0, 0.0], "dB")?;
-        optional("radar.pulse_rate", self.pulse_rate, [100.0, 2e4], "Hz")?;
+        optional("radar.nesz", self.nesz, [-60.0, 20.0], "dB")?;
+        optional(
+            "radar.azimuth_ambiguity",
+            self.azimuth_ambiguity,
+            [-60.0, 0.0],
+            "dB",
+        )?;
+        optional("radar.prf", self.prf, [100.0, 2e4], "Hz")?;
         optional(
             "radar.relaxation_rate",
             self.relaxation_rate,
@@ -214,7 +225,7 @@ impl Radar {
             ("radar.window", self.window.is_some()),
             ("radar.azimuth_window", self.azimuth_window.is_some()),
             ("radar.look_overlap", self.look_overlap.is_some()),
-            ("radar.ambiguity", self.ambiguity.is_some()),
+            ("radar.azimuth_ambiguity", self.azimuth_ambiguity.is_some()),
         ];
         let refuse = |name: &str, requirement: &str| {
             Err(Error::Conflict {
@@ -231,13 +242,13 @@ impl Radar {
                 "but needs radar.range_resolution: set it, or name a radar.sensor",
             );
         }
-        if self.ambiguity.is_some() && self.pulse_rate.is_none() {
-            return refuse("radar.ambiguity", "but needs radar.pulse_rate: set it too");
+        if self.azimuth_ambiguity.is_some() && self.prf.is_none() {
+            return refuse("radar.azimuth_ambiguity", "but needs radar.prf: set it too");
         }
-        if self.pulse_rate.is_some() && self.ambiguity.is_none() {
+        if self.prf.is_some() && self.azimuth_ambiguity.is_none() {
             return refuse(
-                "radar.pulse_rate",
-                "but places ambiguities only: set radar.ambiguity too, or leave it out",
+                "radar.prf",
+                "but places ambiguities only: set radar.azimuth_ambiguity too, or leave it out",
             );
         }
         Ok(())
@@ -288,7 +299,7 @@ mod tests {
         ("radar.frequency", 1e9, 2e10),
         ("radar.incidence", 5.0, 75.0),
         ("radar.range_to_velocity", 0.0, 200.0),
-        ("radar.resolution", 0.5, 100.0),
+        ("radar.azimuth_resolution", 0.5, 100.0),
         ("radar.relaxation_rate", 0.01, 100.0),
         ("model.tolerance", 1e-6, 0.1),
         ("sea.gust_strength", 0.0, 0.5),
@@ -302,8 +313,8 @@ mod tests {
         ("ship.edge_outflow", 0.0, 0.3),
         ("ship.roll", 0.0, 2.0),
         ("radar.range_resolution", 0.5, 500.0),
-        ("radar.noise_floor", -60.0, 20.0),
-        ("radar.pulse_rate", 100.0, 2e4),
+        ("radar.nesz", -60.0, 20.0),
+        ("radar.prf", 100.0, 2e4),
         ("radar.look_overlap", 0.0, 0.9),
     ];
 
@@ -315,7 +326,7 @@ mod tests {
         };
         let mut scene = Scene::default();
         scene.radar.range_resolution = Some(10.0);
-        (scene.radar.ambiguity, scene.radar.pulse_rate) = (Some(-25.0), Some(1700.0));
+        (scene.radar.azimuth_ambiguity, scene.radar.prf) = (Some(-25.0), Some(1700.0));
         for ship in &mut scene.ships {
             (ship.echo, ship.edge) = (true, true);
             // A hull on which every single value may take its extremes.
@@ -385,13 +396,13 @@ mod tests {
             "radar.window=uniform",
             "radar.azimuth_window={ hamming = 0.7 }",
             "radar.look_overlap=0.2",
-            "radar.ambiguity=-25",
+            "radar.azimuth_ambiguity=-25",
         ] {
             assert!(refused(&[key]).contains("radar.range_resolution"), "{key}");
         }
-        let ghost = ["radar.range_resolution=10", "radar.ambiguity=-25"];
-        assert!(refused(&ghost).contains("radar.pulse_rate"));
-        assert!(refused(&["radar.pulse_rate=1700"]).contains("radar.ambiguity"));
+        let ghost = ["radar.range_resolution=10", "radar.azimuth_ambiguity=-25"];
+        assert!(refused(&ghost).contains("radar.prf"));
+        assert!(refused(&["radar.prf=1700"]).contains("radar.azimuth_ambiguity"));
         for (key, good) in [
             ("radar.window={ hamming = 0.5 }", true),
             ("radar.window={ hamming = 1.0 }", true),

@@ -1,7 +1,7 @@
 //! Scene files: reading, writing, and assignments such as `ship.speed=10`.
 
 use super::Scene;
-use super::keys::SET_BY_SENSOR;
+use super::keys::{NOT_SET_BY_SENSOR, STORED, stored_key};
 use crate::error::{Error, Result};
 use std::io::Read;
 use std::path::Path;
@@ -51,9 +51,10 @@ impl Scene {
     ///
     /// [`Error::Parse`] if a value has no form in TOML.
     pub fn to_toml(&self) -> Result<String> {
-        toml::to_string(self).map_err(|e| Error::Parse {
+        let text = toml::to_string(self).map_err(|e| Error::Parse {
             message: e.to_string(),
-        })
+        })?;
+        Ok(with_keys_of_files(&text))
     }
 
     /// The scene with assignments such as `ship.speed=10` made, in order, then checked.
@@ -85,7 +86,8 @@ impl Scene {
             .ok_or_else(|| fail("there is no '='".to_owned()))?;
         let value = toml_value(value.trim()).ok_or_else(|| fail("there is no value".to_owned()))?;
         let mut root = toml::Table::try_from(self).map_err(|e| fail(e.to_string()))?;
-        let path: Vec<&str> = key.trim().split('.').collect();
+        let key = stored_key(key.trim());
+        let path: Vec<&str> = key.split('.').collect();
         let (last, tables) = path.split_last().unwrap_or((&"", &[]));
         if path == ["radar", "sensor"] {
             forget_radar(&mut root);
@@ -145,15 +147,32 @@ fn table_of_ship<'t, 'k>(
     Ok((table, rest))
 }
 
+/// The text of a serialized scene with the keys of a scene file.
+fn with_keys_of_files(text: &str) -> String {
+    let (mut out, mut radar) = (String::with_capacity(text.len() + 64), false);
+    for line in text.lines() {
+        if line.starts_with('[') {
+            radar = line == "[radar]";
+        }
+        let value = |stored| line.strip_prefix(stored)?.strip_prefix(" = ");
+        let renamed = STORED
+            .iter()
+            .find_map(|(key, stored)| Some(format!("{key} = {}", value(*stored)?)));
+        out.push_str(renamed.as_deref().filter(|_| radar).unwrap_or(line));
+        out.push('\n');
+    }
+    out
+}
+
 /// Takes away what a sensor sets.
 fn forget_radar(root: &mut toml::Table) {
-    let mut forget = |table: &str, keys: &[&str]| {
+    let mut forget = |table: &str, forgotten: fn(&str) -> bool| {
         if let Some(table) = root.get_mut(table).and_then(toml::Value::as_table_mut) {
-            table.retain(|key, _| !keys.contains(&key));
+            table.retain(|key, _| !forgotten(key));
         }
     };
-    forget("radar", &SET_BY_SENSOR);
-    forget("grid", &["spacing"]);
+    forget("radar", |key| key != NOT_SET_BY_SENSOR);
+    forget("grid", |key| key == "spacing");
 }
 
 /// The text of a file that is no longer than a scene can be.
@@ -210,7 +229,7 @@ mod tests {
 
     #[test]
     fn text_and_back() {
-        for scene in crate::scene::paper_grid().step_by(97) {
+        for scene in crate::scene::paper::paper_grid().step_by(97) {
             assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
         }
         let mut scene = Scene::default();

@@ -51,34 +51,42 @@ struct RadarKeys {
     polarization: Option<Polarization>,
     incidence: Option<f64>,
     range_to_velocity: Option<f64>,
-    resolution: Option<f64>,
+    #[serde(alias = "resolution")]
+    azimuth_resolution: Option<f64>,
     range_resolution: Option<f64>,
     window: Option<Window>,
     azimuth_window: Option<Window>,
     looks: Option<u32>,
     look_overlap: Option<f64>,
-    noise_floor: Option<f64>,
-    ambiguity: Option<f64>,
-    pulse_rate: Option<f64>,
+    #[serde(alias = "noise_floor")]
+    nesz: Option<f64>,
+    #[serde(alias = "ambiguity")]
+    azimuth_ambiguity: Option<f64>,
+    #[serde(alias = "pulse_rate")]
+    prf: Option<f64>,
     relaxation_rate: Option<f64>,
 }
 
-/// Keys that a sensor sets where they are absent.
-pub(super) const SET_BY_SENSOR: [&str; 13] = [
-    "frequency",
-    "polarization",
-    "incidence",
-    "range_to_velocity",
-    "resolution",
-    "range_resolution",
-    "window",
-    "azimuth_window",
-    "looks",
-    "look_overlap",
-    "noise_floor",
-    "ambiguity",
-    "pulse_rate",
+/// Keys of the radar in a scene file, and the names under which serialized scenes have them.
+pub(super) const STORED: [(&str, &str); 4] = [
+    ("azimuth_resolution", "resolution"),
+    ("nesz", "noise_floor"),
+    ("azimuth_ambiguity", "ambiguity"),
+    ("prf", "pulse_rate"),
 ];
+
+/// The path of a key in a serialized scene: `radar.noise_floor` for `radar.nesz`; most keys have one name.
+#[must_use]
+pub fn stored_key(path: &str) -> String {
+    let key = path.strip_prefix("radar.");
+    match STORED.iter().find(|(name, _)| key == Some(*name)) {
+        Some((_, stored)) => format!("radar.{stored}"),
+        None => path.to_owned(),
+    }
+}
+
+/// The one key of the radar that no sensor sets.
+pub(super) const NOT_SET_BY_SENSOR: &str = "relaxation_rate";
 
 impl From<SceneKeys> for Scene {
     fn from(keys: SceneKeys) -> Self {
@@ -116,15 +124,15 @@ impl RadarKeys {
             polarization: self.polarization.unwrap_or(base.polarization),
             incidence: incidence.unwrap_or(base.incidence),
             range_to_velocity: self.range_to_velocity.unwrap_or(base.range_to_velocity),
-            resolution: self.resolution.unwrap_or(base.resolution),
+            azimuth_resolution: self.azimuth_resolution.unwrap_or(base.azimuth_resolution),
             range_resolution: self.range_resolution.or(base.range_resolution),
             window: self.window.or(base.window),
             azimuth_window: self.azimuth_window.or(base.azimuth_window),
             looks: self.looks.unwrap_or(base.looks),
             look_overlap: self.look_overlap.or(base.look_overlap),
-            noise_floor: self.noise_floor.or(base.noise_floor),
-            ambiguity: self.ambiguity.or(base.ambiguity),
-            pulse_rate: self.pulse_rate.or(base.pulse_rate),
+            nesz: self.nesz.or(base.nesz),
+            azimuth_ambiguity: self.azimuth_ambiguity.or(base.azimuth_ambiguity),
+            prf: self.prf.or(base.prf),
             relaxation_rate: self.relaxation_rate,
         }
     }
@@ -140,15 +148,15 @@ fn of_sensor(sensor: Sensor, incidence: Option<f64>) -> Radar {
         polarization: mode.polarization,
         incidence,
         range_to_velocity: mode.range_to_velocity_at(incidence),
-        resolution: mode.azimuth_resolution,
+        azimuth_resolution: mode.azimuth_resolution,
         range_resolution: Some(mode.range_resolution_at(incidence)),
         window: Some(mode.windows[0]),
         azimuth_window: Some(mode.windows[1]),
         looks: mode.looks.0,
         look_overlap: Some(mode.looks.1),
-        noise_floor: Some(mode.noise_floor),
-        ambiguity: Some(AMBIGUITY),
-        pulse_rate: Some(mode.pulse_rate),
+        nesz: Some(mode.nesz),
+        azimuth_ambiguity: Some(AMBIGUITY),
+        prf: Some(mode.prf),
         relaxation_rate: None,
     }
 }
@@ -209,17 +217,84 @@ mod tests {
         assert_eq!(kept.radar.relaxation_rate, Some(2.0));
     }
 
-    /// Every field of the radar but two is set by a sensor; a new one must be put on the list or named here.
+    /// The first names of keys and terms are read as before; files are written with the new ones, JSON with the first.
     #[test]
-    fn the_list_of_keys_is_complete() {
-        let radar = of_sensor(Sensor::Sentinel1Iw, None);
-        let written = toml::Table::try_from(&radar).unwrap();
-        let set: Vec<&str> = written
-            .keys()
-            .map(String::as_str)
-            .filter(|k| *k != "sensor")
-            .collect();
-        assert_eq!(set.len(), SET_BY_SENSOR.len());
-        assert!(set.iter().all(|key| SET_BY_SENSOR.contains(key)), "{set:?}");
+    fn keys_of_two_names_are_one() {
+        let [first, new] = [
+            "range_resolution = 9\nresolution = 7\nnoise_floor = -20\nambiguity = -25\npulse_rate = 1700",
+            "range_resolution = 9\nazimuth_resolution = 7\nnesz = -20\nazimuth_ambiguity = -25\nprf = 1700",
+        ]
+        .map(|keys| Scene::from_toml(&format!("[radar]\n{keys}")).unwrap());
+        assert_eq!(first, new);
+        let radar = &new.radar;
+        assert_eq!((radar.azimuth_resolution, radar.nesz), (7.0, Some(-20.0)));
+        assert_eq!(
+            (radar.azimuth_ambiguity, radar.prf),
+            (Some(-25.0), Some(1700.0))
+        );
+        let text = new.to_toml().unwrap();
+        let json = serde_json::to_string(&new).unwrap();
+        for (key, stored) in STORED {
+            assert!(text.contains(&format!("\n{key} = ")), "{text}");
+            assert!(!text.contains(&format!("\n{stored} = ")), "{text}");
+            assert!(json.contains(&format!("\"{stored}\":")), "{json}");
+            assert!(!json.contains(&format!("\"{key}\":")), "{json}");
+            assert_eq!(
+                stored_key(&format!("radar.{key}")),
+                format!("radar.{stored}")
+            );
+            assert_eq!(stored_key(key), key);
+            // Either name replaces the value.
+            let value = match key {
+                "azimuth_resolution" => 8,
+                "prf" => 2000,
+                _ => -10,
+            };
+            let [a, b] = [key, stored].map(|name| {
+                new.with_assignments(&[format!("radar.{name}={value}")])
+                    .unwrap()
+            });
+            assert!(a == b && a != new, "{key}");
+            let both = format!("[radar]\n{key} = 1\n{stored} = 1");
+            let message = Scene::from_toml(&both).unwrap_err().to_string();
+            assert!(message.contains("duplicate"), "{message}");
+        }
+        let terms = |words: &str| {
+            Scene::default()
+                .with_assignments(&[format!("model.terms=[{words}]")])
+                .unwrap()
+                .model
+        };
+        assert_eq!(
+            terms("\"unresolved\", \"edge\", \"bunching\", \"coherence\", \"response\""),
+            terms(
+                "\"subpixel_wake\", \"bright_edge\", \"velocity_bunching\", \"azimuth_smear\", \"impulse_response\""
+            )
+        );
+    }
+
+    /// Every field of the radar but one is set by a sensor; a new one must be set, too, or be named here.
+    #[test]
+    fn a_sensor_sets_all_but_one_key() {
+        let mut radar = of_sensor(Sensor::Sentinel1Iw, None);
+        let set = toml::Table::try_from(&radar).unwrap();
+        assert!(!set.contains_key(NOT_SET_BY_SENSOR));
+        radar.relaxation_rate = Some(1.0);
+        let all = toml::Table::try_from(&radar).unwrap();
+        assert!(all.contains_key(NOT_SET_BY_SENSOR) && all.len() == set.len() + 1);
+        let Radar {
+            sensor: Some(_),
+            range_resolution: Some(_),
+            window: Some(_),
+            azimuth_window: Some(_),
+            look_overlap: Some(_),
+            nesz: Some(_),
+            azimuth_ambiguity: Some(_),
+            prf: Some(_),
+            ..
+        } = radar
+        else {
+            panic!("a key that no sensor sets")
+        };
     }
 }

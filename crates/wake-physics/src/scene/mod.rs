@@ -5,12 +5,12 @@ mod file;
 mod forms;
 mod keys;
 mod model;
-mod paper;
+pub(crate) mod paper;
 pub mod sensor;
 
 use crate::window::Window;
+pub use keys::stored_key;
 pub use model::{Model, Term, TermRule, Terms};
-pub use paper::paper_grid;
 use serde::{Deserialize, Serialize};
 
 /// A ship, a sea and a radar over a grid of pixels.
@@ -155,6 +155,7 @@ impl Default for Sea {
 /// Wavenumber spectrum of the resolved waves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum SpectrumModel {
     /// Elfouhaily et al. (1997).
     Elfouhaily,
@@ -167,6 +168,7 @@ pub enum SpectrumModel {
 /// Directional spreading of the resolved waves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum SpreadingModel {
     /// cos-2s with the exponent of Hasselmann et al. (1980).
     Hasselmann,
@@ -258,6 +260,7 @@ impl Ship {
 /// Form of the hull.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum HullForm {
     /// Wigley's parabolic hull, block coefficient 4/9.
     Wigley,
@@ -266,6 +269,9 @@ pub enum HullForm {
 }
 
 /// The radar and its platform; it looks toward +x.
+///
+/// Serialized scenes (reports, manifests, weights) keep the first names of four keys, `resolution`, `noise_floor`, `ambiguity`
+/// and `pulse_rate`; [`Scene::to_toml`] writes the names of the fields, and every reader accepts both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Radar {
     /// The satellite that set what follows, where no key beside it did.
@@ -280,7 +286,8 @@ pub struct Radar {
     /// Range over platform speed R/V \[s\], 0 to 200.
     pub range_to_velocity: f64,
     /// Single-look azimuth resolution \[m\], 0.5 to 100.
-    pub resolution: f64,
+    #[serde(rename(serialize = "resolution"))]
+    pub azimuth_resolution: f64,
     /// Resolution of one look in ground range \[m\], 0.5 to 500. Where absent it is the pixel and every pixel has its own
     /// speckle; with it the image has the radar's impulse response in both axes, see [`crate::sar::impulse`].
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -298,14 +305,23 @@ pub struct Radar {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub look_overlap: Option<f64>,
     /// Noise-equivalent σ⁰ \[dB\], −60 to 20, added before the speckle; no noise where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise_floor: Option<f64>,
+    #[serde(
+        rename(serialize = "noise_floor"),
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub nesz: Option<f64>,
     /// Level of the ship's azimuth ambiguities over its echo \[dB\], −60 to 0; none where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ambiguity: Option<f64>,
+    #[serde(
+        rename(serialize = "ambiguity"),
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub azimuth_ambiguity: Option<f64>,
     /// Pulse repetition frequency \[Hz\], 100 to 20,000: places the ambiguities; only with them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pulse_rate: Option<f64>,
+    #[serde(
+        rename(serialize = "pulse_rate"),
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub prf: Option<f64>,
     /// Relaxation rate of the Bragg waves [1/s], 0.01 to 100, in the hydrodynamic modulation and at the edges of wakes; from
     /// the Bragg wave and the wind where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -320,15 +336,15 @@ impl Default for Radar {
             polarization: Polarization::VV,
             incidence: 32.0,
             range_to_velocity: 78.0,
-            resolution: 3.0,
+            azimuth_resolution: 3.0,
             range_resolution: None,
             window: None,
             azimuth_window: None,
             looks: 4,
             look_overlap: None,
-            noise_floor: None,
-            ambiguity: None,
-            pulse_rate: None,
+            nesz: None,
+            azimuth_ambiguity: None,
+            prf: None,
             relaxation_rate: None,
         }
     }
@@ -338,6 +354,7 @@ impl Default for Radar {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[expect(missing_docs, reason = "the names of the satellites and their modes")]
+#[non_exhaustive]
 pub enum Sensor {
     #[serde(rename = "sentinel-1-iw")]
     Sentinel1Iw,

@@ -37,7 +37,7 @@ impl Terms {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, unresolved, turbulent, edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, bunching, coherence, noise, response, speckle"
+    expecting = "\"needed\", \"all\" or a list of the terms sea, swell, kelvin, subpixel_wake, turbulent, bright_edge, slicks, tilt_average, specular, breaking, gusts, range_bunching, hydrodynamic, velocity_bunching, azimuth_smear, noise, impulse_response, speckle"
 )]
 pub enum Terms {
     /// By a rule.
@@ -56,94 +56,86 @@ pub enum TermRule {
     All,
 }
 
-/// One physical effect that can be computed or left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Term {
-    /// The resolved wind waves.
-    Sea,
-    /// The swell.
-    Swell,
-    /// The Kelvin wake.
-    Kelvin,
-    /// The ship's waves that the computed pixels do not carry, as slopes and velocities of a variance: with an impulse
-    /// response.
-    Unresolved,
-    /// The turbulent wake.
-    Turbulent,
-    /// The current of the turbulent wake and its bright edges.
-    Edge,
-    /// Slicks.
-    Slicks,
-    /// The average of σ⁰ over the slopes of unresolved waves.
-    TiltAverage,
-    /// The quasi-specular return.
-    Specular,
-    /// The return of breaking waves.
-    Breaking,
-    /// Gusts of the wind.
-    Gusts,
-    /// Layover of elevated points toward the radar.
-    RangeBunching,
-    /// Modulation of the Bragg waves by the currents of longer ones.
-    Hydrodynamic,
-    /// Azimuth shift by the line-of-sight velocity.
-    Bunching,
-    /// Loss of azimuth resolution by unresolved and accelerated motion.
-    Coherence,
-    /// Noise of the radar.
-    Noise,
-    /// The radar's impulse response in range and azimuth.
-    Response,
-    /// Multi-look speckle.
-    Speckle,
+/// The terms in the order of the data flow: each with its name in scene files and reports, and its first name if it had
+/// another.
+macro_rules! terms {
+    ($($(#[doc = $doc:literal])* $term:ident = $name:literal $(| $first:literal)?,)*) => {
+        /// One physical effect that can be computed or left out.
+        ///
+        /// Scene files may also use the first names of some terms: `unresolved`, `edge`, `bunching`, `coherence`, `response`.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        #[non_exhaustive]
+        pub enum Term {
+            $($(#[doc = $doc])* #[serde(rename = $name $(, alias = $first)?)] $term,)*
+        }
+
+        impl Term {
+            /// Every term, in the order of the data flow.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$term),*];
+
+            /// Name in scene files and reports.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$term => $name,)*
+                }
+            }
+        }
+    };
 }
 
-impl Term {
-    /// Every term, in the order of the data flow.
-    pub const ALL: [Self; 18] = [
-        Self::Sea,
-        Self::Swell,
-        Self::Kelvin,
-        Self::Unresolved,
-        Self::Turbulent,
-        Self::Edge,
-        Self::Slicks,
-        Self::TiltAverage,
-        Self::Specular,
-        Self::Breaking,
-        Self::Gusts,
-        Self::RangeBunching,
-        Self::Hydrodynamic,
-        Self::Bunching,
-        Self::Coherence,
-        Self::Noise,
-        Self::Response,
-        Self::Speckle,
-    ];
+terms! {
+    /// The resolved wind waves.
+    Sea = "sea",
+    /// The swell.
+    Swell = "swell",
+    /// The Kelvin wake.
+    Kelvin = "kelvin",
+    /// The ship's waves that the computed pixels do not carry, as slopes and velocities of a variance: with an impulse
+    /// response.
+    SubpixelWake = "subpixel_wake" | "unresolved",
+    /// The turbulent wake.
+    Turbulent = "turbulent",
+    /// The current of the turbulent wake and its bright edges.
+    BrightEdge = "bright_edge" | "edge",
+    /// Slicks.
+    Slicks = "slicks",
+    /// The average of σ⁰ over the slopes of subpixel waves.
+    TiltAverage = "tilt_average",
+    /// The quasi-specular return.
+    Specular = "specular",
+    /// The return of breaking waves.
+    Breaking = "breaking",
+    /// Gusts of the wind.
+    Gusts = "gusts",
+    /// Layover of elevated points toward the radar.
+    RangeBunching = "range_bunching",
+    /// Modulation of the Bragg waves by the currents of longer ones.
+    Hydrodynamic = "hydrodynamic",
+    /// Azimuth shift by the line-of-sight velocity.
+    VelocityBunching = "velocity_bunching" | "bunching",
+    /// Loss of azimuth resolution by subpixel and accelerated motion.
+    AzimuthSmear = "azimuth_smear" | "coherence",
+    /// Noise of the radar.
+    Noise = "noise",
+    /// The radar's impulse response in range and azimuth.
+    ImpulseResponse = "impulse_response" | "response",
+    /// Multi-look speckle.
+    Speckle = "speckle",
+}
 
-    /// Name in scene files and reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sea => "sea",
-            Self::Swell => "swell",
-            Self::Kelvin => "kelvin",
-            Self::Unresolved => "unresolved",
-            Self::Turbulent => "turbulent",
-            Self::Edge => "edge",
-            Self::Slicks => "slicks",
-            Self::TiltAverage => "tilt_average",
-            Self::Specular => "specular",
-            Self::Breaking => "breaking",
-            Self::Gusts => "gusts",
-            Self::RangeBunching => "range_bunching",
-            Self::Hydrodynamic => "hydrodynamic",
-            Self::Bunching => "bunching",
-            Self::Coherence => "coherence",
-            Self::Noise => "noise",
-            Self::Response => "response",
-            Self::Speckle => "speckle",
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The message about a wrong term names all of them, and files spell each as its name.
+    #[test]
+    fn terms_have_their_names() {
+        let error = serde_json::from_str::<Terms>("3").unwrap_err().to_string();
+        for term in Term::ALL {
+            let name = term.name();
+            assert!(error.contains(name), "{name}: {error}");
+            assert_eq!(serde_json::to_value(term).unwrap(), name);
         }
     }
 }

@@ -24,6 +24,7 @@ pub enum RangeResolution {
 
 /// What a sensor sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct SensorMode {
     /// Frequency \[Hz\].
     pub frequency: f64,
@@ -46,9 +47,9 @@ pub struct SensorMode {
     /// Number of looks and the share of its band that each has in common with the next.
     pub looks: (u32, f64),
     /// Noise-equivalent cross-section σ⁰ \[dB\].
-    pub noise_floor: f64,
+    pub nesz: f64,
     /// Pulse repetition frequency \[Hz\].
-    pub pulse_rate: f64,
+    pub prf: f64,
 }
 
 impl Sensor {
@@ -106,8 +107,8 @@ fn sentinel_1_iw() -> SensorMode {
         azimuth_resolution: 18.4,
         windows: [Window::Hamming(0.70), Window::Uniform],
         looks: (5, 0.25),
-        noise_floor: -25.0,
-        pulse_rate: 1717.0,
+        nesz: -25.0,
+        prf: 1717.0,
     }
 }
 
@@ -121,8 +122,8 @@ fn sentinel_1_ew() -> SensorMode {
         range_resolution: RangeResolution::Ground(93.0),
         azimuth_resolution: 87.0,
         looks: (12, 0.25),
-        noise_floor: CHOSEN_NOISE,
-        pulse_rate: 1700.0,
+        nesz: CHOSEN_NOISE,
+        prf: 1700.0,
         ..sentinel_1_iw()
     }
 }
@@ -140,8 +141,8 @@ fn terrasar_x_sm() -> SensorMode {
         azimuth_resolution: 3.3,
         windows: [Window::Hamming(0.6); 2],
         looks: (1, 0.0),
-        noise_floor: CHOSEN_NOISE,
-        pulse_rate: 3800.0,
+        nesz: CHOSEN_NOISE,
+        prf: 3800.0,
     }
 }
 
@@ -158,8 +159,8 @@ fn cosmo_skymed_hi() -> SensorMode {
         azimuth_resolution: 3.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (1, 0.0),
-        noise_floor: -20.0,
-        pulse_rate: 3100.0,
+        nesz: -20.0,
+        prf: 3100.0,
     }
 }
 
@@ -176,13 +177,13 @@ fn iceye_strip() -> SensorMode {
         azimuth_resolution: 3.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (1, 0.0),
-        noise_floor: -18.0,
-        pulse_rate: 5000.0,
+        nesz: -18.0,
+        prf: 5000.0,
     }
 }
 
 /// Stripmap of PALSAR-2. Frequency, altitude, incidence, resolution: distributor's table. The rest: chosen.
-fn alos_2(spacing: f64, resolution: [f64; 2], looks: u32, noise_floor: f64) -> SensorMode {
+fn alos_2(spacing: f64, resolution: [f64; 2], looks: u32, nesz: f64) -> SensorMode {
     SensorMode {
         frequency: 1.26e9,
         polarization: Polarization::HH,
@@ -194,8 +195,8 @@ fn alos_2(spacing: f64, resolution: [f64; 2], looks: u32, noise_floor: f64) -> S
         azimuth_resolution: resolution[1],
         windows: [Window::Hamming(0.75); 2],
         looks: (looks, 0.0),
-        noise_floor,
-        pulse_rate: 2100.0,
+        nesz,
+        prf: 2100.0,
     }
 }
 
@@ -213,8 +214,8 @@ fn radarsat_2_s() -> SensorMode {
         azimuth_resolution: 24.7,
         windows: [Window::Hamming(0.75); 2],
         looks: (4, 0.5),
-        noise_floor: -28.0,
-        pulse_rate: 1300.0,
+        nesz: -28.0,
+        prf: 1300.0,
     }
 }
 
@@ -231,8 +232,8 @@ fn novasar_1() -> SensorMode {
         azimuth_resolution: 6.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (3, 0.0),
-        noise_floor: -17.0,
-        pulse_rate: 3000.0,
+        nesz: -17.0,
+        prf: 3000.0,
     }
 }
 
@@ -249,8 +250,8 @@ fn ers_2_pri() -> SensorMode {
         azimuth_resolution: 22.0,
         windows: [Window::Hamming(0.75); 2],
         looks: (3, 0.4),
-        noise_floor: -24.0,
-        pulse_rate: 1680.0,
+        nesz: -24.0,
+        prf: 1680.0,
     }
 }
 
@@ -300,8 +301,8 @@ pub fn range_to_velocity(altitude: f64, incidence: f64) -> f64 {
 /// Δy = PRF λ β/2,     β = R/V
 /// ```
 #[must_use]
-pub fn ambiguity_distance(pulse_rate: f64, frequency: f64, range_to_velocity: f64) -> f64 {
-    0.5 * pulse_rate * SPEED_OF_LIGHT / frequency * range_to_velocity
+pub fn ambiguity_distance(prf: f64, frequency: f64, range_to_velocity: f64) -> f64 {
+    0.5 * prf * SPEED_OF_LIGHT / frequency * range_to_velocity
 }
 
 /// Resolution in slant range \[m\] of a bandwidth \[Hz\]: ρB c/(2B).
@@ -362,7 +363,7 @@ mod tests {
         ] {
             let mode = sensor.mode();
             let beta = mode.range_to_velocity_at(mode.incidence);
-            let distance = ambiguity_distance(mode.pulse_rate, mode.frequency, beta) / 1e3;
+            let distance = ambiguity_distance(mode.prf, mode.frequency, beta) / 1e3;
             assert!(
                 (distance - expected).abs() < rounding,
                 "{sensor:?}: {distance}"
@@ -413,7 +414,7 @@ mod tests {
                 assert!((0.0..=200.0).contains(&mode.range_to_velocity_at(incidence)));
                 assert!((0.5..=500.0).contains(&mode.range_resolution_at(incidence)));
             }
-            assert!((-40.0..=0.0).contains(&mode.noise_floor), "{sensor:?}");
+            assert!((-40.0..=0.0).contains(&mode.nesz), "{sensor:?}");
         }
     }
 

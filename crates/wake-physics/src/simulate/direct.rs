@@ -1,14 +1,14 @@
 //! The oracles of all stages at some pixels of an image that is too large for them as a whole.
 
-use super::clock::{Clock, Seconds};
-use super::prepared::Prepared;
+use super::record::{Clock, Seconds};
 use super::simulation::Method;
-use super::stages::{Backdrop, Stages};
-use super::strip::Strip;
-use super::surface_fields::{SurfaceFields, Wanted};
+use super::stages::{Stages, sea_of};
+use super::strips::Strip;
 use crate::computed::Parts;
 use crate::error::{Error, Result};
+use crate::fields::{Fields, Wanted};
 use crate::kelvin::fade_at;
+use crate::prepared::Prepared;
 use crate::raster::Field;
 use crate::sar::direct::{DirectImage, reaching};
 use crate::scene::{Scene, Term};
@@ -55,7 +55,8 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
             }
         }
     }
-    let Prepared { models, plan, .. } = Prepared::new(scene)?;
+    let prepared = Prepared::new(scene)?;
+    let models = &prepared.models;
     if models.response.is_some() {
         return Err(Error::Conflict {
             name: "radar".to_owned(),
@@ -63,13 +64,12 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
             requirement: "so that no pixel can be had alone; simulate the whole scene with Method::Direct, or take the response away".to_owned(),
         });
     }
-    let strip = Strip::whole(&models, &plan);
-    let how = (Method::Fast, Wanted::Image);
-    let stages = Stages::new((scene, &models, &plan), how, &strip);
+    let strip = Strip::whole(&prepared);
+    let stages = Stages::new(&prepared, Method::Fast, Wanted::Image, &strip);
     if !models.is_refined() {
         return Ok(stages.direct_intensity(pixels));
     }
-    let parts = Parts::new(&models.image, &models.delivered);
+    let parts = Parts::new(&models.computed, &models.image);
     let fine: Vec<[usize; 2]> = pixels.iter().flat_map(|&pixel| parts.of(pixel)).collect();
     let mut direct = stages.direct_intensity(&fine);
     let pixels = direct.intensity.chunks(parts.count());
@@ -80,112 +80,118 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
 impl Stages<'_> {
     fn direct_intensity(&self, pixels: &[[usize; 2]]) -> DirectPixels {
         let workspace = &mut Workspace::default();
-        let image = &self.models.image;
-        let mut backdrop = Backdrop::new(workspace, self.scene, self.models, self.plan);
-        let sources = self.reaching(workspace, &mut backdrop, pixels);
-        let at = |&[i, j]: &[usize; 2]| i * self.raster.columns + j;
-        let mut seconds = Seconds::default();
+        let raster = &self.site.raster;
+        let sources = self.reaching(workspace, pixels);
+        let at = |&[i, j]: &[usize; 2]| i * raster.columns + j;
 
-        let mut fields = self.harmonic_fields(workspace, &sources, &mut seconds);
-        self.add_edge(&mut fields);
-        self.turn_into_factors(&mut fields);
-        let damping = self.damping(workspace);
-        let unresolved = self.unresolved(workspace, &mut fields);
-        let (backscatter, facets) = self.facets(&fields, damping.as_ref(), unresolved.as_ref());
         let mut clock = Clock::start();
-        let exact = backscatter.sigma0_pixels(&facets, &sources);
-        seconds.backscatter = clock.lap();
-        let mut all = workspace.flat_field(&self.raster);
+        let mut fields = self.harmonic_fields(workspace, &sources, &mut clock);
+        let roughening = self.finish_surface(workspace, &mut fields);
+        clock.lap(|seconds| &mut seconds.turbulent);
+        let facets = self.facets(&fields, &roughening);
+        let exact = self.backscatter().sigma0_pixels(&facets, &sources);
+        clock.lap(|seconds| &mut seconds.backscatter);
+        let mut all = workspace.flat_field(raster);
         for (source, value) in sources.iter().zip(exact) {
             all.values[at(source)] = value;
         }
-        self.modulate(&mut all, damping.as_ref(), &backdrop);
+        self.change_sigma0(&mut all, &roughening);
         // Where no wave was summed there is no source.
-        let mut sigma0 = workspace.flat_field(&self.raster);
+        fields.sigma0 = workspace.flat_field(raster);
         for source in &sources {
-            sigma0.values[at(source)] = all.values[at(source)];
+            fields.sigma0.values[at(source)] = all.values[at(source)];
         }
 
-        let velocity = fields.radial_velocity(workspace, &self.raster, self.models.incidence);
-        let (imaging, lit) = self.imaging(&sigma0, &velocity, &fields);
-        let direct = DirectImage::new(&imaging, &lit, image);
-        clock.lap();
+        fields.project(workspace, raster, self.site.models.incidence);
+        let (imaging, lit) = (self.imaging(), self.sources(&fields));
+        let direct = DirectImage::new(&imaging, &lit, &self.computed);
+        clock.lap(|seconds| &mut seconds.speckle);
         let mut intensity: Vec<f64> = pixels.par_iter().map(|&[i, j]| direct.at(i, j)).collect();
-        seconds.imaging = clock.lap();
-        let mut rest = workspace.flat_field(image);
+        clock.lap(|seconds| &mut seconds.imaging);
+        let mut rest = workspace.flat_field(&self.computed);
         self.add_echo_and_noise(&mut rest);
         for (value, &[i, j]) in intensity.iter_mut().zip(pixels) {
             *value += f64::from(rest.at(i, j));
         }
-        seconds.total = seconds.sea + seconds.kelvin + seconds.backscatter + seconds.imaging;
+        let Seconds {
+            sea,
+            kelvin,
+            backscatter,
+            imaging,
+            ..
+        } = clock.stop();
         DirectPixels {
             intensity,
             sources: sources.len(),
-            seconds,
+            seconds: Seconds {
+                sea,
+                kelvin,
+                backscatter,
+                imaging,
+                total: sea + kelvin + backscatter + imaging,
+                ..Seconds::default()
+            },
         }
     }
 
     /// The source pixels that reach the pixels, by the fast fields.
-    fn reaching(
-        &self,
-        workspace: &mut Workspace,
-        backdrop: &mut Backdrop,
-        pixels: &[[usize; 2]],
-    ) -> Vec<[usize; 2]> {
-        let mut fields = self.sea(workspace, backdrop);
-        self.add_swell(workspace, &mut fields);
-        self.add_wake(workspace, &mut fields);
-        self.add_edge(&mut fields);
-        self.unresolved(workspace, &mut fields);
-        let velocity = fields.radial_velocity(workspace, &self.raster, self.models.incidence);
-        let power = Field::constant(&self.raster, 1.0);
-        let (imaging, sources) = self.imaging(&power, &velocity, &fields);
-        reaching(&imaging, &sources, &self.models.image, pixels)
+    fn reaching(&self, workspace: &mut Workspace, pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
+        let mut sea = sea_of(self.prepared, workspace);
+        let mut fields = self.sea(workspace, &mut sea);
+        self.add_waves_of_effects(workspace, &mut fields);
+        self.add_wakes(workspace, &mut fields);
+        self.finish_surface(workspace, &mut fields);
+        let raster = &self.site.raster;
+        fields.project(workspace, raster, self.site.models.incidence);
+        fields.sigma0 = Field::constant(raster, 1.0);
+        let (imaging, sources) = (self.imaging(), self.sources(&fields));
+        reaching(&imaging, &sources, &self.computed, pixels)
     }
 
-    /// Sea, swell and wake by harmonic sums at some pixels; 0 at all others.
+    /// Sea, waves of effects and wakes by harmonic sums at some pixels; 0 at all others.
     fn harmonic_fields(
         &self,
         workspace: &mut Workspace,
         pixels: &[[usize; 2]],
-        seconds: &mut Seconds,
-    ) -> SurfaceFields {
-        let (models, raster) = (self.models, &self.raster);
-        let (seed, time) = (self.scene.seed, self.scene.sea.time);
+        clock: &mut Clock,
+    ) -> Fields {
+        let (models, raster) = (self.site.models, &self.site.raster);
+        let scene = self.site.scene;
         let quantities = self.quantities.concat();
         let mut sums = vec![vec![0.0; pixels.len()]; quantities.len()];
         let mut add = |waves: &PlaneWaves, weights: &[f64]| {
-            let mut clock = Clock::start();
             let more = harmonic_sum(waves, &models.transfer, &quantities, raster, pixels);
             for (sums, more) in sums.iter_mut().zip(&more) {
                 for ((sum, wave), weight) in sums.iter_mut().zip(more).zip(weights) {
                     *sum += weight * wave;
                 }
             }
-            clock.lap()
         };
         let everywhere = vec![1.0; pixels.len()];
-        if self.plan.uses(Term::Sea) {
-            let waves = Surface::new(&models.sea, seed, time, raster).modes();
-            seconds.sea = add(&waves, &everywhere);
+        if self.uses(Term::Sea) {
+            let sea = Surface::new(&models.sea, scene.seed, scene.sea.time, raster);
+            let waves = sea.modes();
+            clock.lap(|seconds| &mut seconds.plan);
+            add(&waves, &everywhere);
         }
-        if let Some(swell) = models.swell.filter(|_| self.plan.uses(Term::Swell)) {
-            let band = raster.nyquist_wavenumber();
-            let waves = swell.waves((seed, time), models.transfer.depth, band);
-            seconds.sea += add(&waves, &everywhere);
+        for waves in self.effects().filter_map(|effect| effect.waves(&self.site)) {
+            add(&waves, &everywhere);
         }
-        let drawn = self.plan.uses(Term::Kelvin);
-        let pairs = models.wakes.iter().zip(&self.plan.wakes);
+        clock.lap(|seconds| &mut seconds.sea);
+        let drawn = self.uses(Term::Kelvin);
+        let pairs = models.wakes.iter().zip(&self.prepared.plan.wakes);
         for (wake, plan) in pairs.filter(|_| drawn) {
-            let wake = &wake.kelvin;
             let faded = |&[i, j]: &[usize; 2]| {
                 let place = [raster.x(j), raster.y(i)];
                 fade_at(&wake.track, wake.hull.length(), place)
             };
             let fades: Vec<f64> = pixels.iter().map(faded).collect();
-            seconds.kelvin += add(&wake.waves(plan), &fades);
+            let waves = wake.waves(plan);
+            clock.lap(|seconds| &mut seconds.plan);
+            add(&waves, &fades);
+            clock.lap(|seconds| &mut seconds.kelvin);
         }
-        let mut fields = SurfaceFields::default();
+        let mut fields = Fields::default();
         for (&quantity, sums) in quantities.iter().zip(&sums) {
             let mut field = workspace.flat_field(raster);
             for (&[i, j], &sum) in pixels.iter().zip(sums) {
@@ -222,7 +228,7 @@ mod tests {
             "ship.edge=true",
             "sea.gust_strength=0.05",
             "sea.breaking=true",
-            "radar.noise_floor=-20",
+            "radar.nesz=-20",
             "sea.swell_height=1",
         ];
         let pixels = [[0, 0], [11, 9], [5, 4], [6, 4], [3, 8]];

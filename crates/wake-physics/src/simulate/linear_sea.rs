@@ -2,17 +2,18 @@
 
 use crate::correlated::real_sum;
 use crate::dispersion::angular_frequency;
+use crate::effects::Effects;
 use crate::error::Result;
 use crate::fft::{fast_length, signed_index};
+use crate::linear::OpenSea;
 use crate::memory;
 use crate::models::Models;
-use crate::modulation::smear;
 use crate::raster::Field;
 use crate::sar::ImpulseResponse;
 use crate::sar::impulse::Axis;
+use crate::scattering::modulation::smear;
 use crate::scene::Scene;
 use crate::surface::wave_variances;
-use crate::survey::Survey;
 use crate::swell::Swell;
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -70,16 +71,15 @@ impl LinearSea {
         // White numbers, waves, two fields.
         let needed = 24 * (period * period) as u64;
         let advice = "lower grid.rows or grid.columns";
-        memory::check([rows, columns], [0, 0], (needed, advice))?;
-        let mut models = Models::new(&scene);
-        let survey = Survey::new(&scene, &models);
-        let (slopes, velocity) = survey.resolved_sea();
-        models.average_over(&slopes, velocity);
-        let transfer = survey.modulation_of(&models);
+        memory::check([rows, columns], [0, 0], needed, advice)?;
+        let models = Models::new(&scene);
+        let open = OpenSea::new(&models);
+        let modulated = open.modulated_share(&Effects::new(&scene, &models).added());
+        let models = open.averaged(&models);
+        let transfer = open.modulation_of(&models);
         let spacing = scene.grid.spacing;
         let step = TAU / (period as f64 * spacing);
         let resolution = models.resolution().at(0.0);
-        let modulated = survey.modulated_share();
         let wavenumber = |index: usize| signed_index(index, period) as f64 * step;
         let left = |axis: fn(&ImpulseResponse) -> &Axis| -> Vec<f64> {
             let of = |n| {
@@ -93,7 +93,7 @@ impl LinearSea {
             .map(|row| azimuth[row] * smear(wavenumber(row), resolution))
             .collect();
         let mut variances = wave_variances(&models.sea, period, spacing);
-        add_swell(models.swell.as_ref(), &mut variances, (period, step));
+        add_swell(models.swell.as_ref(), &mut variances, period, step);
         let line = |(column, line): (usize, &mut [f32])| {
             let kx = wavenumber(column);
             for (row, variance) in line.iter_mut().enumerate().filter(|(_, v)| **v > 0.0) {
@@ -173,8 +173,8 @@ fn pairs(variances: &[f32], period: usize) -> impl Iterator<Item = f32> {
 
 /// Adds the waves of a swell to variances along +k, all of its variance however few of them are near its peak.
 ///
-/// - `lattice`: waves along each axis and their step [rad/m]
-fn add_swell(swell: Option<&Swell>, variances: &mut [f32], (period, step): (usize, f64)) {
+/// - `period` waves along each axis, `step` between them [rad/m]
+fn add_swell(swell: Option<&Swell>, variances: &mut [f32], period: usize, step: f64) {
     let Some(swell) = swell else {
         return;
     };

@@ -1,43 +1,32 @@
 //! From a scene to a SAR image: `stages` alone knows the order of the stages.
 //!
 //! ```text
-//! Scene ─► Models ─► Survey ─► Plan ─► Stages ─► Simulation
+//! Scene ─► Prepared { models, effects, first-order theory, plan } ─► Stages ─► Simulation
 //! ```
-//!
-//! `Models` are the formulas with the scene's numbers, `Survey` is what linear theory tells of them, `Plan` what is to be
-//! computed, `Stages` computes it.
 
-mod accuracy;
-mod clock;
 mod direct;
 mod linear_sea;
-mod prepared;
 mod radar;
+mod record;
 mod simulation;
 mod speckling;
 mod stages;
-mod strip;
 mod strips;
-mod surface_fields;
 
-pub use accuracy::{Accuracy, Reached};
-pub use clock::Seconds;
 pub use direct::{DirectPixels, direct_intensity};
 pub use linear_sea::LinearSea;
+pub use record::{Accuracy, Reached, Seconds};
 pub use simulation::{Method, SarImage, Simulation};
 pub use speckling::unit_speckle;
 
 use crate::error::Result;
-use crate::models::Models;
-use crate::plan::Plan;
+use crate::fields::Wanted;
+use crate::prepared::Prepared;
 use crate::raster::Field;
-use crate::scattering::BackscatterTable;
 use crate::scene::{Scene, Term};
-use crate::workspace::Workspace;
-use clock::Clock;
-use prepared::Prepared;
-use speckling::{Exposure, Speckling};
-use surface_fields::Wanted;
+use record::Clock;
+use speckling::Speckling;
+use stages::{Drawn, Memory, draw};
 
 /// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
 ///
@@ -61,9 +50,7 @@ use surface_fields::Wanted;
 /// ```
 #[derive(Debug, Default)]
 pub struct Simulator {
-    workspace: Workspace,
-    /// The last table of σ⁰.
-    table: Option<BackscatterTable>,
+    memory: Memory,
 }
 
 impl Simulator {
@@ -83,51 +70,45 @@ impl Simulator {
     /// As [`Self::simulate`].
     pub fn simulate_with(&mut self, scene: &Scene, method: Method) -> Result<Simulation> {
         let mut clock = Clock::start();
-        let mut seconds = Seconds::default();
         let prepared = Prepared::new(scene)?;
-        let Prepared { models, plan, .. } = &prepared;
-        seconds.plan = clock.lap();
-        let what = (scene, models, plan);
-        let how = (method, Wanted::Fields);
-        let (drawn, exposure) = self.draw(what, how, (&mut clock, &mut seconds));
-        let mut speckled = self.workspace.field(&models.delivered);
-        speckled.values.copy_from_slice(&drawn.intensity.values);
-        let speckling = Speckling::of(scene, models, exposure);
-        let slc = if plan.uses(Term::Speckle) {
-            speckling.apply(&mut speckled)
-        } else {
-            None
-        };
-        let sources = speckling.into_sources();
-        sources
-            .into_iter()
-            .for_each(|field| self.workspace.give(field));
-        seconds.speckle = clock.lap();
-        let labels = prepared.labels();
+        let models = &prepared.models;
+        clock.lap(|seconds| &mut seconds.plan);
+        let memory = &mut self.memory;
+        let drawn = draw(&prepared, memory, method, Wanted::Fields, &mut clock);
         let fields = drawn.fields;
-        let mut simulation = Simulation {
-            raster: prepared.models.delivered,
+        let mut speckled = memory.workspace.field(&models.image);
+        speckled.values.copy_from_slice(&fields.intensity.values);
+        let speckling = Speckling::of(scene, models, drawn.exposure);
+        let slc = match prepared.plan.uses(Term::Speckle) {
+            true => speckling.apply(&mut speckled),
+            false => None,
+        };
+        if let Some(sources) = speckling.into_sources() {
+            memory.workspace.give(sources);
+        }
+        clock.lap(|seconds| &mut seconds.speckle);
+        let labels = prepared.labels();
+        clock.lap(|seconds| &mut seconds.labels);
+        Ok(Simulation {
+            raster: models.image,
             elevation: fields.elevation,
             slope_x: fields.slope_x,
             slope_y: fields.slope_y,
             velocity_x: fields.velocity_x,
             velocity_y: fields.velocity_y,
             velocity_z: fields.velocity_z,
-            radial_velocity: drawn.radial_velocity,
-            sigma0: drawn.sigma0,
-            intensity: drawn.intensity,
+            radial_velocity: fields.radial_velocity,
+            sigma0: fields.sigma0,
+            intensity: fields.intensity,
             speckled,
             slc,
             labels,
             accuracy: drawn.accuracy,
             plan: prepared.plan,
-            seconds,
+            seconds: clock.stop(),
             method,
             scene: scene.clone(),
-        };
-        simulation.seconds.labels = clock.lap();
-        simulation.seconds.total = clock.total();
-        Ok(simulation)
+        })
     }
 
     /// The image of a scene and its labels: fields that the image does not need are not computed.
@@ -137,17 +118,16 @@ impl Simulator {
     /// As [`Self::simulate`].
     pub fn image(&mut self, scene: &Scene) -> Result<SarImage> {
         let prepared = Prepared::new(scene)?;
-        let Prepared { models, plan, .. } = &prepared;
-        let (intensity, exposure, accuracy) = self.intensity(scene, models, plan);
-        let speckling = match plan.uses(Term::Speckle) {
-            true => Speckling::of(scene, models, exposure),
+        let drawn = self.image_of(&prepared);
+        let speckling = match prepared.plan.uses(Term::Speckle) {
+            true => Speckling::of(scene, &prepared.models, drawn.exposure),
             false => Speckling::Without,
         };
         Ok(SarImage {
-            intensity,
+            intensity: drawn.fields.intensity,
             labels: prepared.labels(),
             plan: prepared.plan,
-            accuracy,
+            accuracy: drawn.accuracy,
             speckling,
         })
     }
@@ -158,54 +138,23 @@ impl Simulator {
     ///
     /// As [`Self::simulate`].
     pub fn expected_intensity(&mut self, scene: &Scene) -> Result<Field> {
-        let Prepared {
-            mut models,
-            survey,
-            mut plan,
-            ..
-        } = Prepared::new(scene)?;
-        if plan.uses(Term::Sea) || plan.uses(Term::Swell) {
-            let (slopes, velocity) = survey.resolved_sea();
-            models.average_over(&slopes, velocity);
-            plan = plan.over_all_seas();
-        }
-        Ok(self.intensity(scene, &models, &plan).0)
+        let mean = Prepared::new(scene)?.over_all_seas();
+        Ok(self.image_of(&mean).fields.intensity)
     }
 
     /// The intensity before speckle, and no other field but what the impulse response looks at.
-    fn intensity(
-        &mut self,
-        scene: &Scene,
-        models: &Models,
-        plan: &Plan,
-    ) -> (Field, Option<Exposure>, Accuracy) {
-        let mut clock = (Clock::start(), Seconds::default());
-        let how = (Method::Fast, Wanted::Image);
-        let clock = (&mut clock.0, &mut clock.1);
-        let (drawn, exposure) = self.draw((scene, models, plan), how, clock);
-        (drawn.intensity, exposure, drawn.accuracy)
+    fn image_of(&mut self, prepared: &Prepared<'_>) -> Drawn {
+        let (method, wanted) = (Method::Fast, Wanted::Image);
+        let clock = &mut Clock::start();
+        draw(prepared, &mut self.memory, method, wanted, clock)
     }
 
     /// Takes the blocks of a simulation back that is no longer needed: the next one of this size asks the system for
     /// none.
-    pub fn reclaim(&mut self, simulation: Simulation) {
-        let s = simulation;
-        let surface = [
-            s.elevation,
-            s.slope_x,
-            s.slope_y,
-            s.velocity_x,
-            s.velocity_y,
-        ];
-        let more = [
-            s.velocity_z,
-            s.radial_velocity,
-            s.sigma0,
-            s.intensity,
-            s.speckled,
-        ];
-        let fields = surface.into_iter().chain(more);
-        fields.for_each(|field| self.workspace.give(field));
+    pub fn reclaim(&mut self, mut simulation: Simulation) {
+        for field in simulation.fields_mut() {
+            self.memory.workspace.give(std::mem::take(field));
+        }
     }
 }
 

@@ -1,10 +1,10 @@
-//! What the radar makes of the surface: σ⁰, and the image before speckle.
+//! Stages of the radar: σ⁰, and the image before speckle.
 
-use super::accuracy::{Accuracy, Reached};
+use super::record::{Accuracy, Reached};
 use super::simulation::Method;
 use super::speckling::points;
-use super::stages::{Backdrop, Stages};
-use super::surface_fields::SurfaceFields;
+use super::stages::{Memory, Roughening, Stages};
+use crate::fields::Fields;
 use crate::plan::SHARES;
 use crate::raster::Field;
 use crate::sar::direct::DirectImage;
@@ -13,155 +13,136 @@ use crate::sar::{Imaging, Sources};
 use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
 use crate::scene::Term;
 use crate::workspace::Workspace;
-use rayon::prelude::*;
 
 /// Share of the expected mean σ⁰ for which the table is made at first: chosen, the mean that is there is rarely lower.
 const LOWEST_MEAN: f64 = 0.8;
 
 impl Stages<'_> {
-    /// What breaking waves, the wake's edges and gusts do to σ⁰.
-    pub(super) fn modulate(
-        &self,
-        sigma0: &mut Field,
-        damping: Option<&Field>,
-        backdrop: &Backdrop,
-    ) {
-        self.add_breaking(sigma0, damping);
-        for edge in self.edges() {
-            edge.modulate(sigma0, &self.raster);
-        }
-        if let (Some((gusts, exponent)), Some(drawn)) = (self.models.gusts, &backdrop.gusts) {
-            gusts.modulate_strip(sigma0, self.first_row, drawn, exponent);
-        }
+    /// σ⁰ as a function of the slope.
+    pub(super) fn backscatter(&self) -> Backscatter {
+        let models = self.site.models;
+        models.backscatter(self.uses(Term::TiltAverage), self.uses(Term::Specular))
     }
 
-    /// Adds the return of breaking waves, damped like the short ones.
-    fn add_breaking(&self, sigma0: &mut Field, damping: Option<&Field>) {
-        if !self.plan.uses(Term::Breaking) {
-            return;
-        }
-        let breaking = self.models.breaking as f32;
-        let pixels = sigma0.values.par_iter_mut().with_min_len(1 << 14);
-        match damping {
-            None => pixels.for_each(|s| *s += breaking),
-            Some(left) => pixels
-                .zip(&left.values)
-                .for_each(|(s, left)| *s += breaking * left),
-        }
-    }
-
-    /// σ⁰ as a function of the slope, and the facets it is taken at.
+    /// The facets at which σ⁰ is taken.
     pub(super) fn facets<'f>(
         &self,
-        fields: &'f SurfaceFields,
-        damping: Option<&'f Field>,
-        unresolved: Option<&'f [Field; 3]>,
-    ) -> (Backscatter, FacetFields<'f>) {
-        let uses = |term| self.plan.uses(term);
-        let backscatter = self
-            .models
-            .backscatter(uses(Term::TiltAverage), uses(Term::Specular));
-        let facets = FacetFields {
+        fields: &'f Fields,
+        roughening: &'f Roughening,
+    ) -> FacetFields<'f> {
+        FacetFields {
             slope_x: &fields.slope_x,
             slope_y: &fields.slope_y,
-            modulation: uses(Term::Hydrodynamic).then_some(&fields.modulation),
-            damping,
-            unresolved,
-        };
-        (backscatter, facets)
+            modulation: self.uses(Term::Hydrodynamic).then_some(&fields.modulation),
+            bragg_remaining: roughening.bragg_remaining.as_ref(),
+            subpixel_variances: roughening.subpixel_variances.as_ref(),
+        }
     }
 
-    pub(super) fn sigma0(
+    /// Computes σ⁰, with everything that changes it.
+    pub(super) fn scatter(
         &self,
-        workspace: &mut Workspace,
-        last_table: &mut Option<BackscatterTable>,
-        (fields, damping, unresolved): (&SurfaceFields, Option<&Field>, Option<&[Field; 3]>),
+        memory: &mut Memory,
+        fields: &mut Fields,
+        roughening: &Roughening,
+        accuracy: &mut Accuracy,
+    ) {
+        let facets = self.facets(fields, roughening);
+        let mut sigma0 = match self.method {
+            Method::Fast => self.tabulated(memory, &facets, accuracy),
+            Method::Direct => self.backscatter().sigma0_field(&facets),
+        };
+        self.change_sigma0(&mut sigma0, roughening);
+        fields.sigma0 = sigma0;
+    }
+
+    /// Applies what optional effects do to σ⁰.
+    pub(super) fn change_sigma0(&self, sigma0: &mut Field, roughening: &Roughening) {
+        for effect in self.effects() {
+            effect.change_sigma0(&self.site, sigma0, roughening.bragg_remaining.as_ref());
+        }
+    }
+
+    /// σ⁰ by a table.
+    fn tabulated(
+        &self,
+        memory: &mut Memory,
+        facets: &FacetFields<'_>,
         accuracy: &mut Accuracy,
     ) -> Field {
-        let (backscatter, facets) = self.facets(fields, damping, unresolved);
-        if self.method == Method::Direct {
-            return backscatter.sigma0_field(&facets);
-        }
-        let asked = SHARES.table * self.scene.model.tolerance;
+        let backscatter = self.backscatter();
+        let asked = SHARES.table * self.site.scene.model.tolerance;
         let table_for = |last, mean: f64| {
-            BackscatterTable::covering_or(last, backscatter.clone(), &facets, asked * mean)
+            BackscatterTable::covering_or(last, backscatter.clone(), facets, asked * mean)
         };
-        let mut sigma0 = workspace.field(&self.raster);
-        let mut table = table_for(last_table.take(), LOWEST_MEAN * self.plan.mean_sigma0);
-        table.fill_sigma0(&mut sigma0, &facets);
+        let mut sigma0 = memory.workspace.field(&self.site.raster);
+        let expected = LOWEST_MEAN * self.prepared.plan.mean_sigma0;
+        let mut table = table_for(memory.table.take(), expected);
+        table.fill_sigma0(&mut sigma0, facets);
         // The mean is known now; without a sea near nadir it is far from the one that was expected.
         let mean = sigma0.mean();
         if mean > 0.0 && table.error() > asked * mean {
             // One table in memory, not two.
             drop(table);
             table = table_for(None, mean);
-            table.fill_sigma0(&mut sigma0, &facets);
+            table.fill_sigma0(&mut sigma0, facets);
         }
         let share = table.error() / mean;
         let reached = if mean > 0.0 { share } else { 0.0 };
         accuracy.table = Some(Reached { asked, reached });
         accuracy.table_nodes = table.size();
-        *last_table = Some(table);
+        memory.table = Some(table);
         sigma0
     }
 
-    /// What the radar does, and what it looks at.
-    pub(super) fn imaging<'f>(
-        &self,
-        sigma0: &'f Field,
-        radial_velocity: &'f Field,
-        fields: &'f SurfaceFields,
-    ) -> (Imaging, Sources<'f>) {
-        let uses = |term| self.plan.uses(term);
-        let sources = Sources {
-            raster: self.raster,
-            sigma0,
-            radial_velocity: uses(Term::Bunching).then_some(radial_velocity),
-            radial_acceleration: uses(Term::Coherence).then_some(&fields.radial_acceleration),
-            elevation: uses(Term::RangeBunching).then_some(&fields.elevation),
-        };
-        let imaging = Imaging {
-            range_to_velocity: self.models.range_to_velocity,
-            incidence: self.models.incidence,
-            resolution: if uses(Term::Coherence) {
-                self.models.resolution()
+    /// What the radar does.
+    pub(super) fn imaging(&self) -> Imaging {
+        let models = self.site.models;
+        Imaging {
+            range_to_velocity: models.range_to_velocity,
+            incidence: models.incidence,
+            resolution: if self.uses(Term::AzimuthSmear) {
+                models.resolution()
             } else {
-                self.models.resolution_at_rest()
+                models.resolution_at_rest()
             },
-        };
-        (imaging, sources)
+        }
     }
 
-    /// Intensity of the image before speckle.
-    pub(super) fn image(
-        &self,
-        workspace: &mut Workspace,
-        sigma0: &Field,
-        radial_velocity: &Field,
-        fields: &SurfaceFields,
-    ) -> Field {
-        let (imaging, sources) = self.imaging(sigma0, radial_velocity, fields);
-        let image = &self.image;
-        let tolerance = SHARES.kernels * self.scene.model.tolerance;
+    /// What the radar looks at.
+    pub(super) fn sources<'f>(&self, fields: &'f Fields) -> Sources<'f> {
+        let uses = |term| self.uses(term);
+        Sources {
+            raster: self.site.raster,
+            sigma0: &fields.sigma0,
+            radial_velocity: uses(Term::VelocityBunching).then_some(&fields.radial_velocity),
+            radial_acceleration: uses(Term::AzimuthSmear).then_some(&fields.radial_acceleration),
+            elevation: uses(Term::RangeBunching).then_some(&fields.elevation),
+        }
+    }
+
+    /// Computes the intensity before speckle.
+    pub(super) fn image(&self, workspace: &mut Workspace, fields: &mut Fields) {
+        let (imaging, sources) = (self.imaging(), self.sources(fields));
+        let tolerance = SHARES.kernels * self.site.scene.model.tolerance;
         let mut intensity = match self.method {
-            Method::Fast => imaging.image_in(workspace, &sources, image, tolerance),
-            Method::Direct => DirectImage::new(&imaging, &sources, image).image(),
+            Method::Fast => imaging.image_in(workspace, &sources, &self.computed, tolerance),
+            Method::Direct => DirectImage::new(&imaging, &sources, &self.computed).image(),
         };
         self.add_echo_and_noise(&mut intensity);
-        intensity
+        fields.intensity = intensity;
     }
 
     /// Adds the ships' own echoes, unless an impulse response is to image it, and the radar's noise.
     pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
-        if self.models.response.is_none() {
-            let resolution = self.models.resolution_at_rest().nominal;
-            let points = points(self.scene, self.models);
-            add_points(intensity, &self.image, &points, resolution);
+        let models = self.site.models;
+        if models.response.is_none() {
+            let resolution = models.resolution_at_rest().nominal;
+            let points = points(self.site.scene, models);
+            add_points(intensity, &self.computed, &points, resolution);
         }
-        if self.plan.uses(Term::Noise) {
-            let noise = self.models.noise as f32;
-            let pixels = intensity.values.par_iter_mut().with_min_len(1 << 14);
-            pixels.for_each(|value| *value += noise);
+        for effect in self.effects() {
+            effect.add_to_image(intensity);
         }
     }
 }

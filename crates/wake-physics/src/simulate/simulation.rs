@@ -1,18 +1,21 @@
 //! What comes out of a simulation, and how it is written.
 
-use super::accuracy::Accuracy;
-use super::clock::Seconds;
+use super::record::{Accuracy, Seconds};
 use super::speckling::Speckling;
+#[cfg(feature = "png")]
 use crate::error::Result;
 use crate::grey::GreyScale;
 use crate::labels::Labels;
+#[cfg(feature = "png")]
 use crate::output;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
 use num_complex::Complex32;
 use serde::Serialize;
+#[cfg(feature = "png")]
 use serde_json::{Value, json};
+#[cfg(feature = "png")]
 use std::path::Path;
 
 /// How fields are computed.
@@ -110,12 +113,28 @@ impl Simulation {
         ]
     }
 
+    pub(super) fn fields_mut(&mut self) -> [&mut Field; 10] {
+        [
+            &mut self.elevation,
+            &mut self.slope_x,
+            &mut self.slope_y,
+            &mut self.velocity_x,
+            &mut self.velocity_y,
+            &mut self.velocity_z,
+            &mut self.sigma0,
+            &mut self.radial_velocity,
+            &mut self.intensity,
+            &mut self.speckled,
+        ]
+    }
+
     /// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json` into a folder, each whole or
     /// not at all, and returns the report.
     ///
     /// # Errors
     ///
     /// [`Error::File`](crate::Error::File) if the folder cannot be made or a file not be written.
+    #[cfg(feature = "png")]
     pub fn write(&self, folder: &Path) -> Result<Value> {
         self.write_in(folder, &GreyScale::default())
     }
@@ -123,7 +142,7 @@ impl Simulation {
     /// The amplitude scale of a quick-look: fixed by the σ⁰ that the scene has on average, not by its pixels.
     #[must_use]
     pub fn quick_look(&self) -> GreyScale {
-        let noise = self.scene.radar.noise_floor;
+        let noise = self.scene.radar.nesz;
         let noise = noise.map_or(0.0, |db| 10f64.powf(0.1 * db));
         // A sea that returns nothing is black on any scale.
         GreyScale::amplitude_around((self.plan.mean_sigma0 + noise).max(1e-5))
@@ -136,16 +155,27 @@ impl Simulation {
         self.speckled.values.iter().map(level).collect()
     }
 
+    /// Writes the image with speckle alone, as an 8-bit grey PNG.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::File`](crate::Error::File) if the file cannot be written.
+    #[cfg(feature = "png")]
+    pub fn write_png(&self, path: &Path, grey: &GreyScale) -> Result<()> {
+        let [rows, columns] = [self.raster.rows, self.raster.columns];
+        output::write_png(path, &self.levels(grey), rows, columns)
+    }
+
     /// [`Self::write`] with the picture in another grey.
     ///
     /// # Errors
     ///
     /// As [`Self::write`].
+    #[cfg(feature = "png")]
     pub fn write_in(&self, folder: &Path, grey: &GreyScale) -> Result<Value> {
         whole_files::make_folder(folder)?;
         let path = |name: &str| folder.join(name);
-        let [rows, columns] = [self.raster.rows, self.raster.columns];
-        output::write_png(&path("image.png"), &self.levels(grey), rows, columns)?;
+        self.write_png(&path("image.png"), grey)?;
         let size = [self.raster.rows, self.raster.columns];
         let slc = self.slc.as_deref().map(|slc| (slc, size));
         output::write_fields(&path("fields.safetensors"), &self.named_fields(), slc)?;

@@ -1,6 +1,7 @@
 //! From the mean intensity to the image with speckle.
 
 use crate::error::Result;
+use crate::kelvin::KelvinWake;
 use crate::models::Models;
 use crate::raster::{Field, Raster};
 use crate::sar::ImpulseResponse;
@@ -10,7 +11,6 @@ use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::speckle::speckle;
 use crate::scene::sensor::ambiguity_distance;
 use crate::scene::{Scene, Ship};
-use crate::wakes::Wake;
 use num_complex::Complex32;
 
 /// What the radar looks at before its impulse response.
@@ -37,10 +37,10 @@ impl Exposure {
     ) -> Self {
         Self {
             response,
-            sources: models.image,
+            sources: models.computed,
             intensity,
             points: points_inside(scene, models),
-            image: models.delivered,
+            image: models.image,
         }
     }
 
@@ -66,10 +66,10 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     };
     let ships = scene.ships.iter().zip(&models.wakes).enumerate();
     let drawn = ships.filter(|(_, (ship, _))| ship.echo);
-    let of_ship = |(n, (ship, wake)): (usize, (&Ship, &Wake))| {
+    let of_ship = |(n, (ship, wake)): (usize, (&Ship, &KelvinWake))| {
         let heading = ship.heading_at(scene.sea.time);
         let echo = ShipEcho {
-            position: wake.kelvin.track.position,
+            position: wake.track.position,
             heading,
             length: ship.length,
             beam: ship.beam,
@@ -80,7 +80,7 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
     };
     let mut points: Vec<PointTarget> = drawn.flat_map(of_ship).collect();
     let radar = &scene.radar;
-    if let (Some(level), Some(rate)) = (radar.ambiguity, radar.pulse_rate) {
+    if let (Some(level), Some(rate)) = (radar.azimuth_ambiguity, radar.prf) {
         let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
         points.extend(ambiguities(&points, distance, 10f64.powf(0.1 * level)));
     }
@@ -89,10 +89,10 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
 
 /// Those points that lie among the sources: an impulse response would bring others around.
 fn points_inside(scene: &Scene, models: &Models) -> Vec<PointTarget> {
-    let [rows, columns] = [models.image.rows as f64, models.image.columns as f64];
+    let [rows, columns] = [models.computed.rows as f64, models.computed.columns as f64];
     let mut points = points(scene, models);
     points.retain(|point| {
-        let [column, row] = models.image.pixel(point.position[0], point.position[1]);
+        let [column, row] = models.computed.pixel(point.position[0], point.position[1]);
         (0.0..rows).contains(&row) && (0.0..columns).contains(&column)
     });
     points
@@ -172,10 +172,10 @@ pub fn unit_speckle(scene: &Scene) -> Result<Field> {
         ..scene.clone()
     };
     let models = Models::new(&open);
-    let sources = Field::constant(&models.image, 1.0);
+    let sources = Field::constant(&models.computed, 1.0);
     let response = models.response;
     let exposure = response.map(|response| Exposure::of(&open, &models, response, sources));
-    let mut image = Field::constant(&models.delivered, 1.0);
+    let mut image = Field::constant(&models.image, 1.0);
     Speckling::of(&open, &models, exposure).apply(&mut image);
     Ok(image)
 }

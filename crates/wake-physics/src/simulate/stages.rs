@@ -1,207 +1,243 @@
-//! The order of the stages, and one function a stage: what it takes from the plan, and which method it calls.
+//! The order of the stages up to the intensity before speckle, and the stages of the surface; those of the radar stand in
+//! `radar`.
 
-use super::accuracy::{Accuracy, Reached};
-use super::clock::{Clock, Seconds};
+use super::record::{Accuracy, Clock, Reached};
 use super::simulation::Method;
-use super::strip::Strip;
-use super::surface_fields::{SurfaceFields, Wanted, quantities};
+use super::speckling::Exposure;
+use super::strips::{Strip, means, put};
+use crate::effects::{Effect, Site};
+use crate::fields::{Fields, Wanted, quantities};
 use crate::kelvin::{self, KelvinWake, WakePlan};
-use crate::models::Models;
 use crate::nufft;
-use crate::plan::{Plan, SHARES};
+use crate::plan::SHARES;
+use crate::prepared::Prepared;
 use crate::raster::{Field, Raster};
 use crate::scattering::BackscatterTable;
 use crate::scattering::hydrodynamic::to_bragg_factors;
-use crate::scene::{Scene, Term};
+use crate::scene::Term;
 use crate::surface::Surface;
-use crate::turbulent::current::WakeEdge;
-use crate::wakes::Wake;
-use crate::waves::{Quantity, harmonic_fields};
+use crate::waves::{PlaneWaves, Quantity, harmonic_fields};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// A scene being drawn: what its stages have in common.
 pub(super) struct Stages<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) models: &'a Models,
-    pub(super) plan: &'a Plan,
+    pub(super) prepared: &'a Prepared<'a>,
     pub(super) method: Method,
-    /// The computed image and its margin; where strips are computed the rows of one, and how many lie before them.
-    pub(super) raster: Raster,
-    pub(super) first_row: usize,
+    /// The rows that are drawn at once.
+    pub(super) site: Site<'a>,
     /// Whether no strip comes after this one.
-    pub(super) last: bool,
-    /// The computed image, or the rows of it.
-    pub(super) image: Raster,
+    last: bool,
+    /// The computed pixels of the image, without margin.
+    pub(super) computed: Raster,
     /// What the image needs, and what is wanted besides. Each group is summed by itself, so that the image has the
     /// same bits with and without the second.
     pub(super) quantities: [Vec<Quantity>; 2],
 }
 
-/// What a scene looks like before speckle: as computed, all but the image on the raster with its margin, or as delivered, all at
-/// the pixels of the image.
+/// Fields of the surface that σ⁰ depends on besides slopes and modulation.
+#[derive(Default)]
+pub(super) struct Roughening {
+    /// Share of the Bragg waves that remains.
+    pub(super) bragg_remaining: Option<Field>,
+    /// Slopes of ships' waves below the pixels.
+    pub(super) subpixel_variances: Option<[Field; 3]>,
+}
+
+/// Blocks and tables that one simulation leaves to the next.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    pub(super) workspace: Workspace,
+    /// The last table of σ⁰.
+    pub(super) table: Option<BackscatterTable>,
+}
+
+/// The waves of the sea, drawn as a whole for all strips; `None` without a sea, and after the last strip.
+pub(super) type Sea = Option<Surface>;
+
+/// Draws the waves of a sea.
+pub(super) fn sea_of(prepared: &Prepared<'_>, workspace: &mut Workspace) -> Sea {
+    let scene = prepared.scene;
+    let draw = || {
+        let seed_and_time = (scene.seed, scene.sea.time);
+        let sea = &prepared.models.sea;
+        Surface::new_in(workspace, sea, seed_and_time, &prepared.with_margin())
+    };
+    prepared.plan.uses(Term::Sea).then(draw)
+}
+
+/// A scene before speckle, at the pixels of the image.
 #[derive(Default)]
 pub(super) struct Drawn {
-    pub(super) fields: SurfaceFields,
-    /// Velocity toward the radar [m/s].
-    pub(super) radial_velocity: Field,
-    pub(super) sigma0: Field,
-    /// Intensity of the image.
-    pub(super) intensity: Field,
+    /// All but the linear fields that only the image needs.
+    pub(super) fields: Fields,
     pub(super) accuracy: Accuracy,
+    /// Sources of the impulse response, where the image has one.
+    pub(super) exposure: Option<Exposure>,
 }
 
-/// What all strips see, drawn as a whole.
-pub(super) struct Backdrop {
-    /// The waves of the sea.
-    surface: Option<Surface>,
-    /// Gusts at every few pixels.
-    pub(super) gusts: Option<(Field, usize)>,
-}
-
-impl Backdrop {
-    pub(super) fn new(
-        workspace: &mut Workspace,
-        scene: &Scene,
-        models: &Models,
-        plan: &Plan,
-    ) -> Self {
-        let [rows, columns] = plan.sizes.margin;
-        let whole = models.image.with_margin(rows, columns);
-        let seed_and_time = (scene.seed, scene.sea.time);
-        let gusts = models.gusts.filter(|_| plan.uses(Term::Gusts));
-        Self {
-            surface: plan
-                .uses(Term::Sea)
-                .then(|| Surface::new_in(workspace, &models.sea, seed_and_time, &whole)),
-            gusts: gusts.map(|(gusts, _)| gusts.coarse_field(&whole, scene.seed)),
+/// All stages up to the intensity before speckle. The clock runs since the plan was made; without `Wanted::Fields` there is only
+/// the image.
+pub(super) fn draw(
+    prepared: &Prepared<'_>,
+    memory: &mut Memory,
+    method: Method,
+    wanted: Wanted,
+    clock: &mut Clock,
+) -> Drawn {
+    let models = &prepared.models;
+    let mut sea = sea_of(prepared, &mut memory.workspace);
+    let mut out = Drawn::default();
+    for strip in &Strip::all(prepared) {
+        let stages = Stages::new(prepared, method, wanted, strip);
+        let (mut fields, accuracy) = stages.draw(memory, &mut sea, clock);
+        let workspace = &mut memory.workspace;
+        out.accuracy = out.accuracy.and(&accuracy);
+        let pixels = models.image.strip(&strip.image);
+        let intensity = std::mem::take(&mut fields.intensity);
+        if models.response.is_some() {
+            let rows = [strip.own.clone(), 0..models.computed.rows];
+            put(workspace, &mut out.fields.intensity, rows, intensity);
+        } else {
+            let rows = [strip.image.clone(), 0..models.image.rows];
+            let intensity = means(workspace, intensity, &stages.computed, &pixels);
+            put(workspace, &mut out.fields.intensity, rows, intensity);
         }
+        if wanted == Wanted::Fields {
+            let pairs = out.fields.each().into_iter().zip(fields.each());
+            for (to, from) in pairs.take(Fields::RESULTS) {
+                let rows = [strip.image.clone(), 0..models.image.rows];
+                let from = std::mem::take(from);
+                let part = means(workspace, from, &stages.site.raster, &pixels);
+                put(workspace, to, rows, part);
+            }
+        }
+        fields.give_back(workspace);
     }
-}
-
-impl Drawn {
-    /// The fields that are results, but for the image.
-    pub(super) fn outputs(&mut self) -> [&mut Field; 8] {
-        let f = &mut self.fields;
-        [
-            &mut f.elevation,
-            &mut f.slope_x,
-            &mut f.slope_y,
-            &mut f.velocity_x,
-            &mut f.velocity_y,
-            &mut f.velocity_z,
-            &mut self.radial_velocity,
-            &mut self.sigma0,
-        ]
+    if let Some(response) = models.response {
+        let sources = std::mem::take(&mut out.fields.intensity);
+        let exposure = Exposure::of(prepared.scene, models, response, sources);
+        out.fields.intensity = exposure.mean();
+        out.exposure = Some(exposure);
+        clock.lap(|seconds| &mut seconds.imaging);
     }
-
-    /// Puts the blocks of all fields back.
-    pub(super) fn give_back(self, workspace: &mut Workspace) {
-        let f = self.fields;
-        let surface = [
-            f.elevation,
-            f.slope_x,
-            f.slope_y,
-            f.velocity_x,
-            f.velocity_y,
-        ];
-        let more = [f.velocity_z, f.radial_acceleration, f.modulation];
-        let rest = [self.radial_velocity, self.sigma0, self.intensity];
-        let fields = surface.into_iter().chain(more).chain(rest);
-        fields.for_each(|field| workspace.give(field));
-    }
+    out
 }
 
 impl<'a> Stages<'a> {
     pub(super) fn new(
-        (scene, models, plan): (&'a Scene, &'a Models, &'a Plan),
-        (method, wanted): (Method, Wanted),
+        prepared: &'a Prepared<'a>,
+        method: Method,
+        wanted: Wanted,
         strip: &Strip,
     ) -> Self {
-        let [rows, columns] = plan.sizes.margin;
+        let models = &prepared.models;
+        let whole = prepared.with_margin();
         Self {
-            scene,
-            models,
-            plan,
+            prepared,
             method,
-            raster: models.image.with_margin(rows, columns).strip(&strip.raster),
-            first_row: strip.raster.start,
-            last: strip.delivered.end == models.delivered.rows,
-            image: models.image.strip(&strip.image),
-            quantities: quantities(plan, wanted),
+            site: Site {
+                scene: prepared.scene,
+                models,
+                raster: whole.strip(&strip.raster),
+                whole,
+                first_row: strip.raster.start,
+            },
+            last: strip.image.end == models.image.rows,
+            computed: models.computed.strip(&strip.computed),
+            quantities: quantities(|term| prepared.plan.uses(term), wanted),
         }
+    }
+
+    pub(super) fn uses(&self, term: Term) -> bool {
+        self.prepared.plan.uses(term)
+    }
+
+    /// The optional effects that are drawn.
+    pub(super) fn effects(&self) -> impl Iterator<Item = &dyn Effect> {
+        let all = self.prepared.effects.each();
+        all.filter(|effect| self.uses(effect.term()))
     }
 
     /// All stages up to the intensity before speckle, in their order; the clock runs since the plan was made.
     pub(super) fn draw(
         &self,
+        memory: &mut Memory,
+        sea: &mut Sea,
+        clock: &mut Clock,
+    ) -> (Fields, Accuracy) {
+        let workspace = &mut memory.workspace;
+        let mut fields = self.sea(workspace, sea);
+        self.add_waves_of_effects(workspace, &mut fields);
+        clock.lap(|seconds| &mut seconds.sea);
+        let mut accuracy = Accuracy {
+            wake: self.add_wakes(workspace, &mut fields),
+            ..Accuracy::default()
+        };
+        clock.lap(|seconds| &mut seconds.kelvin);
+        let roughening = self.finish_surface(workspace, &mut fields);
+        clock.lap(|seconds| &mut seconds.turbulent);
+        self.scatter(memory, &mut fields, &roughening, &mut accuracy);
+        let workspace = &mut memory.workspace;
+        roughening.give_back(workspace);
+        clock.lap(|seconds| &mut seconds.backscatter);
+        fields.project(workspace, &self.site.raster, self.site.models.incidence);
+        self.image(workspace, &mut fields);
+        clock.lap(|seconds| &mut seconds.imaging);
+        (fields, accuracy)
+    }
+
+    /// Once all waves are in: currents, factors on the Bragg return, and what roughens or smooths the surface.
+    pub(super) fn finish_surface(
+        &self,
         workspace: &mut Workspace,
-        last_table: &mut Option<BackscatterTable>,
-        backdrop: &mut Backdrop,
-        (clock, seconds): (&mut Clock, &mut Seconds),
-    ) -> Drawn {
-        let mut accuracy = Accuracy::default();
-        let mut fields = self.sea(workspace, backdrop);
-        self.add_swell(workspace, &mut fields);
-        seconds.sea += clock.lap();
-        accuracy.wake = self.add_wake(workspace, &mut fields);
-        seconds.kelvin += clock.lap();
-        self.add_edge(&mut fields);
-        self.turn_into_factors(&mut fields);
-        let damping = self.damping(workspace);
-        seconds.turbulent += clock.lap();
-        let roughness = self.unresolved(workspace, &mut fields);
-        let damping_field = damping.as_ref();
-        let mut sigma0 = self.sigma0(
-            workspace,
-            last_table,
-            (&fields, damping_field, roughness.as_ref()),
-            &mut accuracy,
-        );
-        self.modulate(&mut sigma0, damping_field, backdrop);
-        let used = damping.into_iter().chain(roughness.into_iter().flatten());
-        used.for_each(|field| workspace.give(field));
-        seconds.backscatter += clock.lap();
-        let radial_velocity =
-            fields.radial_velocity(workspace, &self.raster, self.models.incidence);
-        let intensity = self.image(workspace, &sigma0, &radial_velocity, &fields);
-        seconds.imaging += clock.lap();
-        Drawn {
-            fields,
-            radial_velocity,
-            sigma0,
-            intensity,
-            accuracy,
+        fields: &mut Fields,
+    ) -> Roughening {
+        let site = &self.site;
+        let mut roughening = Roughening::default();
+        for effect in self.effects() {
+            effect.add_velocity(site, fields);
         }
+        if self.uses(Term::Hydrodynamic) {
+            let variance = match self.uses(Term::Sea) {
+                true => self.prepared.plan.modulation_variance,
+                false => 0.0,
+            };
+            to_bragg_factors(&mut fields.modulation, variance);
+        }
+        for effect in self.effects() {
+            effect.damp(site, workspace, &mut roughening.bragg_remaining);
+        }
+        if self.uses(Term::SubpixelWake) {
+            let smears = self.uses(Term::AzimuthSmear);
+            let wakes = &self.prepared.effects.subpixel_wake;
+            let variances = wakes.variances(site, workspace, fields, smears);
+            roughening.subpixel_variances = Some(variances);
+        }
+        roughening
     }
 
     /// Tolerance of sums of waves; single precision is not more exact.
     fn field_tolerance(&self) -> f64 {
-        (SHARES.fields * self.scene.model.tolerance).max(1e-6)
+        (SHARES.fields * self.site.scene.model.tolerance).max(1e-6)
     }
 
     /// The same of each wake, so that all keep it together.
     fn wake_tolerance(&self) -> f64 {
-        let share = SHARES.fields / self.models.wakes.len().max(1) as f64;
-        (share * self.scene.model.tolerance).max(1e-6)
-    }
-
-    /// Rows of the whole computed image with its margin.
-    fn rows(&self) -> Range<usize> {
-        self.first_row..self.first_row + self.raster.rows
+        let share = SHARES.fields / self.site.models.wakes.len().max(1) as f64;
+        (share * self.site.scene.model.tolerance).max(1e-6)
     }
 
     /// The waves of the sea; the last strip puts their blocks back.
-    pub(super) fn sea(&self, workspace: &mut Workspace, backdrop: &mut Backdrop) -> SurfaceFields {
-        let mut fields = SurfaceFields::default();
-        let Some(surface) = &backdrop.surface else {
+    pub(super) fn sea(&self, workspace: &mut Workspace, sea: &mut Sea) -> Fields {
+        let mut fields = Fields::default();
+        let (raster, transfer) = (&self.site.raster, &self.site.models.transfer);
+        let Some(surface) = sea else {
             for &quantity in self.quantities.iter().flatten() {
-                *fields.of(quantity) = workspace.flat_field(&self.raster);
+                *fields.of(quantity) = workspace.flat_field(raster);
             }
             return fields;
         };
-        let transfer = &self.models.transfer;
         let mut put = |quantities: &[Quantity], made: Vec<Field>| {
             for (&quantity, field) in quantities.iter().zip(made) {
                 *fields.of(quantity) = field;
@@ -212,68 +248,49 @@ impl<'a> Stages<'a> {
                 for group in &self.quantities {
                     let tolerance = self.field_tolerance();
                     let sum = (transfer, &group[..], tolerance);
-                    put(group, surface.strip_in(workspace, &self.rows(), sum));
+                    put(group, surface.strip_in(workspace, &self.site.rows(), sum));
                 }
             }
             Method::Direct => {
                 let all = self.quantities.concat();
                 put(
                     &all,
-                    harmonic_fields(&surface.modes(), transfer, &all, &self.raster),
+                    harmonic_fields(&surface.modes(), transfer, &all, raster),
                 );
             }
         }
-        if self.last {
-            let last = backdrop.surface.take();
-            last.into_iter()
-                .for_each(|surface| surface.give_back(workspace));
+        if self.last
+            && let Some(surface) = sea.take()
+        {
+            surface.give_back(workspace);
         }
         fields
     }
 
-    /// Adds the swell.
-    pub(super) fn add_swell(&self, workspace: &mut Workspace, fields: &mut SurfaceFields) {
-        let swell = self.models.swell.filter(|_| self.plan.uses(Term::Swell));
-        let Some(swell) = swell else { return };
-        let (seed, transfer) = (
-            (self.scene.seed, self.scene.sea.time),
-            &self.models.transfer,
-        );
-        let raster = &self.raster;
-        let waves = swell.waves(seed, transfer.depth, raster.nyquist_wavenumber());
-        let mut add = |quantity, made: &Field| {
-            let sum = fields.of(quantity).values.par_iter_mut().zip(&made.values);
-            sum.with_min_len(1 << 14)
-                .for_each(|(sum, made)| *sum += made);
-        };
-        match self.method {
-            Method::Fast => {
-                for group in &self.quantities {
-                    let sum = (&waves, transfer, &group[..], raster);
-                    let take = |q: usize, made: &mut Field| add(group[q], made);
-                    nufft::synthesize_each(workspace, sum, self.field_tolerance(), take);
-                }
-            }
-            Method::Direct => {
-                let all = self.quantities.concat();
-                let made = harmonic_fields(&waves, transfer, &all, raster);
-                all.iter().zip(&made).for_each(|(q, made)| add(*q, made));
-            }
+    /// Adds the waves of optional effects.
+    pub(super) fn add_waves_of_effects(&self, workspace: &mut Workspace, fields: &mut Fields) {
+        let tolerance = self.field_tolerance();
+        for waves in self.effects().filter_map(|effect| effect.waves(&self.site)) {
+            self.sum(workspace, &waves, tolerance, |quantity, made| {
+                let sum = fields.of(quantity).values.par_iter_mut();
+                sum.zip(&made.values)
+                    .with_min_len(1 << 14)
+                    .for_each(|(sum, made)| *sum += made);
+            });
         }
     }
 
     /// Adds the Kelvin wakes.
-    pub(super) fn add_wake(
+    pub(super) fn add_wakes(
         &self,
         workspace: &mut Workspace,
-        fields: &mut SurfaceFields,
+        fields: &mut Fields,
     ) -> Option<Reached> {
-        if !self.plan.uses(Term::Kelvin) {
+        if !self.uses(Term::Kelvin) {
             return None;
         }
-        let pairs = self.models.wakes.iter().zip(&self.plan.wakes);
-        let reached = pairs
-            .filter_map(|(wake, plan)| self.add_wake_of(workspace, fields, &wake.kelvin, plan));
+        let pairs = self.site.models.wakes.iter().zip(&self.prepared.plan.wakes);
+        let reached = pairs.filter_map(|(wake, plan)| self.add_wake(workspace, fields, wake, plan));
         reached.reduce(|a, b| Reached {
             reached: a.reached.max(b.reached),
             ..a
@@ -281,153 +298,65 @@ impl<'a> Stages<'a> {
     }
 
     /// Adds the Kelvin wake of one ship, faded over its hull.
-    fn add_wake_of(
+    fn add_wake(
         &self,
         workspace: &mut Workspace,
-        fields: &mut SurfaceFields,
+        fields: &mut Fields,
         wake: &KelvinWake,
         plan: &WakePlan,
     ) -> Option<Reached> {
-        let waves = wake.waves(plan);
-        let transfer = &self.models.transfer;
-        let raster = &self.raster;
-        let mut fade = workspace.field(raster);
-        kelvin::fill_fade(&mut fade, &wake.track, wake.hull.length(), raster);
-        let mut add = |quantity, wake: &mut Field| fields.of(quantity).add_product(wake, &fade);
-        let reached = match self.method {
+        let mut fade = workspace.field(&self.site.raster);
+        kelvin::fill_fade(
+            &mut fade,
+            &wake.track,
+            wake.hull.length(),
+            &self.site.raster,
+        );
+        let asked = self.wake_tolerance();
+        let reached = self.sum(workspace, &wake.waves(plan), asked, |quantity, wake| {
+            fields.of(quantity).add_product(wake, &fade);
+        });
+        workspace.give(fade);
+        reached.map(|reached| Reached { asked, reached })
+    }
+
+    /// Sums waves by the method, hands each field on, and returns the error that the method states.
+    fn sum(
+        &self,
+        workspace: &mut Workspace,
+        waves: &PlaneWaves,
+        tolerance: f64,
+        mut add: impl FnMut(Quantity, &mut Field),
+    ) -> Option<f64> {
+        let (raster, transfer) = (&self.site.raster, &self.site.models.transfer);
+        match self.method {
             Method::Fast => {
-                let asked = self.wake_tolerance();
                 let mut reached = 0.0f64;
                 for group in &self.quantities {
-                    let sum = (&waves, transfer, &group[..], raster);
-                    let take = |q: usize, wake: &mut Field| add(group[q], wake);
-                    reached = reached.max(nufft::synthesize_each(workspace, sum, asked, take));
+                    let sum = (waves, transfer, &group[..], raster);
+                    let take = |q: usize, made: &mut Field| add(group[q], made);
+                    let error = nufft::synthesize_each(workspace, sum, tolerance, take);
+                    reached = reached.max(error);
                 }
-                Some(Reached { asked, reached })
+                Some(reached)
             }
             Method::Direct => {
                 let all = self.quantities.concat();
-                let made = harmonic_fields(&waves, transfer, &all, raster);
+                let made = harmonic_fields(waves, transfer, &all, raster);
                 for (quantity, mut field) in all.into_iter().zip(made) {
                     add(quantity, &mut field);
                 }
                 None
             }
-        };
-        workspace.give(fade);
-        reached
-    }
-
-    /// Once all waves are in: from the modulation to the factor on the Bragg return.
-    pub(super) fn turn_into_factors(&self, fields: &mut SurfaceFields) {
-        if self.plan.uses(Term::Hydrodynamic) {
-            let sea = self.plan.uses(Term::Sea);
-            let variance = if sea {
-                self.plan.modulation_variance
-            } else {
-                0.0
-            };
-            to_bragg_factors(&mut fields.modulation, variance);
         }
     }
+}
 
-    /// What turbulent wakes and slicks leave of the short waves.
-    pub(super) fn damping(&self, workspace: &mut Workspace) -> Option<Field> {
-        let uses = |term| self.plan.uses(term);
-        let slicks = self.models.slicks.filter(|_| uses(Term::Slicks));
-        let [rows, columns] = self.plan.sizes.margin;
-        let whole = self.models.image.with_margin(rows, columns);
-        let wind_and_seed = (self.scene.sea.wind_speed, self.scene.seed);
-        let slicks = slicks.map(|slicks| slicks.strip(&whole, &self.rows(), wind_and_seed));
-        let wakes: &[Wake] = if uses(Term::Turbulent) {
-            &self.models.wakes
-        } else {
-            &[]
-        };
-        let mut left = slicks;
-        for wake in wakes {
-            let mut field = workspace.field(&self.raster);
-            wake.turbulent.fill_damping(&mut field, &self.raster);
-            let damping = field.values.par_iter_mut().with_min_len(1 << 14);
-            match &mut left {
-                None => {
-                    damping.for_each(|damping| *damping = 1.0 - *damping);
-                    left = Some(field);
-                }
-                Some(left) => {
-                    let pairs = left.values.par_iter_mut().zip(damping);
-                    pairs.for_each(|(left, damping)| *left *= 1.0 - *damping);
-                    workspace.give(field);
-                }
-            }
-        }
-        left
-    }
-
-    /// Variances xx, xy and yy of the slopes of the ship's waves that the pixels do not carry. Their velocities smear the
-    /// image as an acceleration would that defocuses as much: the mean square of both is that of one.
-    pub(super) fn unresolved(
-        &self,
-        workspace: &mut Workspace,
-        fields: &mut SurfaceFields,
-    ) -> Option<[Field; 3]> {
-        let models = self.models;
-        if !self.plan.uses(Term::Unresolved) {
-            return None;
-        }
-        let raster = &self.raster;
-        let mut variances = [(); 3].map(|()| workspace.flat_field(raster));
-        let per_velocity = if self.plan.uses(Term::Coherence) {
-            models.defocus_of_velocity()
-        } else {
-            0.0
-        };
-        let columns = raster.columns.max(1);
-        let mut unused = Vec::new();
-        let acceleration = &mut fields.radial_acceleration.values;
-        let acceleration = if per_velocity > 0.0 {
-            acceleration
-        } else {
-            unused.resize(raster.len(), 0.0);
-            &mut unused
-        };
-        let [xx, xy, yy] = variances
-            .each_mut()
-            .map(|f| f.values.par_chunks_mut(columns));
-        let rows = xx.zip(xy).zip(yy).zip(acceleration.par_chunks_mut(columns));
-        rows.enumerate()
-            .for_each(|(i, (((xx, xy), yy), acceleration))| {
-                for (j, acceleration) in acceleration.iter_mut().enumerate() {
-                    if let Some(rough) = models.roughness([raster.x(j), raster.y(i)]) {
-                        [xx[j], xy[j], yy[j]] = rough.slopes.map(|v| v as f32);
-                        let square = rough.radial(models.incidence) * per_velocity * per_velocity;
-                        *acceleration = acceleration.hypot(square.sqrt() as f32);
-                    }
-                }
-            });
-        Some(variances)
-    }
-
-    /// The edges that are drawn.
-    pub(super) fn edges(&self) -> impl Iterator<Item = &WakeEdge> {
-        let drawn = self.plan.uses(Term::Edge);
-        let edges = self
-            .models
-            .wakes
-            .iter()
-            .filter_map(|wake| wake.edge.as_ref());
-        edges.filter(move |_| drawn)
-    }
-
-    /// Adds the currents at the edges of turbulent wakes.
-    pub(super) fn add_edge(&self, fields: &mut SurfaceFields) {
-        for edge in self.edges() {
-            let SurfaceFields {
-                velocity_x,
-                velocity_y,
-                ..
-            } = fields;
-            edge.add_velocity([velocity_x, velocity_y], &self.raster);
+impl Roughening {
+    fn give_back(self, workspace: &mut Workspace) {
+        let fields = self.subpixel_variances.into_iter().flatten();
+        for field in fields.chain(self.bragg_remaining) {
+            workspace.give(field);
         }
     }
 }

@@ -5,70 +5,79 @@
 //! σ⁰), which stays within the shares of the tolerance that these have. Rows are computed beyond a strip as far as echoes are
 //! displaced, twice the margin of the image.
 
-use super::Simulator;
-use super::clock::{Clock, Seconds};
-use super::simulation::Method;
-use super::speckling::Exposure;
-use super::stages::{Backdrop, Drawn, Stages};
-use super::strip::Strip;
-use super::surface_fields::Wanted;
-use crate::computed::means_over;
-use crate::models::Models;
-use crate::plan::Plan;
+use crate::computed::{Parts, means_over};
+use crate::prepared::Prepared;
 use crate::raster::{Field, Raster};
-use crate::scene::Scene;
 use crate::workspace::Workspace;
 use std::ops::Range;
 
-impl Simulator {
-    /// All stages up to the intensity before speckle, at the pixels of the image, and what the impulse response looks at
-    /// where the image has one. The clock runs since the plan was made; without `Wanted::Fields` there is only the image.
-    pub(super) fn draw(
-        &mut self,
-        (scene, models, plan): (&Scene, &Models, &Plan),
-        (method, wanted): (Method, Wanted),
-        (clock, seconds): (&mut Clock, &mut Seconds),
-    ) -> (Drawn, Option<Exposure>) {
-        let workspace = &mut self.workspace;
-        let mut backdrop = Backdrop::new(workspace, scene, models, plan);
-        let mut out = Drawn::default();
-        for strip in &Strip::all(models, plan) {
-            let stages = Stages::new((scene, models, plan), (method, wanted), strip);
-            let mut drawn =
-                stages.draw(workspace, &mut self.table, &mut backdrop, (clock, seconds));
-            out.accuracy = out.accuracy.and(&drawn.accuracy);
-            let pixels = models.delivered.strip(&strip.delivered);
-            let intensity = std::mem::take(&mut drawn.intensity);
-            if models.response.is_some() {
-                let rows = [strip.own.clone(), 0..models.image.rows];
-                put(workspace, &mut out.intensity, rows, intensity);
-            } else {
-                let rows = [strip.delivered.clone(), 0..models.delivered.rows];
-                let intensity = means(workspace, intensity, &stages.image, &pixels);
-                put(workspace, &mut out.intensity, rows, intensity);
-            }
-            if wanted == Wanted::Fields {
-                for (to, from) in out.outputs().into_iter().zip(drawn.outputs()) {
-                    let rows = [strip.delivered.clone(), 0..models.delivered.rows];
-                    let part = means(workspace, std::mem::take(from), &stages.raster, &pixels);
-                    put(workspace, to, rows, part);
-                }
-            }
-            drawn.give_back(workspace);
+/// Margins between a strip's image and the edge of what is computed for it.
+const OVERLAP: usize = 2;
+
+/// One strip.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Strip {
+    /// Rows of the image.
+    pub(super) image: Range<usize>,
+    /// Rows of the computed image that they are made of; the last may be the first of the next strip as well.
+    pub(super) computed: Range<usize>,
+    /// Those of them that belong to no other strip.
+    pub(super) own: Range<usize>,
+    /// Rows of the computed pixels with their margin.
+    pub(super) raster: Range<usize>,
+}
+
+impl Strip {
+    /// All rows.
+    pub(super) fn whole(prepared: &Prepared<'_>) -> Self {
+        let models = &prepared.models;
+        Self {
+            image: 0..models.image.rows,
+            computed: 0..models.computed.rows,
+            own: 0..models.computed.rows,
+            raster: 0..models.computed.rows + 2 * prepared.plan.sizes.margin[0],
         }
-        let exposure = models.response.map(|response| {
-            let sources = std::mem::take(&mut out.intensity);
-            let exposure = Exposure::of(scene, models, response, sources);
-            out.intensity = exposure.mean();
-            seconds.imaging += clock.lap();
-            exposure
-        });
-        (out, exposure)
+    }
+
+    /// The strips of a plan, from the first row to the last.
+    pub(super) fn all(prepared: &Prepared<'_>) -> Vec<Self> {
+        let (models, plan) = (&prepared.models, &prepared.plan);
+        let count = plan.sizes.strips;
+        let whole = Self::whole(prepared);
+        let parts = Parts::new(&models.computed, &models.image);
+        let margin = plan.sizes.margin[0];
+        let one = |n: usize| {
+            let [start, end] = [n, n + 1].map(|n| n * whole.image.end / count);
+            let mut own = parts.rows(&(start..end)).start..parts.rows(&(end..end + 1)).start;
+            let mut computed = parts.rows(&(start..end));
+            // Around the rows of the strip lie margin rows, then the overlap.
+            let mut raster = computed.start.saturating_sub((OVERLAP - 1) * margin)
+                ..(computed.end + (OVERLAP + 1) * margin).min(whole.raster.end);
+            if n == 0 {
+                (own.start, computed.start, raster.start) = (0, 0, 0);
+            }
+            if n + 1 == count {
+                (own.end, computed.end, raster.end) =
+                    (whole.own.end, whole.computed.end, whole.raster.end);
+            }
+            Self {
+                image: start..end,
+                computed,
+                own,
+                raster,
+            }
+        };
+        (0..count).map(one).collect()
     }
 }
 
 /// The means of a field over the pixels of an image.
-fn means(workspace: &mut Workspace, field: Field, computed: &Raster, image: &Raster) -> Field {
+pub(super) fn means(
+    workspace: &mut Workspace,
+    field: Field,
+    computed: &Raster,
+    image: &Raster,
+) -> Field {
     if computed == image {
         return field;
     }
@@ -86,7 +95,12 @@ fn means(workspace: &mut Workspace, field: Field, computed: &Raster, image: &Ras
 }
 
 /// Puts some rows of all into a field; what covers all of it becomes it. Rows after those that are put are dropped.
-fn put(workspace: &mut Workspace, into: &mut Field, [rows, all]: [Range<usize>; 2], part: Field) {
+pub(super) fn put(
+    workspace: &mut Workspace,
+    into: &mut Field,
+    [rows, all]: [Range<usize>; 2],
+    part: Field,
+) {
     if rows == all {
         *into = part;
         return;
@@ -107,8 +121,12 @@ fn put(workspace: &mut Workspace, into: &mut Field, [rows, all]: [Range<usize>; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fields::Wanted;
     use crate::plan::SHARES;
-    use crate::survey::Survey;
+    use crate::scene::Scene;
+    use crate::simulate::record::Clock;
+    use crate::simulate::simulation::Method;
+    use crate::simulate::stages::{Drawn, Memory, draw};
 
     /// Small margins: what lies beyond a strip is little.
     fn scene(keys: &[&str]) -> Scene {
@@ -124,14 +142,12 @@ mod tests {
     }
 
     fn drawn(scene: &Scene, strips: usize) -> (Drawn, Vec<Strip>) {
-        let models = Models::new(scene);
-        let mut plan = Plan::of(scene, &models, &Survey::new(scene, &models)).unwrap();
-        plan.sizes.strips = strips;
-        let mut clock = (Clock::start(), Seconds::default());
-        let what = (scene, &models, &plan);
-        let how = (Method::Fast, Wanted::Fields);
-        let (out, _) = Simulator::default().draw(what, how, (&mut clock.0, &mut clock.1));
-        (out, Strip::all(&models, &plan))
+        let mut prepared = Prepared::new(scene).unwrap();
+        prepared.plan.sizes.strips = strips;
+        let (mut memory, mut clock) = (Memory::default(), Clock::start());
+        let (method, wanted) = (Method::Fast, Wanted::Fields);
+        let out = draw(&prepared, &mut memory, method, wanted, &mut clock);
+        (out, Strip::all(&prepared))
     }
 
     const SCENES: [&[&str]; 4] = [
@@ -165,14 +181,20 @@ mod tests {
                 // Each sum of the wake's waves keeps its share of the root mean square over its own pixels, which in one
                 // of n strips is at most √n times that over all.
                 let sums = (1.0 + (count as f64).sqrt()) * SHARES.fields * tolerance;
-                for (a, b) in whole.outputs().into_iter().zip(parts.outputs()).take(7) {
+                for (a, b) in whole
+                    .fields
+                    .each()
+                    .into_iter()
+                    .zip(parts.fields.each())
+                    .take(7)
+                {
                     assert_eq!((a.rows, a.columns), (170, 60));
                     let largest = a.difference(b).0 / a.rms();
                     assert!(largest <= sums, "{keys:?} {count}: {largest:e} {sums:e}");
                 }
                 let shares = SHARES.fields + SHARES.table + SHARES.kernels;
-                let (_, rms) = whole.intensity.difference(&parts.intensity);
-                let allowed = shares * tolerance * whole.intensity.mean();
+                let (_, rms) = whole.fields.intensity.difference(&parts.fields.intensity);
+                let allowed = shares * tolerance * whole.fields.intensity.mean();
                 assert!(
                     rms > 0.0 && rms <= allowed,
                     "{keys:?} {count}: {rms:e} {allowed:e}"
@@ -190,7 +212,13 @@ mod tests {
             scene.sea.swell_height = 0.0;
             scene.radar.range_to_velocity = 120.0;
             let [mut whole, mut parts] = [1, 5].map(|count| drawn(&scene, count).0);
-            for (a, b) in whole.outputs().into_iter().zip(parts.outputs()).take(7) {
+            for (a, b) in whole
+                .fields
+                .each()
+                .into_iter()
+                .zip(parts.fields.each())
+                .take(7)
+            {
                 assert!(a == b && a.rms() > 0.0, "{keys:?}");
             }
         }
@@ -201,25 +229,25 @@ mod tests {
     fn strips_cover_all_rows_once() {
         for keys in SCENES {
             let scene = scene(keys);
-            let models = Models::new(&scene);
-            let mut plan = Plan::of(&scene, &models, &Survey::new(&scene, &models)).unwrap();
-            let margin = plan.sizes.margin[0];
+            let mut prepared = Prepared::new(&scene).unwrap();
+            let margin = prepared.plan.sizes.margin[0];
             for count in [1, 2, 7, 170] {
-                plan.sizes.strips = count;
-                let strips = Strip::all(&models, &plan);
+                prepared.plan.sizes.strips = count;
+                let strips = Strip::all(&prepared);
                 let mut next = [0; 2];
                 for strip in &strips {
-                    assert_eq!([strip.delivered.start, strip.own.start], next, "{keys:?}");
-                    next = [strip.delivered.end, strip.own.end];
+                    assert_eq!([strip.image.start, strip.own.start], next, "{keys:?}");
+                    next = [strip.image.end, strip.own.end];
                     assert!(
-                        strip.image.start <= strip.own.start && strip.image.end >= strip.own.end
+                        strip.computed.start <= strip.own.start
+                            && strip.computed.end >= strip.own.end
                     );
                     // Rows of the margin count from the first one above the image.
-                    let above = (strip.image.start + margin) - strip.raster.start;
-                    let below = strip.raster.end - (strip.image.end + margin);
+                    let above = (strip.computed.start + margin) - strip.raster.start;
+                    let below = strip.raster.end - (strip.computed.end + margin);
                     assert!(above >= margin && below >= margin);
                 }
-                assert_eq!(next, [170, models.image.rows]);
+                assert_eq!(next, [170, prepared.models.computed.rows]);
             }
         }
     }

@@ -6,7 +6,7 @@
 //! The one variant offered is the drag law, see [`DragLaw`].
 
 use crate::constants::GRAVITY;
-use crate::quadrature::GaussLegendre;
+use crate::numeric::GaussLegendre;
 use std::f64::consts::{LN_2, PI};
 
 /// Wavenumber of the slowest wave `k_m` [rad/m], as the paper rounds it.

@@ -1,7 +1,7 @@
 //! Mean amplitude of every wave of a lattice, by a table over |k| and an elementary function of the direction.
 
-use super::vector::{exp, ln};
 use super::wave_lattice::WaveLattice;
+use crate::numeric::vector::{exp_f32, ln_f32};
 use crate::spectrum::deep_equivalent;
 use crate::spreading::{Cos2s, Spreading};
 use crate::wind_sea::{DirectionalSpectrum, GAUSS_8};
@@ -78,8 +78,8 @@ impl<'a> Amplitudes<'a> {
         match self.spectrum.spreading() {
             Spreading::Cos2s(_) => waves.for_each(|(cos, (along, against))| {
                 let (level, half_s) = (*along, *against);
-                *along = level * exp(half_s * ln((0.5 + 0.5 * cos).max(1e-30)));
-                *against = level * exp(half_s * ln((0.5 - 0.5 * cos).max(1e-30)));
+                *along = level * exp_f32(half_s * ln_f32((0.5 + 0.5 * cos).max(1e-30)));
+                *against = level * exp_f32(half_s * ln_f32((0.5 - 0.5 * cos).max(1e-30)));
             }),
             Spreading::Even(_) => waves.for_each(|(cos, (along, against))| {
                 *along *= (1.0 + *against * (2.0 * cos * cos - 1.0)).max(0.0).sqrt();

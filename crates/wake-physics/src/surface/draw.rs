@@ -1,12 +1,11 @@
 //! Draws the random amplitudes of a sea, line by line.
 
 use super::amplitude::Amplitudes;
-use super::vector::{cos_sin, ln};
 use super::wave_lattice::WaveLattice;
 use crate::dispersion::angular_frequency;
+use crate::numeric::vector::{cos_sin, ln_f32, vectorized};
 use crate::random::{Stream, generator};
 use crate::raster::Raster;
-use crate::vectorize::vectorized;
 use crate::wind_sea::DirectionalSpectrum;
 use num_complex::Complex32;
 use rand::Rng;
@@ -189,7 +188,7 @@ impl<'a> Draw<'a> {
         match self.scatter {
             Scatter::Gaussian => {
                 let u = ((bits >> 1) as i32 as f32 + 0.5) * f32::from_bits((127 - 31) << 23);
-                (-ln(u)).max(0.0).sqrt()
+                (-ln_f32(u)).max(0.0).sqrt()
             }
             #[cfg(test)]
             Scatter::Phase => 1.0,

@@ -3,7 +3,7 @@
 //! A real field has the half spectrum H(k) = ½(T(k) c(k) + T*(−k) c*(−k)). With E and O = ½(c(k) ± c*(−k))
 //! and the factors T of [`Transfer::factor`], each quantity needs one or both of E and O.
 
-use super::vector::Lane;
+use super::lane::Lane;
 use super::wave_lattice::WaveLattice;
 use crate::constants::{GRAVITY, KINEMATIC_SURFACE_TENSION};
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity, Transfer};
@@ -27,7 +27,7 @@ pub(super) struct Factors<'a, T> {
     sin: T,
     cos: T,
     rate: T,
-    steepness: T,
+    action_slope: T,
 }
 
 impl<'a, T: Lane> Factors<'a, T> {
@@ -44,7 +44,7 @@ impl<'a, T: Lane> Factors<'a, T> {
             sin: T::constant(transfer.incidence.sin()),
             cos: T::constant(transfer.incidence.cos()),
             rate: T::constant(transfer.relaxation_rate),
-            steepness: T::constant(transfer.steepness),
+            action_slope: T::constant(transfer.action_slope),
         }
     }
 
@@ -104,12 +104,12 @@ impl<'a, T: Lane> Factors<'a, T> {
                 let limit = T::constant(LARGEST_MODULATING_WAVENUMBER.powi(2));
                 let rate = self.rate;
                 let gain = |n: usize| {
-                    let steepness = if kx * kx + ky[n] * ky[n] > limit {
+                    let action_slope = if kx * kx + ky[n] * ky[n] > limit {
                         T::zero()
                     } else {
-                        self.steepness
+                        self.action_slope
                     };
-                    steepness * kx * kx * orbital[n] / (omega[n] * omega[n] + rate * rate)
+                    action_slope * kx * kx * orbital[n] / (omega[n] * omega[n] + rate * rate)
                 };
                 map(out, even, |n, e| e * (gain(n) * omega[n]));
                 for ((n, h), &o) in out.iter_mut().enumerate().zip(odd) {

@@ -4,22 +4,22 @@ mod amplitude;
 mod draw;
 mod factor;
 mod wave_lattice;
-pub(crate) mod vector;
+pub(crate) mod lane;
 
 use crate::dispersion::angular_frequency;
 use crate::fft::{Synthesis, signed_index};
+use crate::numeric::vectorized;
 use crate::raster::{Field, Raster};
-use crate::vectorize::vectorized;
 use crate::waves::{PlaneWaves, Quantity, Transfer};
 use crate::wind_sea::DirectionalSpectrum;
 use crate::workspace::Workspace;
 use amplitude::Amplitudes;
 use draw::{Draw, Scatter};
 use factor::Factors;
+use lane::Lane;
 use num_complex::{Complex, Complex32, Complex64};
 use std::f64::consts::TAU;
 use std::ops::Range;
-use vector::Lane;
 use wave_lattice::WaveLattice;
 
 /// From this tolerance on single precision is enough: its error stays below a quarter of it.

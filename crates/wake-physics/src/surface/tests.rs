@@ -29,7 +29,7 @@ fn transfer(depth: f64) -> Transfer {
         depth,
         incidence: 0.56,
         relaxation_rate: 0.3,
-        steepness: 4.5,
+        action_slope: 4.5,
     }
 }
 

@@ -341,7 +341,7 @@ mod tests {
             let distance = current.speed * age;
             current.divergence(distance, width(current.beam, distance))
         };
-        let rule = crate::quadrature::GaussLegendre::new(64);
+        let rule = crate::numeric::GaussLegendre::new(64);
         for (rate, age) in [(0.6f64, 100.0f64), (0.2, 200.0), (0.1, 300.0)] {
             let lag = 1.0 / rate;
             let integral = rule.integrate([(age - 30.0 * lag).max(0.0), age], |t| {
@@ -365,7 +365,7 @@ mod tests {
     fn water_is_conserved() {
         let wake = wake();
         let across = width(wake.beam, 400.0);
-        let rule = crate::quadrature::GaussLegendre::new(60);
+        let rule = crate::numeric::GaussLegendre::new(60);
         let sum = rule.integrate([-9.0 * across, 9.0 * across], |y| wake.divergence(400.0, y));
         assert!(sum.abs() < 1e-9, "{sum}");
     }

@@ -192,7 +192,7 @@ mod tests {
             depth: f64::INFINITY,
             incidence: 0.5,
             relaxation_rate: 0.7,
-            steepness: 4.5,
+            action_slope: 4.5,
         };
         let mut waves = PlaneWaves::default();
         for n in 0..300 {

@@ -1,8 +1,6 @@
 //! Plane waves, what each carries, and the slow sum of them that everything fast is checked against.
 
-mod matrix_product;
-
-pub use matrix_product::matrix_product;
+pub(crate) mod matrix_product;
 
 use crate::raster::{Field, Raster};
 use num_complex::Complex64;
@@ -120,8 +118,8 @@ pub struct Transfer {
     pub incidence: f64,
     /// Relaxation rate μ of the Bragg waves [1/s].
     pub relaxation_rate: f64,
-    /// Steepness `m_B` of the action spectrum of the Bragg waves \[1\], −∂ln(ωΨ/k)/∂ln k; 4.5 for Ψ ∝ k⁻⁴.
-    pub steepness: f64,
+    /// Slope `m_B` of the action spectrum of the Bragg waves \[1\], −∂ln(ωΨ/k)/∂ln k; 4.5 for Ψ ∝ k⁻⁴.
+    pub action_slope: f64,
 }
 
 /// Waves shorter than 5 m do not modulate the Bragg waves (chosen): above the relaxation rate the modulation is `m_B`
@@ -168,7 +166,7 @@ impl Transfer {
             Quantity::Hydrodynamic if k > LARGEST_MODULATING_WAVENUMBER => Complex64::ZERO,
             Quantity::Hydrodynamic => {
                 let gradient = i * kx * (horizontal * kx / k);
-                -self.steepness * gradient / (self.relaxation_rate - i * omega)
+                -self.action_slope * gradient / (self.relaxation_rate - i * omega)
             }
         }
     }
@@ -218,7 +216,7 @@ pub fn harmonic_sum(
 
 /// Amplitudes T·a of each quantity, one vector per quantity.
 #[must_use]
-pub fn strengths(
+pub(crate) fn strengths(
     waves: &PlaneWaves,
     transfer: &Transfer,
     quantities: &[Quantity],
@@ -265,7 +263,7 @@ mod tests {
         depth: 12.0,
         incidence: 0.5,
         relaxation_rate: 0.7,
-        steepness: 4.5,
+        action_slope: 4.5,
     };
 
     fn value(quantity: Quantity, k: [f64; 2], [x, y, t]: [f64; 3]) -> f64 {

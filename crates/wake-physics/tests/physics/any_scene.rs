@@ -128,12 +128,12 @@ prop_compose! {
     fn radar_of_keys()(
         (frequency, incidence) in (decades(1e9, 2e10), ends(5.0, 75.0)),
         horizontal in any::<bool>(),
-        (range_to_velocity, resolution) in (ends(0.0, 200.0), decades(0.5, 100.0)),
+        (range_to_velocity, azimuth_resolution) in (ends(0.0, 200.0), decades(0.5, 100.0)),
         range_resolution in maybe(decades(0.5, 500.0)),
         windows in (maybe(window()), maybe(window())),
         (looks, look_overlap) in (looks(), maybe(ends(0.0, 0.9))),
-        noise_floor in maybe(ends(-60.0, 20.0)),
-        (ambiguity, pulse_rate) in (maybe(ends(-60.0, 0.0)), decades(100.0, 2e4)),
+        nesz in maybe(ends(-60.0, 20.0)),
+        (ambiguity, prf) in (maybe(ends(-60.0, 0.0)), decades(100.0, 2e4)),
         relaxation_rate in maybe(decades(0.01, 100.0)),
     ) -> Radar {
         let responds = range_resolution.is_some();
@@ -144,15 +144,15 @@ prop_compose! {
             polarization: if horizontal { Polarization::HH } else { Polarization::VV },
             incidence,
             range_to_velocity,
-            resolution,
+            azimuth_resolution,
             range_resolution,
             window: windows.0.filter(|_| responds),
             azimuth_window: windows.1.filter(|_| responds),
             looks,
             look_overlap: look_overlap.filter(|_| responds),
-            noise_floor,
-            ambiguity,
-            pulse_rate: ambiguity.map(|_| pulse_rate),
+            nesz,
+            azimuth_ambiguity: ambiguity,
+            prf: ambiguity.map(|_| prf),
             relaxation_rate,
         }
     }

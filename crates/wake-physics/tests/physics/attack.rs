@@ -66,7 +66,7 @@ prop_compose! {
         (sea.spectrum, sea.spreading) = (spectra[spectrum], spreads[spreading]);
         let radar = &mut scene.radar;
         (radar.frequency, radar.incidence, radar.looks) = (frequency, incidence, looks);
-        (radar.range_to_velocity, radar.resolution) = (range_to_velocity, resolution);
+        (radar.range_to_velocity, radar.azimuth_resolution) = (range_to_velocity, resolution);
         radar.polarization = if horizontal { Polarization::HH } else { Polarization::VV };
         (scene.model.terms, scene.model.tolerance) = (terms, tolerance);
         scene

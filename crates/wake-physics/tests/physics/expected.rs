@@ -116,7 +116,7 @@ fn without_a_sea_it_is_the_simulated_image() {
         Term::TiltAverage,
         Term::Specular,
         Term::RangeBunching,
-        Term::Bunching,
+        Term::VelocityBunching,
     ]);
     let simulated = simulate(&scene).unwrap().intensity;
     assert_eq!(expected_intensity(&scene).unwrap(), simulated);
@@ -184,8 +184,8 @@ fn a_low_swell_is_seen_as_the_linear_sea_says() {
     ];
     let seen = |more: &[&str]| deviations(&open_sea(scene(&[&swell[..], more].concat())));
     let [plain, ..] = seen(&[]);
-    let response = ["radar.range_resolution=40", "radar.resolution=40"];
-    for more in [&[][..], &response, &["radar.noise_floor=-10"]] {
+    let response = ["radar.range_resolution=40", "radar.azimuth_resolution=40"];
+    for more in [&[][..], &response, &["radar.nesz=-10"]] {
         let [linear, simulated] = seen(more);
         println!("{more:?} {linear:.4} {simulated:.4}");
         assert!(
@@ -193,7 +193,7 @@ fn a_low_swell_is_seen_as_the_linear_sea_says() {
             "{more:?} {linear} {simulated}"
         );
     }
-    let [smeared, noisy] = [&response[..], &["radar.noise_floor=-10"]].map(|more| seen(more)[0]);
+    let [smeared, noisy] = [&response[..], &["radar.nesz=-10"]].map(|more| seen(more)[0]);
     assert!(
         smeared < 0.9 * plain && noisy < 0.8 * plain,
         "{plain} {smeared} {noisy}"
@@ -208,12 +208,16 @@ fn unit_speckle_is_that_of_the_image() {
         &[
             "radar.looks=3",
             "radar.range_resolution=9",
-            "radar.resolution=12",
+            "radar.azimuth_resolution=12",
         ],
     ] {
         let mut scene = open_sea(scene(more));
         scene.sea.wind_speed = 5.0;
-        scene.model.terms = Terms::List(vec![Term::TiltAverage, Term::Response, Term::Speckle]);
+        scene.model.terms = Terms::List(vec![
+            Term::TiltAverage,
+            Term::ImpulseResponse,
+            Term::Speckle,
+        ]);
         let image = simulate(&scene).unwrap();
         let shape = |field: &Field| {
             let (mean, n) = (field.mean(), field.columns);

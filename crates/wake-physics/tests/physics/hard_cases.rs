@@ -59,7 +59,7 @@ fn every_corner_of_a_scene_is_sound() {
         &[
             "radar.frequency=2e10",
             "grid.spacing=0.1",
-            "radar.resolution=0.5",
+            "radar.azimuth_resolution=0.5",
             "radar.range_to_velocity=2",
         ],
         &["radar.relaxation_rate=0.01", "radar.looks=1"],
@@ -313,7 +313,7 @@ fn scenes() -> impl Strategy<Value = Scene> {
         };
         s.radar.incidence = radar.1;
         s.radar.range_to_velocity = radar.2;
-        s.radar.resolution = radar.3;
+        s.radar.azimuth_resolution = radar.3;
         s.radar.looks = radar.4;
         s.model.tolerance = 10f64.powf(-grid.4);
         s

@@ -78,9 +78,9 @@ fn satellite_scenes_keep_the_tolerance() {
         "grid.spacing=5",
         "radar.frequency=5.405e9",
         "radar.range_resolution=10",
-        "radar.resolution=10",
+        "radar.azimuth_resolution=10",
         "radar.range_to_velocity=10",
-        "radar.noise_floor=-25",
+        "radar.nesz=-25",
         "sea.wind_speed=4",
         "sea.swell_height=1",
         "sea.gust_strength=0.1",
@@ -92,8 +92,16 @@ fn satellite_scenes_keep_the_tolerance() {
     ];
     let scene = small(7, 6, &keys);
     let plan = wake_physics::Plan::new(&scene).unwrap();
-    let drawn = [Term::Swell, Term::Unresolved, Term::Edge, Term::Slicks];
-    for term in drawn.into_iter().chain([Term::Gusts, Term::Response]) {
+    let drawn = [
+        Term::Swell,
+        Term::SubpixelWake,
+        Term::BrightEdge,
+        Term::Slicks,
+    ];
+    for term in drawn
+        .into_iter()
+        .chain([Term::Gusts, Term::ImpulseResponse])
+    {
         assert!(plan.uses(term), "{plan}");
     }
     assert_tolerance(&scene, 1e-3);

@@ -19,12 +19,12 @@ proptest! {
         let [a, b, c, d, e, f, g, h] = numbers;
         [scene.sea.wind_speed, scene.sea.time, scene.grid.spacing] = [a, b, c];
         [scene.radar.incidence, scene.model.tolerance] = [d, e];
-        scene.radar.noise_floor = Some(f);
+        scene.radar.nesz = Some(f);
         scene.ships[0].position = [g, h];
         let bits = |scene: &Scene| {
             let Scene { sea, grid, radar, model, ships, .. } = scene;
             let [x, y] = ships[0].position;
-            let noise = radar.noise_floor.unwrap_or_default();
+            let noise = radar.nesz.unwrap_or_default();
             [sea.wind_speed, sea.time, grid.spacing, radar.incidence, model.tolerance, noise, x, y].map(f64::to_bits)
         };
         let json = serde_json::to_string(&scene).unwrap();

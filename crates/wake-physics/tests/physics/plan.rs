@@ -121,6 +121,6 @@ fn a_list_of_terms_is_followed() {
         .filter(|t| t.used)
         .map(|t| t.term)
         .collect();
-    assert_eq!(used, [Term::Sea, Term::Bunching]);
+    assert_eq!(used, [Term::Sea, Term::VelocityBunching]);
     assert!(plan.left_out() > 0.1);
 }

@@ -174,7 +174,7 @@ fn spread(values: &[f64]) -> f64 {
 /// A response of 20 m, and all terms: the plan keeps the response on pixels of 20 m too.
 const RESPONSE: [&str; 3] = [
     "radar.range_resolution=20",
-    "radar.resolution=20",
+    "radar.azimuth_resolution=20",
     "model.terms=all",
 ];
 
@@ -320,7 +320,7 @@ fn unresolved_waves_are_left_out_where_they_are_weak() {
             96,
             &[
                 "radar.range_resolution=10",
-                "radar.resolution=10",
+                "radar.azimuth_resolution=10",
                 "grid.spacing=5",
                 "ship.position=[150, 150]",
                 "model.tolerance=1e-2",
@@ -328,12 +328,17 @@ fn unresolved_waves_are_left_out_where_they_are_weak() {
             ],
         );
         let needed = run(&scene);
-        assert_eq!(needed.plan.uses(Term::Unresolved), used, "{}", needed.plan);
+        assert_eq!(
+            needed.plan.uses(Term::SubpixelWake),
+            used,
+            "{}",
+            needed.plan
+        );
         let all = run(&scene.with_assignments(&["model.terms=all"]).unwrap());
-        let planned = all.plan.terms.iter().find(|t| t.term == Term::Unresolved);
+        let planned = all.plan.terms.iter().find(|t| t.term == Term::SubpixelWake);
         let estimate = planned.unwrap().estimate;
         let mut without = scene.clone();
-        let list = Term::ALL.into_iter().filter(|t| *t != Term::Unresolved);
+        let list = Term::ALL.into_iter().filter(|t| *t != Term::SubpixelWake);
         without.model.terms = Terms::List(list.collect());
         let (_, change) = run(&without).intensity.difference(&all.intensity);
         let change = change / all.intensity.mean();

@@ -9,13 +9,13 @@ use wake_physics::{Field, Scene, Simulator, expected_intensity, simulate};
 /// Terms that a scene has only where it asks for them.
 pub(crate) const EXTRAS: [Term; 8] = [
     Term::Swell,
-    Term::Unresolved,
-    Term::Edge,
+    Term::SubpixelWake,
+    Term::BrightEdge,
     Term::Slicks,
     Term::Breaking,
     Term::Gusts,
     Term::Noise,
-    Term::Response,
+    Term::ImpulseResponse,
 ];
 
 /// A sea and a ship under Sentinel-1, 160 × 150 pixels of 10 m.
@@ -56,10 +56,10 @@ fn a_satellite_scene_is_sound_and_has_its_pixels() {
     );
     assert_eq!(simulation.raster.spacing, 10.0);
     for term in [
-        Term::Response,
+        Term::ImpulseResponse,
         Term::Noise,
         Term::Gusts,
-        Term::Edge,
+        Term::BrightEdge,
         Term::Breaking,
     ] {
         assert!(simulation.plan.uses(term), "{}", simulation.plan);
@@ -135,7 +135,7 @@ fn a_quick_look_is_of_the_scene() {
 fn the_response_smears_and_keeps_the_mean() {
     let keys = [
         "radar.range_resolution=12",
-        "radar.resolution=12",
+        "radar.azimuth_resolution=12",
         "model.terms=all",
     ];
     let simulation = run(&open_sea(small(128, 128, &keys)));
@@ -167,9 +167,9 @@ fn weak_extras_are_left_out_and_change_less_than_estimated() {
         (Term::Gusts, "sea.gust_strength", [3e-5, 0.05]),
         (Term::Swell, "sea.swell_height", [1e-5, 1.0]),
         (Term::Slicks, "sea.slick_damping", [1e-4, 0.5]),
-        (Term::Noise, "radar.noise_floor", [-60.0, -25.0]),
+        (Term::Noise, "radar.nesz", [-60.0, -25.0]),
         // The wind along the track, but for a hundredth of a degree, and across it.
-        (Term::Edge, "sea.wind_toward", [45.01, 135.0]),
+        (Term::BrightEdge, "sea.wind_toward", [45.01, 135.0]),
     ];
     for (n, (term, key, values)) in strengths.into_iter().enumerate() {
         for (value, used) in values.into_iter().zip([false, true]) {
@@ -181,7 +181,7 @@ fn weak_extras_are_left_out_and_change_less_than_estimated() {
                 format!("{key}={value}"),
             ];
             // The edge is asked for by a key of its own.
-            keys.retain(|k| term == Term::Edge || k != "ship.edge=true");
+            keys.retain(|k| term == Term::BrightEdge || k != "ship.edge=true");
             let scene = small(96, 96, &[]).with_assignments(&keys).unwrap();
             let needed = run(&scene);
             assert_eq!(
@@ -281,7 +281,7 @@ fn a_ship_has_one_cross_section() {
     };
     let windowed = [
         "radar.range_resolution=6",
-        "radar.resolution=6",
+        "radar.azimuth_resolution=6",
         "radar.window={ hamming = 0.7 }",
     ];
     let mut mean = 0.0;

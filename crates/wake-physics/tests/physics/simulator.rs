@@ -52,10 +52,10 @@ fn image_only_has_the_same_bits() {
     let mut simulator = Simulator::default();
     let mut scenes = scenes();
     let moving = [
-        Term::Bunching,
+        Term::VelocityBunching,
         Term::RangeBunching,
         Term::Hydrodynamic,
-        Term::Coherence,
+        Term::AzimuthSmear,
     ];
     for chosen in 0..1 << moving.len() {
         let also = moving
@@ -105,7 +105,7 @@ fn accuracy_is_told() {
     // Means over the slopes of breaking waves do not keep a millionth.
     let keys = [
         "radar.range_resolution=10",
-        "radar.resolution=10",
+        "radar.azimuth_resolution=10",
         "grid.spacing=10",
         "ship.position=[40, 40]",
         "model.tolerance=1e-6",

@@ -132,10 +132,9 @@ fn painted(object: &Object, scene: &Scene) -> Wake {
 /// ```
 fn line_snr(object: &Object, scene: &Scene) -> f32 {
     let pixels = |resolution: f64| (resolution / scene.grid.spacing).max(1.0);
-    let correlated = scene
-        .radar
-        .range_resolution
-        .map_or(1.0, |range| pixels(range) * pixels(scene.radar.resolution));
+    let correlated = scene.radar.range_resolution.map_or(1.0, |range| {
+        pixels(range) * pixels(scene.radar.azimuth_resolution)
+    });
     let snr = object.visibility.map_or(f64::INFINITY, |v| v.snr);
     (snr * (object.length_px * LINE / correlated).sqrt()) as f32
 }
@@ -212,7 +211,7 @@ mod tests {
         let object = wake_physics::labels_of(&scene).objects()[0];
         let mut correlated = scene.clone();
         correlated.radar.range_resolution = Some(40.0);
-        correlated.radar.resolution = 20.0;
+        correlated.radar.azimuth_resolution = 20.0;
         // Eight pixels of ten metres count as one.
         let ratio = line_snr(&object, &scene) / line_snr(&object, &correlated);
         assert!((ratio - 8f32.sqrt()).abs() < 1e-4, "{ratio}");

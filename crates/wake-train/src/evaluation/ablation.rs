@@ -2,7 +2,8 @@
 
 use burn::tensor::Device;
 use serde::Serialize;
-use wake_physics::measure::{SeaShape, crest_variance, sea_shape, seams};
+use wake_physics::measure::{SeaShape, crest_variance, sea_shape};
+use wake_physics::reference::seams;
 use wake_physics::{Field, Scene};
 
 use super::baseline::Baseline;
@@ -100,7 +101,7 @@ fn row(
         image,
         skewness: of(&|s| s.skewness),
         kurtosis: of(&|s| s.kurtosis),
-        steepness: std::array::from_fn(|n| of(&|s| s.steepness[n])),
+        steepness: std::array::from_fn(|n| of(&|s| s.derivative_skewness[n])),
         grouping: of(&|s| s.grouping),
         crest_variance: mean(&crests),
         seams: mean(&borders),

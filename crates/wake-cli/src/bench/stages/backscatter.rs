@@ -86,7 +86,7 @@ pub(crate) fn unresolved(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Ro
     };
     let variances = [0, 1, 2].map(|n| Field::from_fn(raster, |i, j| of_pixel(i, j)[n]));
     let facets = FacetFields {
-        unresolved: Some(&variances),
+        subpixel_variances: Some(&variances),
         ..FacetFields::of_slopes(&slopes[0], &slopes[1])
     };
     let model = backscatter_model(raster.spacing);

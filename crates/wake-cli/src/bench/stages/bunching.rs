@@ -6,7 +6,7 @@ use super::surface::{INCIDENCE, fields};
 use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use rayon::prelude::*;
 use wake_physics::Raster;
-use wake_physics::sar::direct::DirectImage;
+use wake_physics::reference::DirectImage;
 use wake_physics::sar::{AzimuthResolution, Imaging, Sources};
 use wake_physics::waves::Quantity;
 

@@ -6,8 +6,8 @@ use super::surface::{TRANSFER, spectrum, wake};
 use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use wake_physics::surface::Surface;
 use wake_physics::swell::Swell;
-use wake_physics::waves::{PlaneWaves, Quantity, harmonic_sum, matrix_product};
-use wake_physics::{Field, Raster, nufft};
+use wake_physics::waves::{PlaneWaves, Quantity, harmonic_sum};
+use wake_physics::{Field, Raster, reference};
 
 /// Waves of sea and wake: the paper's scale.
 const WAVES: usize = 10_000;
@@ -45,7 +45,7 @@ pub(crate) fn swell(raster: &Raster, tolerance: f64) -> Row {
             std::f64::consts::PI / raster.spacing,
         )
     };
-    let fast = || nufft::synthesize(&draw(), &TRANSFER, &QUANTITIES, raster, tolerance);
+    let fast = || reference::synthesize(&draw(), &TRANSFER, &QUANTITIES, raster, tolerance);
     sum("swell", raster, tolerance, &draw(), fast)
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn kelvin(raster: &Raster, tolerance: f64) -> Row {
     let waves = wake.waves(&wake.plan(raster, tolerance)).strongest(WAVES);
     let fast = || {
         let waves = wake.waves(&wake.plan(raster, tolerance)).strongest(WAVES);
-        nufft::synthesize(&waves, &TRANSFER, &QUANTITIES, raster, tolerance)
+        reference::synthesize(&waves, &TRANSFER, &QUANTITIES, raster, tolerance)
     };
     sum("kelvin", raster, tolerance, &waves, fast)
 }
@@ -98,6 +98,6 @@ fn product(raster: &Raster, waves: &PlaneWaves) -> (f64, Vec<Field>) {
     let rows = if whole { raster.rows } else { PRODUCT_ROWS };
     let part = Raster { rows, ..*raster };
     let (seconds, fields) =
-        median_seconds(1, || matrix_product(waves, &TRANSFER, &QUANTITIES, &part));
+        median_seconds(1, || reference::matrix_product(waves, &TRANSFER, &QUANTITIES, &part));
     (seconds * raster.rows as f64 / rows as f64, fields)
 }

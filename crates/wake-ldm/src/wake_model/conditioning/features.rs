@@ -112,9 +112,9 @@ pub fn features(scene: &Scene) -> Vec<f32> {
         (Some(radar.incidence), ANY_INCIDENCE),
         (Some(log(radar.frequency)), LOG_FREQUENCY),
         (Some(radar.range_to_velocity), RANGE_TO_VELOCITY),
-        (Some(log(radar.resolution)), LOG_SIZE),
+        (Some(log(radar.azimuth_resolution)), LOG_SIZE),
         (radar.range_resolution.map(log), LOG_SIZE),
-        (radar.noise_floor, NOISE),
+        (radar.nesz, NOISE),
         (Some(log(spacing)), LOG_SIZE),
     ] {
         push_number(&mut out, value, range);

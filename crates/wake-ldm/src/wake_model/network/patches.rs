@@ -241,7 +241,7 @@ mod tests {
     use super::*;
     use wake_nn::noise::NoiseSource;
     use wake_physics::Field;
-    use wake_physics::measure::seams;
+    use wake_physics::reference::seams;
 
     /// Waves of two directions: two components hold almost all of it.
     fn images() -> Vec<Vec<f32>> {

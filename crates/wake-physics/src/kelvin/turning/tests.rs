@@ -32,7 +32,7 @@ fn elevation(wake: &KelvinWake, pixels: &[[usize; 2]]) -> Vec<f64> {
         depth: wake.depth,
         incidence: 0.5,
         relaxation_rate: 1.0,
-        steepness: 4.5,
+        action_slope: 4.5,
     };
     let waves = wake.waves(&wake.plan(&raster(), 1e-3));
     assert!(waves.len() > 100);
@@ -179,7 +179,7 @@ fn bessel_functions_are_those_of_the_library() {
 
 #[test]
 fn the_window_is_the_transform_of_its_steps() {
-    let rule = crate::quadrature::GaussLegendre::new(64);
+    let rule = crate::numeric::GaussLegendre::new(64);
     for q in [0.0, 0.1, 0.6, 0.7, 3.0, 40.0] {
         let sum = rule.integrate([-0.5, 0.5], |t| {
             let s = t + 0.5;

@@ -17,10 +17,10 @@
 //!
 //! Alpers and Rufenach (1979), IEEE Trans. Antennas Propag. 27; Hasselmann et al. (1985), J. Geophys. Res. 90.
 
+use crate::numeric::vectorized;
 use crate::raster::{Field, Raster};
 use crate::sar::imaging::{Imaging, Response, SMALLEST_VARIANCE, Sources, largest};
 use crate::sar::spread::{LANES, Steps, gaussian};
-use crate::vectorize::vectorized;
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 use std::f64::consts::LOG2_E;

@@ -1,11 +1,28 @@
 //! A few thousand waves that stand for the resolved sea and wake.
 
 use crate::dispersion::angular_frequency;
-use crate::modulation::WaveSample;
 use crate::swell::Swell;
 use crate::waves::PlaneWaves;
 use crate::wind_sea::DirectionalSpectrum;
+use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
+
+/// One wave, or a bin of waves, with the variance it brings to the elevation in the image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct WaveSample {
+    /// Wavenumber (kx, ky) [rad/m].
+    pub(crate) k: [f64; 2],
+    /// Angular frequency [rad/s].
+    pub(crate) omega: f64,
+    /// Mean square elevation \[m²\].
+    pub(crate) variance: f64,
+}
+
+impl AsRef<Self> for WaveSample {
+    fn as_ref(&self) -> &Self {
+        self
+    }
+}
 
 /// Steps in ln k and in direction of the polar grid of the sea.
 const STEPS: [usize; 2] = [64, 36];
@@ -91,6 +108,15 @@ pub(crate) fn wake(
         .collect()
 }
 
+/// Root of the mean square of a linear quantity over independent waves.
+pub(crate) fn rms<W: AsRef<WaveSample>>(waves: &[W], factor: impl Fn(&W) -> Complex64) -> f64 {
+    waves
+        .iter()
+        .map(|w| w.as_ref().variance * factor(w).norm_sqr())
+        .sum::<f64>()
+        .sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -142,7 +168,7 @@ mod tests {
             depth: f64::INFINITY,
             incidence: 0.5,
             relaxation_rate: 1.0,
-            steepness: 4.5,
+            action_slope: 4.5,
         };
         let raster = Raster::image(401, 1, 0.5);
         let pixels: Vec<[usize; 2]> = (0..401).map(|i| [i, 0]).collect();

@@ -1,57 +1,41 @@
 //! Modulation transfer functions: how strongly each wave modulates the image, to first order in its height.
 //!
-//! By them the plan weighs terms, and the open sea has its spectrum; they never make the image of a scene.
+//! A plan weighs terms by these functions, and the spectrum of open sea follows from them; they never make the image of a scene.
 
 use crate::waves::{Quantity, Transfer};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
-/// One wave, or a bin of waves, with the variance it brings to the elevation in the image.
+/// Modulation transfer function of a radar and a sea, linearised about the calm surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct WaveSample {
-    /// Wavenumber (kx, ky) [rad/m].
-    pub(crate) k: [f64; 2],
-    /// Angular frequency [rad/s].
-    pub(crate) omega: f64,
-    /// Mean square elevation \[m²\].
-    pub(crate) variance: f64,
-}
-
-impl AsRef<Self> for WaveSample {
-    fn as_ref(&self) -> &Self {
-        self
-    }
-}
-
-/// What the intensity of one pixel depends on, linearised about the calm surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ModulationTransfer {
+pub struct ModulationTransfer {
     /// Orbital motion and modulation of a wave.
-    pub(crate) transfer: Transfer,
+    pub transfer: Transfer,
     /// ∂ln σ⁰/∂slope along x and y.
-    pub(crate) tilt: [f64; 2],
+    pub tilt: [f64; 2],
     /// Share of the Bragg return in σ⁰, 0 to 1.
-    pub(crate) bragg_share: f64,
+    pub bragg_share: f64,
     /// R/V \[s\].
-    pub(crate) range_to_velocity: f64,
+    pub range_to_velocity: f64,
 }
 
 /// Relative modulation of the intensity by a wave of unit height, effect by effect [1/m].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Modulation {
+pub struct Modulation {
     /// Slopes turn facets toward the radar.
-    pub(crate) tilt: Complex64,
+    pub tilt: Complex64,
     /// Currents modulate the Bragg waves.
-    pub(crate) hydrodynamic: Complex64,
+    pub hydrodynamic: Complex64,
     /// Layover compresses what rises away from the radar.
-    pub(crate) range_bunching: Complex64,
+    pub range_bunching: Complex64,
     /// Velocities gather and spread echoes in azimuth.
-    pub(crate) bunching: Complex64,
+    pub bunching: Complex64,
 }
 
 impl Modulation {
     /// All effects together.
-    pub(crate) fn total(&self) -> Complex64 {
+    #[must_use]
+    pub fn total(&self) -> Complex64 {
         self.tilt + self.hydrodynamic + self.range_bunching + self.bunching
     }
 }
@@ -66,7 +50,8 @@ impl ModulationTransfer {
     /// # References
     ///
     /// Alpers, Ross and Rufenach (1981), J. Geophys. Res. 86(C7), 6481.
-    pub(crate) fn at(&self, k: [f64; 2], omega: f64) -> Modulation {
+    #[must_use]
+    pub fn at(&self, k: [f64; 2], omega: f64) -> Modulation {
         let i = Complex64::i();
         let hydrodynamic = self.transfer.factor(Quantity::Hydrodynamic, k, omega);
         let radial = self.transfer.radial(k, omega);
@@ -80,17 +65,9 @@ impl ModulationTransfer {
 }
 
 /// Factor by which a Gaussian exp(−(πy/ρ)²) of azimuth resolution ρ damps a wave: exp(−(kyρ/2π)²).
-pub(crate) fn smear(ky: f64, resolution: f64) -> f64 {
+#[must_use]
+pub fn smear(ky: f64, resolution: f64) -> f64 {
     (-(ky * resolution / (2.0 * PI)).powi(2)).exp()
-}
-
-/// Root of the mean square of a linear quantity over independent waves.
-pub(crate) fn rms<W: AsRef<WaveSample>>(waves: &[W], factor: impl Fn(&W) -> Complex64) -> f64 {
-    waves
-        .iter()
-        .map(|w| w.as_ref().variance * factor(w).norm_sqr())
-        .sum::<f64>()
-        .sqrt()
 }
 
 #[cfg(test)]
@@ -103,7 +80,7 @@ mod tests {
                 depth: f64::INFINITY,
                 incidence: 0.6,
                 relaxation_rate: 1.0,
-                steepness: 4.5,
+                action_slope: 4.5,
             },
             tilt: [5.0, 0.0],
             bragg_share: 1.0,

@@ -1,6 +1,73 @@
-//! What the numerical methods reached of the accuracy they were asked for.
+//! What a run took and reached: seconds by stage, and the accuracy of the numerical methods.
 
 use serde::Serialize;
+use std::time::Instant;
+
+/// Wall-clock seconds by stage.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[expect(missing_docs, reason = "the stages' names")]
+pub struct Seconds {
+    pub plan: f64,
+    pub sea: f64,
+    pub kelvin: f64,
+    pub turbulent: f64,
+    pub backscatter: f64,
+    pub imaging: f64,
+    pub speckle: f64,
+    pub labels: f64,
+    /// All of it, without writing files.
+    pub total: f64,
+}
+
+impl std::fmt::Display for Seconds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let ms = |s: f64| 1e3 * s;
+        write!(
+            f,
+            "{:.1} ms: plan {:.1}, sea {:.1}, kelvin {:.1}, turbulent {:.1}, backscatter {:.1}, imaging {:.1}, speckle {:.1}, labels {:.1}",
+            ms(self.total),
+            ms(self.plan),
+            ms(self.sea),
+            ms(self.kelvin),
+            ms(self.turbulent),
+            ms(self.backscatter),
+            ms(self.imaging),
+            ms(self.speckle),
+            ms(self.labels)
+        )
+    }
+}
+
+/// Laps since a start, gathered by stage.
+pub(super) struct Clock {
+    start: Instant,
+    lap: Instant,
+    pub(super) seconds: Seconds,
+}
+
+impl Clock {
+    pub(super) fn start() -> Self {
+        let now = Instant::now();
+        Self {
+            start: now,
+            lap: now,
+            seconds: Seconds::default(),
+        }
+    }
+
+    /// Adds the time since the last lap to a stage.
+    pub(super) fn lap(&mut self, stage: impl FnOnce(&mut Seconds) -> &mut f64) {
+        let now = Instant::now();
+        *stage(&mut self.seconds) += (now - self.lap).as_secs_f64();
+        self.lap = now;
+    }
+
+    /// Seconds by stage, and since the start.
+    pub(super) fn stop(mut self) -> Seconds {
+        self.seconds.total = self.start.elapsed().as_secs_f64();
+        self.seconds
+    }
+}
 
 /// An error asked for, and the one reached by the method's own bound or estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -34,7 +101,7 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// What two parts of a scene reached together: the worse of both.
-    pub(crate) fn and(&self, other: &Self) -> Self {
+    pub(super) fn and(&self, other: &Self) -> Self {
         let worse = |a: Option<Reached>, b: Option<Reached>| match (a, b) {
             (Some(a), Some(b)) if b.reached <= a.reached => Some(a),
             (a, None) => a,

@@ -1,13 +1,12 @@
-//! The linear fields of the surface: which a scene needs, and their values.
+//! The fields of a scene while it is drawn, and which of them its image needs.
 
-use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::scene::Term;
 use crate::waves::Quantity;
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
-/// The fields that are results.
+/// The linear fields that are results.
 const OUTPUTS: [Quantity; 6] = [
     Quantity::Elevation,
     Quantity::SlopeX,
@@ -19,7 +18,7 @@ const OUTPUTS: [Quantity; 6] = [
 
 /// Which fields a caller asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wanted {
+pub(crate) enum Wanted {
     /// The image, and what it is made of.
     Image,
     /// All results.
@@ -27,22 +26,18 @@ pub(super) enum Wanted {
 }
 
 /// The linear fields to be computed: those that the image needs, and those that are wanted besides.
-pub(super) fn quantities(plan: &Plan, wanted: Wanted) -> [Vec<Quantity>; 2] {
+pub(crate) fn quantities(uses: impl Fn(Term) -> bool, wanted: Wanted) -> [Vec<Quantity>; 2] {
     let mut image = vec![Quantity::SlopeX, Quantity::SlopeY];
-    if plan.uses(Term::Bunching) {
+    if uses(Term::VelocityBunching) {
         image.extend([Quantity::VelocityX, Quantity::VelocityZ]);
     }
     let single = [
         (Term::RangeBunching, Quantity::Elevation),
-        (Term::Coherence, Quantity::RadialAcceleration),
+        (Term::AzimuthSmear, Quantity::RadialAcceleration),
         (Term::Hydrodynamic, Quantity::Hydrodynamic),
     ];
-    image.extend(
-        single
-            .iter()
-            .filter(|(term, _)| plan.uses(*term))
-            .map(|(_, q)| *q),
-    );
+    let single = single.iter().filter(|(term, _)| uses(*term));
+    image.extend(single.map(|(_, quantity)| *quantity));
     let mut rest = OUTPUTS.to_vec();
     rest.retain(|quantity| !image.contains(quantity));
     // Two fields share a transform: where one would stand alone, one more costs nothing.
@@ -55,29 +50,57 @@ pub(super) fn quantities(plan: &Plan, wanted: Wanted) -> [Vec<Quantity>; 2] {
     [image, rest]
 }
 
-/// Linear fields of the surface on the raster with its margin; those that nobody asks for have no pixel.
+/// Fields of a scene: of the surface on the computed pixels with their margin, or as an image; those that nobody asks for have
+/// no pixel.
 #[derive(Debug, Default)]
-pub(super) struct SurfaceFields {
+pub(crate) struct Fields {
     /// ζ \[m\].
-    pub(super) elevation: Field,
+    pub(crate) elevation: Field,
     /// ∂ζ/∂x \[1\].
-    pub(super) slope_x: Field,
+    pub(crate) slope_x: Field,
     /// ∂ζ/∂y \[1\].
-    pub(super) slope_y: Field,
+    pub(crate) slope_y: Field,
     /// Of the water along x [m/s].
-    pub(super) velocity_x: Field,
+    pub(crate) velocity_x: Field,
     /// Of the water along y [m/s].
-    pub(super) velocity_y: Field,
+    pub(crate) velocity_y: Field,
     /// Of the water upward [m/s].
-    pub(super) velocity_z: Field,
+    pub(crate) velocity_z: Field,
+    /// Velocity toward the radar [m/s].
+    pub(crate) radial_velocity: Field,
+    /// Cross-section per unit area.
+    pub(crate) sigma0: Field,
+    /// Intensity of the image before speckle.
+    pub(crate) intensity: Field,
     /// Acceleration toward the radar [m/s²].
-    pub(super) radial_acceleration: Field,
+    pub(crate) radial_acceleration: Field,
     /// Hydrodynamic modulation of the Bragg waves \[1\]; once all waves are in, the factor on their return.
-    pub(super) modulation: Field,
+    pub(crate) modulation: Field,
 }
 
-impl SurfaceFields {
-    pub(super) fn of(&mut self, quantity: Quantity) -> &mut Field {
+impl Fields {
+    /// Fields that are results besides the image: the first of [`Self::each`].
+    pub(crate) const RESULTS: usize = 8;
+
+    /// All fields.
+    pub(crate) fn each(&mut self) -> [&mut Field; 11] {
+        [
+            &mut self.elevation,
+            &mut self.slope_x,
+            &mut self.slope_y,
+            &mut self.velocity_x,
+            &mut self.velocity_y,
+            &mut self.velocity_z,
+            &mut self.radial_velocity,
+            &mut self.sigma0,
+            &mut self.intensity,
+            &mut self.radial_acceleration,
+            &mut self.modulation,
+        ]
+    }
+
+    /// The field of a quantity.
+    pub(crate) fn of(&mut self, quantity: Quantity) -> &mut Field {
         match quantity {
             Quantity::Elevation => &mut self.elevation,
             Quantity::SlopeX => &mut self.slope_x,
@@ -90,24 +113,26 @@ impl SurfaceFields {
         }
     }
 
-    /// Velocity toward the radar at the incidence θ \[rad\]; without pixels where nobody asked for the velocities.
-    pub(super) fn radial_velocity(
-        &self,
-        workspace: &mut Workspace,
-        raster: &Raster,
-        incidence: f64,
-    ) -> Field {
+    /// Puts the blocks of all fields back.
+    pub(crate) fn give_back(mut self, memory: &mut Workspace) {
+        for field in self.each() {
+            memory.give(std::mem::take(field));
+        }
+    }
+
+    /// Computes the velocity toward the radar at the incidence θ \[rad\], where the velocities are asked for.
+    pub(crate) fn project(&mut self, memory: &mut Workspace, raster: &Raster, incidence: f64) {
         let [vx, vz] = [&self.velocity_x, &self.velocity_z];
         if vx.values.is_empty() {
-            return Field::default();
+            return;
         }
         let (sin, cos) = (incidence.sin() as f32, incidence.cos() as f32);
-        let mut field = workspace.field(raster);
+        let mut field = memory.field(raster);
         let velocities = vx.values.par_iter().zip(&vz.values);
         let pixels = field.values.par_iter_mut().zip(velocities);
         pixels
             .with_min_len(1 << 14)
             .for_each(|(radial, (x, z))| *radial = z * cos - x * sin);
-        field
+        self.radial_velocity = field;
     }
 }

@@ -32,7 +32,7 @@ const RAYS: usize = 512;
 
 /// Waves of one ship between two wavenumbers.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct UnresolvedWaves {
+pub(crate) struct SubpixelWake {
     track: Track,
     length: f64,
     /// Angle between two rays \[rad\], and tangent of that of the outermost one.
@@ -82,7 +82,7 @@ impl Roughness {
 
 impl KelvinWake {
     /// The waves of a band of wavenumbers (`from`, `to`) [rad/m]; `None` where there are none.
-    pub(crate) fn unresolved(&self, [from, to]: [f64; 2]) -> Option<UnresolvedWaves> {
+    pub(crate) fn subpixel(&self, [from, to]: [f64; 2]) -> Option<SubpixelWake> {
         if self.speed <= 0.0 || from >= to {
             return None;
         }
@@ -122,7 +122,7 @@ impl KelvinWake {
             let of_ray = |(n, sum): (usize, Sum)| sum.on_ray(n, step, self.speed);
             sums.into_iter().enumerate().map(of_ray).collect()
         };
-        Some(UnresolvedWaves {
+        Some(SubpixelWake {
             track: self.track,
             length: self.hull.length(),
             step,
@@ -189,7 +189,7 @@ impl Sum {
     }
 }
 
-impl UnresolvedWaves {
+impl SubpixelWake {
     /// The variances at a place (x, y) \[m\], which fade over the hull as the waves do; `None` outside the rays.
     pub(crate) fn at(&self, place: [f64; 2]) -> Option<Roughness> {
         let [ahead, port] = self.track.seen_from_ship(place);
@@ -225,6 +225,11 @@ impl UnresolvedWaves {
     /// Tangent of the angle from the track to the outermost ray.
     pub(crate) fn widest(&self) -> f64 {
         self.widest
+    }
+
+    /// Length of the ship \[m\].
+    pub(crate) fn length(&self) -> f64 {
+        self.length
     }
 
     /// The track of the ship.
@@ -275,7 +280,7 @@ mod tests {
         let (wake, k) = (wake(), TAU / length);
         let steady = wake.steady_waves();
         let wave = steady.at(steady.last(k).unwrap());
-        let waves = wake.unresolved([0.7 * k, 1.3 * k]).unwrap();
+        let waves = wake.subpixel([0.7 * k, 1.3 * k]).unwrap();
         let ray = (angle(&wave) / waves.step) as usize;
         (wave, waves.branches[1][ray])
     }
@@ -342,7 +347,7 @@ mod tests {
         let nu = GRAVITY / 100.0;
         let cosines = [2.5, 2.5 + 3.0 * TAU / (nu * 195.0)];
         let ends = cosines.map(|c: f64| angle(&steady.at(c.acosh())));
-        let waves = wake.unresolved([0.3, 2.5]).unwrap();
+        let waves = wake.subpixel([0.3, 2.5]).unwrap();
         let middle = 0.5 * (ends[0] + ends[1]);
         // Port is −x of a ship along +y.
         let raster = Raster {
@@ -372,7 +377,7 @@ mod tests {
             depth: f64::INFINITY,
             incidence: 0.5,
             relaxation_rate: 1.0,
-            steepness: 4.5,
+            action_slope: 4.5,
         };
         let quantities = [
             Quantity::SlopeX,
@@ -404,7 +409,7 @@ mod tests {
 
     #[test]
     fn waves_break_end_with_the_rays_and_fade_over_the_hull() {
-        let waves = wake().unresolved([0.6, 50.0]).unwrap();
+        let waves = wake().subpixel([0.6, 50.0]).unwrap();
         let near = waves.at([-10.0, -150.0]).unwrap();
         let variance = near.slopes[0] + near.slopes[2];
         assert!((variance - LARGEST_SLOPE_VARIANCE).abs() < 1e-12);
@@ -422,11 +427,11 @@ mod tests {
         // Far astern viscosity leaves nothing of the shortest.
         let [mid, far] = [2e3, 6e3].map(|d| waves.at([-0.025 * d, -d]).unwrap().slopes[0]);
         assert!(mid > 0.0 && far < 0.1 * mid);
-        assert!(wake().unresolved([60.0, 50.0]).is_none());
+        assert!(wake().subpixel([60.0, 50.0]).is_none());
         let still = KelvinWake {
             speed: 0.0,
             ..wake()
         };
-        assert!(still.unresolved([0.6, 50.0]).is_none());
+        assert!(still.subpixel([0.6, 50.0]).is_none());
     }
 }

@@ -4,8 +4,8 @@ use super::waves;
 use crate::constants::SPEED_OF_LIGHT;
 use crate::dispersion::phase_speed;
 use crate::models::Models;
-use crate::modulation::ModulationTransfer;
 use crate::scattering::bragg;
+use crate::scattering::modulation::ModulationTransfer;
 use crate::scene::Scene;
 use crate::track::direction;
 use crate::turbulent::current::DRIFT_OF_WIND;
@@ -65,7 +65,7 @@ mod tests {
             ])
             .unwrap();
         let models = Models::new(&scene);
-        crate::survey::Survey::new(&scene, &models).mean_velocity(&scene, &models)
+        crate::linear::OpenSea::new(&models).mean_velocity(&scene, &models)
     }
 
     /// CDOP (Mouche et al., 2012, IEEE Trans. Geosci. Remote Sens. 50, 2901), a fit to measured Doppler shifts, evaluated.

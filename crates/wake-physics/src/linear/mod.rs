@@ -1,0 +1,137 @@
+//! First-order theory of a scene: what is known of its image before it is computed.
+//!
+//! A few thousand waves stand for sea and wakes ([`waves`], [`wake`]), transfer functions say how each modulates the image
+//! ([`modulation`](crate::scattering::modulation)), and [`amplitudes`] adds them up. By these figures the plan weighs terms and labels find what is visible; they
+//! never make the image of a scene.
+
+pub(crate) mod amplitudes;
+mod doppler;
+mod open_sea;
+mod wake;
+mod waves;
+
+pub(crate) use amplitudes::Amplitudes;
+pub(crate) use open_sea::{OpenSea, over_mean};
+pub(crate) use waves::WaveSample;
+
+use crate::models::Models;
+use crate::sar::AzimuthResolution;
+use crate::scattering::SlopeCovariance;
+use crate::scattering::modulation::ModulationTransfer;
+use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity};
+use open_sea::{bragg_share, slopes};
+use std::f64::consts::{PI, SQRT_2};
+use waves::rms;
+
+/// Standard deviations that the margin holds; beyond lie 7 in a million.
+const DEVIATIONS: f64 = 4.5;
+
+/// Mean square of the wake where it is over that in the whole image: the wedge covers about a quarter of it.
+const WEDGE: f64 = 4.0;
+
+/// First-order theory of a scene: its open sea and the waves of its ships.
+#[derive(Debug)]
+pub(crate) struct FirstOrder {
+    /// The sea without ships.
+    pub(crate) open: OpenSea,
+    /// Resolved waves of the wakes.
+    pub(crate) wake: Vec<WaveSample>,
+    /// Modulation of the image by waves.
+    pub(crate) modulation: ModulationTransfer,
+    /// Azimuth resolution of the sea in motion.
+    pub(crate) resolution: AzimuthResolution,
+    /// Mean σ⁰ over the image: Bragg and specular.
+    pub(crate) mean: [f64; 2],
+    /// Slopes of the resolved waves where the wake is.
+    pub(crate) resolved: SlopeCovariance,
+    /// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate \[1\].
+    pub(crate) modulation_variance: f64,
+    /// Size of a computed pixel \[m\].
+    pub(crate) spacing: f64,
+}
+
+impl FirstOrder {
+    pub(crate) fn new(models: &Models, open: OpenSea) -> Self {
+        let (mut wake, mut wake_slopes) = (Vec::new(), [SlopeCovariance::NONE; 2]);
+        for one in &models.wakes {
+            let (waves, crowding) = wake::sampled(one, &models.computed);
+            let over_image = slopes(&waves);
+            wake_slopes[0] = wake_slopes[0].plus(&over_image);
+            wake_slopes[1] = wake_slopes[1].plus(&over_image.times(crowding));
+            wake.extend(waves);
+        }
+        // Where the wake is, terms matter most; the mean is that of the whole image.
+        let [mean_slopes, resolved] = wake_slopes.map(|wake| open.slopes.plus(&wake));
+        let mean = match wake.is_empty() {
+            true => open.mean,
+            false => open.backscatter.mean_over(&mean_slopes),
+        };
+        Self {
+            modulation: ModulationTransfer {
+                bragg_share: bragg_share(mean),
+                ..open.modulation
+            },
+            resolution: models.resolution(),
+            mean,
+            resolved,
+            modulation_variance: modulation_variance(models),
+            spacing: models.computed.spacing,
+            wake,
+            open,
+        }
+    }
+
+    /// Mean σ⁰ \[1\].
+    pub(crate) fn mean_sigma0(&self) -> f64 {
+        self.mean[0] + self.mean[1]
+    }
+
+    /// A cross-section that is added to the image over the mean σ⁰; 1 where nothing scatters.
+    pub(crate) fn over_mean(&self, sigma0: f64) -> f64 {
+        over_mean(sigma0, self.mean)
+    }
+
+    /// Whether no wave is resolved.
+    pub(crate) fn is_flat(&self) -> bool {
+        self.open.waves.is_empty() && self.wake.is_empty()
+    }
+
+    /// Margin in rows and columns. It depends on the scene alone, not on the terms that are used: the same seed
+    /// draws the same sea whatever is left out.
+    pub(crate) fn margin(&self, models: &Models) -> [usize; 2] {
+        if self.is_flat() {
+            return [0, 0];
+        }
+        let transfer = &self.modulation.transfer;
+        let velocity = self.deviation(|w| transfer.radial(w.k, w.omega));
+        let elevation = self.deviation(|w| transfer.factor(Quantity::Elevation, w.k, w.omega));
+        let width = self.resolution.at(self.acceleration()) / (SQRT_2 * PI);
+        let azimuth = (models.range_to_velocity * velocity).hypot(width);
+        let range = elevation / models.incidence.tan();
+        [azimuth, range].map(|d| (DEVIATIONS * d / models.computed.spacing).ceil() as usize + 1)
+    }
+
+    /// Standard deviation of the acceleration toward the radar, where the wake is [m/s²].
+    pub(crate) fn acceleration(&self) -> f64 {
+        let transfer = &self.modulation.transfer;
+        self.deviation(|w| transfer.factor(Quantity::RadialAcceleration, w.k, w.omega))
+    }
+
+    /// Standard deviation of a linear field, where the wake is.
+    fn deviation(&self, factor: impl Fn(&WaveSample) -> num_complex::Complex64) -> f64 {
+        rms(&self.open.waves, &factor).hypot(WEDGE.sqrt() * rms(&self.wake, &factor))
+    }
+}
+
+/// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate \[1\].
+fn modulation_variance(models: &Models) -> f64 {
+    let band = models
+        .computed
+        .nyquist_wavenumber()
+        .min(LARGEST_MODULATING_WAVENUMBER);
+    let factor = |w: &WaveSample| {
+        let transfer = &models.transfer;
+        transfer.factor(Quantity::Hydrodynamic, w.k, w.omega)
+    };
+    rms(&waves::sea(&models.sea, band), factor).powi(2)
+}

@@ -1,0 +1,9 @@
+//! Numerical methods that know nothing of the sea: roots and extrema, quadrature, functions in vector instructions.
+
+mod quadrature;
+mod search;
+pub(crate) mod vector;
+
+pub(crate) use quadrature::{GaussLegendre, largest_phase};
+pub(crate) use search::{largest, root, smallest_at};
+pub(crate) use vector::vectorized;

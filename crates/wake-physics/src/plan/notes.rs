@@ -1,0 +1,46 @@
+//! What a user should know about a scene, in words.
+
+use crate::models::Models;
+use crate::scene::Scene;
+
+/// Computed pixels along a side of one of the image above which an impulse response costs more than it shows: chosen.
+const COARSE_PIXEL: f64 = 8.0;
+
+/// What a user should know.
+pub(super) fn notes(scene: &Scene, models: &Models) -> Vec<String> {
+    let mut notes = Vec::new();
+    if models.short_waves_vanish() {
+        notes.push(format!(
+            "a wind of {} m/s raises no short waves at this incidence: the image is specular only, or dark",
+            scene.sea.wind_speed
+        ));
+    }
+    if let Some(asked) = models.asked_spacing {
+        notes.push(format!(
+            "waves on the arms of a wake ask for pixels of {asked:.2} m; {} m are computed: shorter waves count by the \
+             variances of their slopes and velocities where an impulse response is asked for, else not",
+            models.computed.spacing
+        ));
+    }
+    let spacing = models.image.spacing;
+    let divisions = (spacing / models.computed.spacing).round();
+    if let Some(response) = models.response.filter(|_| divisions > COARSE_PIXEL) {
+        let [range, azimuth] = [response.range, response.azimuth].map(|axis| axis.resolution);
+        notes.push(format!(
+            "a pixel of {spacing} m takes {divisions} x {divisions} computed ones, for the radar resolves {range:.1} x {azimuth:.1} m: for an image \
+             averaged to such pixels set radar.range_resolution and radar.azimuth_resolution to what that image resolves"
+        ));
+    }
+    let count = models.wakes.len();
+    for (n, wake) in models.wakes.iter().enumerate() {
+        let wavelength = wake.transverse_wavelength();
+        if wake.speed > 0.0 && 2.0 * models.computed.spacing > wavelength {
+            notes.push(format!(
+                "the transverse waves of the {} are {wavelength:.2} m long: a pixel of {} m carries none of them",
+                Scene::ship_name(n, count),
+                models.computed.spacing
+            ));
+        }
+    }
+    notes
+}

@@ -1,0 +1,16 @@
+//! Slow references, strong baselines and helpers of tests and benches; simulating a scene needs none of them.
+//!
+//! | item | compares with |
+//! | --- | --- |
+//! | [`direct_quadrature`] | waves of a ship by the sum of plane waves |
+//! | [`matrix_product`], [`synthesize`] | [`harmonic_sum`](crate::waves::harmonic_sum): the same sum as a matrix product, and by non-uniform FFTs |
+//! | [`DirectImage`] | the fast image of moving pixels |
+//! | [`seams`] | images that are put together from squares |
+//! | [`paper_grid`] | the scenes of the paper this project starts from |
+
+pub use crate::kelvin::direct::direct_quadrature;
+pub use crate::measure::shape::seams;
+pub use crate::nufft::synthesize;
+pub use crate::sar::direct::DirectImage;
+pub use crate::scene::paper::paper_grid;
+pub use crate::waves::matrix_product::matrix_product;
