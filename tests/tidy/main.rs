@@ -17,7 +17,7 @@ use imports::{Crate, Names};
 use picture::Column;
 
 /// The crates, in the order in which they import each other.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 11] = [
     "whole-files",
     "wake-physics",
     "wake-text",

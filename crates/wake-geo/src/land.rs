@@ -193,10 +193,11 @@ impl Land {
                 let (a, b) = edge;
                 let row = |latitude: f64| ((latitude - south) / CELL).ceil().max(0.0) as usize;
                 let [low, high] = [a[1].min(b[1]), a[1].max(b[1])];
-                for row in row(low)..row(high).min(mask.size[1]) {
+                let (first, end) = (row(low), row(high).min(mask.size[1]));
+                for (row, crossings) in crossings.iter_mut().enumerate().take(end).skip(first) {
                     let latitude = south + row as f64 * CELL;
                     let t = (latitude - a[1]) / (b[1] - a[1]);
-                    crossings[row].push(a[0] + t * (b[0] - a[0]));
+                    crossings.push(a[0] + t * (b[0] - a[0]));
                 }
             }
         }

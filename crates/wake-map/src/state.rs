@@ -49,7 +49,7 @@ impl State {
         let mut lines = text
             .split_inclusive('\n')
             .filter(|line| line.ends_with('\n'));
-        let mut done = BTreeMap::new();
+        let mut done: BTreeMap<usize, Vec<Detection>> = BTreeMap::new();
         if let Some(first) = lines.next() {
             let found: Value = serde_json::from_str(first).unwrap_or(Value::Null);
             if found != *identity {

@@ -45,7 +45,7 @@ fn made(ships: &[ShipAt], options: &Options) -> (tempfile::TempDir, Product, Pat
     let folder = tempfile::tempdir().unwrap();
     let mut lines = 0;
     let written = simulate(&template(), ships, options, folder.path(), &mut |n| {
-        lines += n
+        lines += n;
     })
     .unwrap();
     assert_eq!(lines, options.lines.as_ref().unwrap().len());
@@ -166,7 +166,7 @@ fn blocks_leave_no_seams() {
 fn what_cannot_be_simulated_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("new");
-    let mut refused = |options: &Options| {
+    let refused = |options: &Options| {
         let result = simulate(&template(), &[], options, &out, &mut |_| ());
         result.unwrap_err().to_string()
     };

@@ -48,7 +48,7 @@ pub(crate) fn opened(path: &Path, arguments: &ProductArguments) -> Outcome<Optio
     let is_product = path.is_dir() && (has("annotation") || has("manifest.safe"))
         || path.file_name().is_some_and(|name| name == "manifest.safe")
         || matches!(ending.as_deref(), Some("zip" | "safe"));
-    if !is_product && !(is_tiff && path.is_file()) {
+    if !(is_product || is_tiff && path.is_file()) {
         return Ok(None);
     }
     let product = match arguments.polarization {

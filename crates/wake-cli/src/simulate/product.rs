@@ -89,7 +89,7 @@ pub(crate) fn run(
     let lines = options.lines.as_ref().map_or(product.size().0, Range::len);
     let bar = progress::bar(lines as u64, "lines");
     let written = simulate(&product, &ships, &options, out, &mut |lines| {
-        bar.inc(lines as u64)
+        bar.inc(lines as u64);
     });
     bar.finish_and_clear();
     let written = written?;
