@@ -6,7 +6,7 @@ use wake_geo::Product;
 
 use crate::echo::{Echo, echo};
 use crate::error::Result;
-use crate::profile::{Kind, profile};
+use crate::profile::{Contrast, Kind, Surroundings};
 
 /// A wake with all that is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -56,14 +56,18 @@ pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>>
 }
 
 fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
-    let wake = &one.wake;
+    let surroundings = Surroundings::of(product, &one.wake);
+    let (wake, measured) = match &surroundings {
+        Some(pixels) => pixels.refined(&one.wake),
+        None => (one.wake, None),
+    };
+    let wake = &wake;
     let (lines, pixels) = product.size();
     let inside = |[x, y]: [f32; 2]| {
         let clamped = |value: f32, size: usize| f64::from(value).clamp(-0.5, size as f64 - 0.5);
         (clamped(y, lines), clamped(x, pixels))
     };
     let (tip, end) = (inside(wake.tip), inside(wake.at(wake.length)));
-    let measured = profile(product, wake);
     let mut mapped = MappedWake {
         score: f64::from(one.score),
         sure: one.score >= Detector::OPERATING_POINT,
@@ -76,8 +80,8 @@ fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
         end_px: wake.at(wake.length).map(f64::from),
         length_px: f64::from(wake.length),
         half_angle: f64::from(wake.half_angle_deg),
-        contrast_db: measured.map(|(db, _)| db),
-        kind: measured.map(|(_, kind)| kind),
+        contrast_db: measured.map(Contrast::decibel),
+        kind: measured.map(Contrast::kind),
         incidence: None,
         time: None,
         echo: echo(product, wake),

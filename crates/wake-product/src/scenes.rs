@@ -18,8 +18,11 @@ pub struct Wind {
     pub toward: f64,
 }
 
-/// Ships farther than this from a block leave no wake in it \[m\].
-const REACH: f64 = 30_000.0;
+/// Ships farther than this from a block leave no wake in it that could be seen \[m\].
+const REACH: f64 = 12_000.0;
+
+/// Accuracy of the scenes, as in data sets for detectors: speckle of a few looks hides what is finer.
+const TOLERANCE: f64 = 0.02;
 
 /// Everything that the scenes of the blocks are made from.
 #[derive(Debug)]
@@ -45,7 +48,9 @@ impl<'a> Scenes<'a> {
             "radar.polarization={}",
             sentinel.annotation().polarization.name()
         );
-        let mut assignments = vec![format!("radar.sensor={sensor}"), polarization];
+        // A change comes last, so that it may ask for more.
+        let accuracy = format!("model.tolerance={TOLERANCE}");
+        let mut assignments = vec![format!("radar.sensor={sensor}"), polarization, accuracy];
         assignments.extend_from_slice(changes);
         let mut base = Scene::default().with_assignments(&assignments)?;
         base.ships.clear();

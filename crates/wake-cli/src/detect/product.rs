@@ -38,7 +38,7 @@ pub(crate) struct ProductArguments {
 }
 
 /// Longest side of the quick-look \[pixels\].
-const LONGEST: usize = 2400;
+const LONGEST: usize = 1600;
 
 /// The product behind a path: a `.SAFE` folder, a `.zip`, or a TIFF with places or of 32-bit numbers; `None` for other images.
 pub(crate) fn opened(path: &Path, arguments: &ProductArguments) -> Outcome<Option<Product>> {
