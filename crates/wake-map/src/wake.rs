@@ -57,11 +57,12 @@ pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>>
 
 fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
     let surroundings = Surroundings::of(product, &one.wake);
-    let (wake, measured) = match &surroundings {
+    // The detector sees the wake as a whole, and knows its direction best; where the line lies beside the ship, pixels do.
+    let (line, measured) = match &surroundings {
         Some(pixels) => pixels.refined(&one.wake),
         None => (one.wake, None),
     };
-    let wake = &wake;
+    let wake = &one.wake;
     let (lines, pixels) = product.size();
     let inside = |[x, y]: [f32; 2]| {
         let clamped = |value: f32, size: usize| f64::from(value).clamp(-0.5, size as f64 - 0.5);
@@ -84,7 +85,7 @@ fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
         kind: measured.map(Contrast::kind),
         incidence: None,
         time: None,
-        echo: echo(product, wake),
+        echo: echo(product, &line),
     };
     if product.has_places() {
         let [from, to] = [product.place(tip.0, tip.1)?, product.place(end.0, end.1)?];
