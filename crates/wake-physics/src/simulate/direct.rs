@@ -4,10 +4,10 @@ use super::record::{Clock, Seconds};
 use super::simulation::Method;
 use super::stages::{Stages, sea_of};
 use super::strips::Strip;
-use crate::computed::Parts;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, Wanted};
 use crate::kelvin::fade_at;
+use crate::pixels::Parts;
 use crate::prepared::Prepared;
 use crate::raster::Field;
 use crate::sar::direct::{DirectImage, reaching};
@@ -66,10 +66,10 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
     }
     let strip = Strip::whole(&prepared);
     let stages = Stages::new(&prepared, Method::Fast, Wanted::Image, &strip);
-    if !models.is_refined() {
+    if !models.pixels.are_refined() {
         return Ok(stages.direct_intensity(pixels));
     }
-    let parts = Parts::new(&models.computed, &models.image);
+    let parts = Parts::new(&models.pixels.computed, &models.pixels.image);
     let fine: Vec<[usize; 2]> = pixels.iter().flat_map(|&pixel| parts.of(pixel)).collect();
     let mut direct = stages.direct_intensity(&fine);
     let pixels = direct.intensity.chunks(parts.count());
