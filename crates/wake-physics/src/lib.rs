@@ -32,7 +32,7 @@
 //! | the ship | [`hull`], [`kelvin`], [`turbulent`] |
 //! | the radar | [`permittivity`], [`scattering`], [`sar`], [`gusts`], [`slicks`] |
 //! | the image | [`grey`], [`labels`], [`picture`], [`measure`] |
-//! | tests and benches | [`reference`] |
+//! | tests and benches | [`reference`](mod@reference) |
 //!
 //! # Axes and units
 //!
@@ -84,8 +84,7 @@ pub mod sar;
 pub mod gusts;
 pub mod slicks;
 pub mod grey;
-mod wakes;
-mod computed;
+mod pixels;
 mod fields;
 mod models;
 mod linear;

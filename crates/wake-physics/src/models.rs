@@ -1,33 +1,35 @@
 //! The models of a scene: sea, wake, backscatter and radar, with the scene's numbers in the units of formulas.
 
-use crate::computed::Computed;
 use crate::constants::SPEED_OF_LIGHT;
+use crate::hull::Hull;
 use crate::kelvin::KelvinWake;
 use crate::permittivity;
-use crate::raster::Raster;
+use crate::pixels::Pixels;
 use crate::sar::impulse::Axis;
 use crate::sar::{AzimuthResolution, ImpulseResponse};
 use crate::scattering::hydrodynamic::{action_slope, relaxation_rate};
 use crate::scattering::{Backscatter, SlopeCovariance, Specular, TwoScale, bragg};
-use crate::scene::{Radar, Scene, Term};
+use crate::scene::{HullForm, Radar, Scene, Ship, Term};
 use crate::spectrum::elfouhaily::{DragLaw, Elfouhaily, friction_velocity};
 use crate::swell::Swell;
-use crate::wakes::kelvin_wake;
+use crate::track::Track;
 use crate::waves::Transfer;
 use crate::wind_sea::{DirectionalSpectrum, WindSea};
 use crate::window::Window;
 use num_complex::Complex64;
 use std::f64::consts::{PI, SQRT_2, TAU};
 
+/// Block coefficient of the full hull where the scene names none: a laden tanker.
+const TANKER_BLOCK_COEFFICIENT: f64 = 0.8;
+
+/// Farthest coordinate of a ship \[m\]: squares and areas of what lies farther overflow. No image is anywhere near.
+const FARTHEST: f64 = 1e100;
+
 /// The models of a valid scene.
 #[derive(Debug, Clone)]
 pub(crate) struct Models {
-    /// Pixels that are computed: those of the image or finer ones, and the guard of an impulse response.
-    pub(crate) computed: Raster,
-    /// Pixels of the image.
-    pub(crate) image: Raster,
-    /// Spacing that the waves of a ship ask for \[m\], where what is computed is coarser.
-    pub(crate) asked_spacing: Option<f64>,
+    /// Pixels of the image, and those that are computed.
+    pub(crate) pixels: Pixels,
     /// Impulse response in range and azimuth, if the scene asks for one.
     pub(crate) response: Option<ImpulseResponse>,
     /// Incidence angle \[rad\].
@@ -66,7 +68,6 @@ pub(crate) struct SubpixelVariance {
 impl Models {
     pub(crate) fn new(scene: &Scene) -> Self {
         let sea = wind_sea(scene);
-        let image = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
         let response = response(scene);
         let spectrum = DirectionalSpectrum::new(&sea);
         // Whatever spectrum the resolved waves have, the short ones are Elfouhaily's.
@@ -79,8 +80,7 @@ impl Models {
         let relaxation_rate = relaxation(scene);
         let kelvin = |ship| kelvin_wake(ship, scene.sea.depth, scene.sea.time);
         let wakes: Vec<KelvinWake> = scene.ships.iter().map(kelvin).collect();
-        let chosen = Computed::new(&scene.grid, &image, response.as_ref(), &wakes);
-        let computed = chosen.raster;
+        let pixels = Pixels::new(&scene.grid, response.as_ref(), &wakes);
         let incidence = scene.radar.incidence.to_radians();
         let permittivity = permittivity::sea_water(
             scene.radar.frequency,
@@ -99,10 +99,13 @@ impl Models {
             spectrum: crate::scene::SpectrumModel::Elfouhaily,
             ..sea
         })
-        .moments(computed.nyquist_wavenumber(), f64::INFINITY, incidence);
+        .moments(
+            pixels.computed.nyquist_wavenumber(),
+            f64::INFINITY,
+            incidence,
+        );
         Self {
-            image,
-            asked_spacing: chosen.asked,
+            pixels,
             response,
             swell: swell(scene),
             incidence,
@@ -123,19 +126,13 @@ impl Models {
                 averaged_slopes: SlopeCovariance::NONE,
                 velocity: subpixel.radial_velocity.sqrt(),
             },
-            computed,
         }
     }
 
     /// Wavenumbers of the ships' waves that the pixels do not carry and that tilt shorter ones [rad/m].
     pub(crate) fn subpixel_band(&self) -> [f64; 2] {
         let split = self.two_scale.split_wavenumber();
-        [self.computed.nyquist_wavenumber(), split]
-    }
-
-    /// Whether what is computed are not the pixels of the image.
-    pub(crate) fn is_refined(&self) -> bool {
-        self.computed != self.image
+        [self.pixels.computed.nyquist_wavenumber(), split]
     }
 
     /// Averages over resolved waves too, as if a pixel held them.
@@ -151,7 +148,7 @@ impl Models {
     /// σ⁰ of facets, with or without the average over subpixel slopes and the specular return.
     pub(crate) fn backscatter(&self, tilt_average: bool, specular: bool) -> Backscatter {
         let subpixel = self.subpixel_slopes();
-        let lobe = Specular::mirror_lobe(self.radar_wavenumber(), self.computed.spacing);
+        let lobe = Specular::mirror_lobe(self.radar_wavenumber(), self.pixels.computed.spacing);
         Backscatter {
             two_scale: self.two_scale.clone(),
             tilt: if tilt_average {
@@ -171,7 +168,7 @@ impl Models {
     pub(crate) fn subpixel_slopes(&self) -> SlopeCovariance {
         let short = self
             .two_scale
-            .slopes_from(self.computed.nyquist_wavenumber());
+            .slopes_from(self.pixels.computed.nyquist_wavenumber());
         short.plus(&self.subpixel.averaged_slopes)
     }
 
@@ -229,6 +226,29 @@ impl Models {
     /// Wavenumber of the radar `k_e` [rad/m].
     fn radar_wavenumber(&self) -> f64 {
         TAU / self.wavelength
+    }
+}
+
+/// The Kelvin wake of a ship.
+fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
+    let (length, beam, draft) = (ship.length, ship.beam, ship.draft);
+    KelvinWake {
+        hull: match ship.hull {
+            HullForm::Wigley => Hull::wigley(length, beam, draft),
+            HullForm::Full => {
+                let block = ship.block_coefficient.unwrap_or(TANKER_BLOCK_COEFFICIENT);
+                Hull::full(length, beam, draft, block)
+            }
+        },
+        speed: ship.speed,
+        track: Track::turning(
+            ship.position.map(|at| at.clamp(-FARTHEST, FARTHEST)),
+            ship.heading,
+            ship.speed * time,
+            ship.curvature(),
+        ),
+        depth,
+        filter_depth: ship.filter_depth,
     }
 }
 

@@ -43,7 +43,7 @@ impl<'a> Prepared<'a> {
     /// The computed pixels with their margin.
     pub(crate) fn with_margin(&self) -> Raster {
         let [rows, columns] = self.plan.sizes.margin;
-        self.models.computed.with_margin(rows, columns)
+        self.models.pixels.computed.with_margin(rows, columns)
     }
 
     /// The labels of the scene.

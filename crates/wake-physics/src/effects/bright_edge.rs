@@ -61,8 +61,8 @@ impl BrightEdges {
                 to_port(seen)[0] * models.incidence.sin() * edge.velocity(seen)
             };
             [
-                rms_over(&models.computed, change),
-                rms_over(&models.computed, velocity),
+                rms_over(&models.pixels.computed, change),
+                rms_over(&models.pixels.computed, velocity),
             ]
         };
         // Where wakes cross their changes add, at most.

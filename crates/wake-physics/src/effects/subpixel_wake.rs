@@ -65,15 +65,15 @@ impl SubpixelWakes {
                 .sum()
         };
         let narrow = models.resolution().at(0.0) / (SQRT_2 * PI);
-        let width = models.computed.spacing.hypot(narrow);
+        let width = models.pixels.computed.spacing.hypot(narrow);
         let wider = |place| {
             let rough = self.at(place).unwrap_or_default();
             let smear = models.range_to_velocity.powi(2) * rough.radial(models.incidence);
             smear / (smear + width * width)
         };
         [
-            rms_over(&models.computed, change),
-            rms_over(&models.computed, wider),
+            rms_over(&models.pixels.computed, change),
+            rms_over(&models.pixels.computed, wider),
         ]
     }
 
@@ -86,7 +86,7 @@ impl SubpixelWakes {
         if first.mean_sigma0() <= 0.0 {
             return 0.0;
         }
-        let image = &models.image;
+        let image = &models.pixels.image;
         let [rows, columns] = [image.rows as f64, image.columns as f64];
         let specular = |waves: &SubpixelWake, place: [f64; 2]| {
             let [column, row] = image.pixel(place[0], place[1]);

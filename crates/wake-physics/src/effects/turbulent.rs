@@ -34,7 +34,7 @@ impl TurbulentWakes {
         if self.wakes.iter().all(|wake| wake.speed == 0.0) {
             return 0.0;
         }
-        rms_over(&models.computed, |place| {
+        rms_over(&models.pixels.computed, |place| {
             let of = |wake: &TurbulentWake| wake.damping(wake.track.seen_from_ship(place));
             // What is left is the product: 1 − (1 − a)(1 − b) = a + b (1 − a).
             let each = self.wakes.iter().map(of);

@@ -54,7 +54,7 @@ impl FirstOrder {
     pub(crate) fn new(models: &Models, open: OpenSea) -> Self {
         let (mut wake, mut wake_slopes) = (Vec::new(), [SlopeCovariance::NONE; 2]);
         for one in &models.wakes {
-            let (waves, crowding) = wake::sampled(one, &models.computed);
+            let (waves, crowding) = wake::sampled(one, &models.pixels.computed);
             let over_image = slopes(&waves);
             wake_slopes[0] = wake_slopes[0].plus(&over_image);
             wake_slopes[1] = wake_slopes[1].plus(&over_image.times(crowding));
@@ -75,7 +75,7 @@ impl FirstOrder {
             mean,
             resolved,
             modulation_variance: modulation_variance(models),
-            spacing: models.computed.spacing,
+            spacing: models.pixels.computed.spacing,
             wake,
             open,
         }
@@ -108,7 +108,8 @@ impl FirstOrder {
         let width = self.resolution.at(self.acceleration()) / (SQRT_2 * PI);
         let azimuth = (models.range_to_velocity * velocity).hypot(width);
         let range = elevation / models.incidence.tan();
-        [azimuth, range].map(|d| (DEVIATIONS * d / models.computed.spacing).ceil() as usize + 1)
+        [azimuth, range]
+            .map(|d| (DEVIATIONS * d / models.pixels.computed.spacing).ceil() as usize + 1)
     }
 
     /// Standard deviation of the acceleration toward the radar, where the wake is [m/s²].
@@ -126,6 +127,7 @@ impl FirstOrder {
 /// Variance of the hydrodynamic modulation by the waves of the sea that pixels carry and that modulate \[1\].
 fn modulation_variance(models: &Models) -> f64 {
     let band = models
+        .pixels
         .computed
         .nyquist_wavenumber()
         .min(LARGEST_MODULATING_WAVENUMBER);

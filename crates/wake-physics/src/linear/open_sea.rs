@@ -32,8 +32,13 @@ pub(crate) struct OpenSea {
 impl OpenSea {
     pub(crate) fn new(models: &Models) -> Self {
         // Half a cell of the sea's lattice more than the band: cells at its edge hold waves from beyond.
-        let half_cell = 1.0 / models.computed.rows.min(models.computed.columns) as f64;
-        let band = models.computed.nyquist_wavenumber() * (1.0 + half_cell);
+        let half_cell = 1.0
+            / models
+                .pixels
+                .computed
+                .rows
+                .min(models.pixels.computed.columns) as f64;
+        let band = models.pixels.computed.nyquist_wavenumber() * (1.0 + half_cell);
         let swell = waves::swell(models.swell.as_ref(), models.transfer.depth, band);
         let mut waves = waves::sea(&models.sea, band);
         waves.extend_from_slice(&swell);

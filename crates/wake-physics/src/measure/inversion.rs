@@ -51,7 +51,7 @@ pub fn mean_sigma0(scene: &Scene) -> crate::Result<f64> {
 
 fn brightness(scene: &Scene) -> f64 {
     let models = Models::new(scene);
-    let band = Raster::nyquist_wavenumber(&models.image);
+    let band = Raster::nyquist_wavenumber(&models.pixels.image);
     let moments = models.sea.moments(0.0, band, models.incidence);
     let resolved = SlopeCovariance {
         xx: moments.slope_xx,

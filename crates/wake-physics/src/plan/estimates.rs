@@ -96,7 +96,7 @@ fn absent(term: Term, models: &Models, amplitudes: &Amplitudes<'_>) -> Option<&'
 
 /// What the impulse response smears away is at most all contrast; the speckle of neighbours is what it adds.
 fn response(scene: &Scene, models: &Models, contrast: f64) -> Weight {
-    let spacing = models.image.spacing;
+    let spacing = models.pixels.image.spacing;
     let correlation = models
         .response
         .map_or(0.0, |response| response.pixel_correlation(spacing));

@@ -91,10 +91,10 @@ impl Plan {
         let terms = terms::choose(&weighed, &scene.model.terms, tolerance);
         let uses = |term| terms.iter().any(|t| t.term == term && t.used);
         let margin = first.margin(models);
-        let raster = models.computed.with_margin(margin[0], margin[1]);
+        let raster = models.pixels.computed.with_margin(margin[0], margin[1]);
         let mut sizes = Sizes {
             computed_spacing: raster.spacing,
-            strips: strips(&raster, &models.image),
+            strips: strips(&raster, &models.pixels.image),
             margin,
             computed: [raster.rows, raster.columns],
             band: raster.nyquist_wavenumber(),
@@ -136,7 +136,7 @@ impl Plan {
         let zones = wakes.iter().flat_map(|wake| &wake.zones);
         sizes.wake_directions = zones.map(|z| z.directions.map(f64::to_degrees)).collect();
         Ok(Self {
-            image_pixels: models.image.len(),
+            image_pixels: models.pixels.image.len(),
             sizes,
             terms,
             work,

@@ -15,15 +15,15 @@ pub(super) fn notes(scene: &Scene, models: &Models) -> Vec<String> {
             scene.sea.wind_speed
         ));
     }
-    if let Some(asked) = models.asked_spacing {
+    if let Some(asked) = models.pixels.asked_spacing {
         notes.push(format!(
             "waves on the arms of a wake ask for pixels of {asked:.2} m; {} m are computed: shorter waves count by the \
              variances of their slopes and velocities where an impulse response is asked for, else not",
-            models.computed.spacing
+            models.pixels.computed.spacing
         ));
     }
-    let spacing = models.image.spacing;
-    let divisions = (spacing / models.computed.spacing).round();
+    let spacing = models.pixels.image.spacing;
+    let divisions = (spacing / models.pixels.computed.spacing).round();
     if let Some(response) = models.response.filter(|_| divisions > COARSE_PIXEL) {
         let [range, azimuth] = [response.range, response.azimuth].map(|axis| axis.resolution);
         notes.push(format!(
@@ -34,11 +34,11 @@ pub(super) fn notes(scene: &Scene, models: &Models) -> Vec<String> {
     let count = models.wakes.len();
     for (n, wake) in models.wakes.iter().enumerate() {
         let wavelength = wake.transverse_wavelength();
-        if wake.speed > 0.0 && 2.0 * models.computed.spacing > wavelength {
+        if wake.speed > 0.0 && 2.0 * models.pixels.computed.spacing > wavelength {
             notes.push(format!(
                 "the transverse waves of the {} are {wavelength:.2} m long: a pixel of {} m carries none of them",
                 Scene::ship_name(n, count),
-                models.computed.spacing
+                models.pixels.computed.spacing
             ));
         }
     }

@@ -210,9 +210,9 @@ impl Work {
             at_once,
             whole: match sizes.strips {
                 1 => [0.0; 2],
-                _ => [all, models.image.len() as f64],
+                _ => [all, models.pixels.image.len() as f64],
             },
-            image: models.image.len() as f64,
+            image: models.pixels.image.len() as f64,
             lattice: (sizes.sea_lattice[0] * sizes.sea_lattice[1]) as f64,
             sums: waves as f64 + when(swell),
             precise: tolerance < PRECISE,
@@ -230,10 +230,11 @@ impl Work {
                 (SHARES.table * tolerance * first.mean_sigma0(), pixels),
             ),
             steep: all * backscatter.steep_share(&first.open.slopes) * when(moves),
-            summed: (taps / leans * FARTHEST_MOVED) * (models.computed.columns + BLOCK) as f64,
+            summed: (taps / leans * FARTHEST_MOVED)
+                * (models.pixels.computed.columns + BLOCK) as f64,
             sources: models
                 .response
-                .map_or(0.0, |_| models.computed.len() as f64),
+                .map_or(0.0, |_| models.pixels.computed.len() as f64),
             looks: looks(scene, models, uses(Term::Speckle)),
             rings: wakes
                 .iter()
@@ -319,7 +320,7 @@ fn taps(models: &Models, coherent: bool, acceleration: f64, tolerance: f64) -> f
         },
     };
     let tolerance = SHARES.kernels * tolerance;
-    imaging.taps(acceleration, models.computed.spacing, tolerance)
+    imaging.taps(acceleration, models.pixels.computed.spacing, tolerance)
 }
 
 /// Looks that are drawn through an impulse response.

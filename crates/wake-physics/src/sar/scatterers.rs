@@ -56,28 +56,28 @@ pub fn median_cross_section(length: f64) -> f64 {
 
 /// The ship whose echo is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShipEcho {
+pub(crate) struct ShipEcho {
     /// Midship (x, y) \[m\], where the ship truly is.
-    pub position: [f64; 2],
+    pub(crate) position: [f64; 2],
     /// Where it moves to [deg clockwise from azimuth].
-    pub heading: f64,
+    pub(crate) heading: f64,
     /// Length L \[m\].
-    pub length: f64,
+    pub(crate) length: f64,
     /// Beam B \[m\].
-    pub beam: f64,
+    pub(crate) beam: f64,
     /// Velocity toward the radar [m/s].
-    pub radial_velocity: f64,
+    pub(crate) radial_velocity: f64,
     /// Standard deviation of the points' velocity toward the radar by roll and pitch [m/s].
-    pub roll_velocity: f64,
+    pub(crate) roll_velocity: f64,
 }
 
 /// How the echo is imaged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Viewing {
+pub(crate) struct Viewing {
     /// Incidence θ \[rad\].
-    pub incidence: f64,
+    pub(crate) incidence: f64,
     /// R/V \[s\].
-    pub range_to_velocity: f64,
+    pub(crate) range_to_velocity: f64,
 }
 
 impl ShipEcho {
@@ -89,7 +89,11 @@ impl ShipEcho {
     ///
     /// - `seed`, and the ship's number in its scene: the same pair gives the same echo
     #[must_use]
-    pub fn scatterers(&self, view: &Viewing, (seed, number): (u64, usize)) -> Vec<PointTarget> {
+    pub(crate) fn scatterers(
+        &self,
+        view: &Viewing,
+        (seed, number): (u64, usize),
+    ) -> Vec<PointTarget> {
         let mut random = generator(seed, Stream::Scatterers, number as u64);
         let normal = |random: &mut _| -> f64 { StandardNormal.sample(random) };
         let spread = 10f64.powf(0.1 * SPREAD_DB * normal(&mut random));
@@ -145,7 +149,7 @@ fn uniform(random: &mut impl Rng, [low, high]: [f64; 2]) -> f64 {
 ///
 /// Their shift in range and their smear are left out.
 #[must_use]
-pub fn ambiguities(points: &[PointTarget], distance: f64, level: f64) -> Vec<PointTarget> {
+pub(crate) fn ambiguities(points: &[PointTarget], distance: f64, level: f64) -> Vec<PointTarget> {
     let copy = |point: &PointTarget, shift: f64| PointTarget {
         position: [point.position[0], point.position[1] + shift],
         cross_section: level * point.cross_section,

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const STEP: f64 = 1e-3;
 
 /// Slowest and fastest relaxation admitted [1/s], the range of a scene's `radar.relaxation_rate`.
-pub const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
+pub(crate) const RELAXATION_RANGE: [f64; 2] = [0.01, 100.0];
 
 /// Rate at which the Bragg waves return to equilibrium with the wind, taken as their rate of growth.
 ///
@@ -77,7 +77,7 @@ pub fn action_slope(spectrum: &Elfouhaily, bragg_wavenumber: f64, wind: [f64; 2]
 /// a Gaussian m the mean 1.
 ///
 /// - `variance` var m of the sea
-pub fn to_bragg_factors(modulation: &mut Field, variance: f64) {
+pub(crate) fn to_bragg_factors(modulation: &mut Field, variance: f64) {
     let half = (0.5 * variance) as f32;
     let values = modulation.values.par_iter_mut().with_min_len(1 << 14);
     values.for_each(|m| *m = (*m - half).exp());

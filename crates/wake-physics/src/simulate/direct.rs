@@ -4,10 +4,10 @@ use super::record::{Clock, Seconds};
 use super::simulation::Method;
 use super::stages::{Stages, sea_of};
 use super::strips::Strip;
-use crate::computed::Parts;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, Wanted};
 use crate::kelvin::fade_at;
+use crate::pixels::Parts;
 use crate::prepared::Prepared;
 use crate::raster::Field;
 use crate::sar::direct::{DirectImage, reaching};
@@ -66,10 +66,10 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
     }
     let strip = Strip::whole(&prepared);
     let stages = Stages::new(&prepared, Method::Fast, Wanted::Image, &strip);
-    if !models.is_refined() {
+    if !models.pixels.are_refined() {
         return Ok(stages.direct_intensity(pixels));
     }
-    let parts = Parts::new(&models.computed, &models.image);
+    let parts = Parts::new(&models.pixels.computed, &models.pixels.image);
     let fine: Vec<[usize; 2]> = pixels.iter().flat_map(|&pixel| parts.of(pixel)).collect();
     let mut direct = stages.direct_intensity(&fine);
     let pixels = direct.intensity.chunks(parts.count());
@@ -87,7 +87,7 @@ impl Stages<'_> {
         let mut clock = Clock::start();
         let mut fields = self.harmonic_fields(workspace, &sources, &mut clock);
         let roughening = self.finish_surface(workspace, &mut fields);
-        clock.lap(|seconds| &mut seconds.turbulent);
+        clock.skip();
         let facets = self.facets(&fields, &roughening);
         let exact = self.backscatter().sigma0_pixels(&facets, &sources);
         clock.lap(|seconds| &mut seconds.backscatter);
@@ -105,7 +105,7 @@ impl Stages<'_> {
         fields.project(workspace, raster, self.site.models.incidence);
         let (imaging, lit) = (self.imaging(), self.sources(&fields));
         let direct = DirectImage::new(&imaging, &lit, &self.computed);
-        clock.lap(|seconds| &mut seconds.speckle);
+        clock.skip();
         let mut intensity: Vec<f64> = pixels.par_iter().map(|&[i, j]| direct.at(i, j)).collect();
         clock.lap(|seconds| &mut seconds.imaging);
         let mut rest = workspace.flat_field(&self.computed);
@@ -113,24 +113,12 @@ impl Stages<'_> {
         for (value, &[i, j]) in intensity.iter_mut().zip(pixels) {
             *value += f64::from(rest.at(i, j));
         }
-        let Seconds {
-            sea,
-            kelvin,
-            backscatter,
-            imaging,
-            ..
-        } = clock.stop();
+        let seconds = clock.stop();
+        let total = seconds.sea + seconds.kelvin + seconds.backscatter + seconds.imaging;
         DirectPixels {
             intensity,
             sources: sources.len(),
-            seconds: Seconds {
-                sea,
-                kelvin,
-                backscatter,
-                imaging,
-                total: sea + kelvin + backscatter + imaging,
-                ..Seconds::default()
-            },
+            seconds: Seconds { total, ..seconds },
         }
     }
 
@@ -171,7 +159,7 @@ impl Stages<'_> {
         if self.uses(Term::Sea) {
             let sea = Surface::new(&models.sea, scene.seed, scene.sea.time, raster);
             let waves = sea.modes();
-            clock.lap(|seconds| &mut seconds.plan);
+            clock.skip();
             add(&waves, &everywhere);
         }
         for waves in self.effects().filter_map(|effect| effect.waves(&self.site)) {
@@ -187,7 +175,7 @@ impl Stages<'_> {
             };
             let fades: Vec<f64> = pixels.iter().map(faded).collect();
             let waves = wake.waves(plan);
-            clock.lap(|seconds| &mut seconds.plan);
+            clock.skip();
             add(&waves, &fades);
             clock.lap(|seconds| &mut seconds.kelvin);
         }

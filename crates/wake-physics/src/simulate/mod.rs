@@ -76,7 +76,7 @@ impl Simulator {
         let memory = &mut self.memory;
         let drawn = draw(&prepared, memory, method, Wanted::Fields, &mut clock);
         let fields = drawn.fields;
-        let mut speckled = memory.workspace.field(&models.image);
+        let mut speckled = memory.workspace.field(&models.pixels.image);
         speckled.values.copy_from_slice(&fields.intensity.values);
         let speckling = Speckling::of(scene, models, drawn.exposure);
         let slc = match prepared.plan.uses(Term::Speckle) {
@@ -90,7 +90,7 @@ impl Simulator {
         let labels = prepared.labels();
         clock.lap(|seconds| &mut seconds.labels);
         Ok(Simulation {
-            raster: models.image,
+            raster: models.pixels.image,
             elevation: fields.elevation,
             slope_x: fields.slope_x,
             slope_y: fields.slope_y,

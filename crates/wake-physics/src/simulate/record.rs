@@ -62,6 +62,11 @@ impl Clock {
         self.lap = now;
     }
 
+    /// Leaves the time since the last lap out.
+    pub(super) fn skip(&mut self) {
+        self.lap = Instant::now();
+    }
+
     /// Seconds by stage, and since the start.
     pub(super) fn stop(mut self) -> Seconds {
         self.seconds.total = self.start.elapsed().as_secs_f64();

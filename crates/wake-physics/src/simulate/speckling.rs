@@ -37,10 +37,10 @@ impl Exposure {
     ) -> Self {
         Self {
             response,
-            sources: models.computed,
+            sources: models.pixels.computed,
             intensity,
             points: points_inside(scene, models),
-            image: models.image,
+            image: models.pixels.image,
         }
     }
 
@@ -89,10 +89,16 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
 
 /// Those points that lie among the sources: an impulse response would bring others around.
 fn points_inside(scene: &Scene, models: &Models) -> Vec<PointTarget> {
-    let [rows, columns] = [models.computed.rows as f64, models.computed.columns as f64];
+    let [rows, columns] = [
+        models.pixels.computed.rows as f64,
+        models.pixels.computed.columns as f64,
+    ];
     let mut points = points(scene, models);
     points.retain(|point| {
-        let [column, row] = models.computed.pixel(point.position[0], point.position[1]);
+        let [column, row] = models
+            .pixels
+            .computed
+            .pixel(point.position[0], point.position[1]);
         (0.0..rows).contains(&row) && (0.0..columns).contains(&column)
     });
     points
@@ -172,10 +178,10 @@ pub fn unit_speckle(scene: &Scene) -> Result<Field> {
         ..scene.clone()
     };
     let models = Models::new(&open);
-    let sources = Field::constant(&models.computed, 1.0);
+    let sources = Field::constant(&models.pixels.computed, 1.0);
     let response = models.response;
     let exposure = response.map(|response| Exposure::of(&open, &models, response, sources));
-    let mut image = Field::constant(&models.image, 1.0);
+    let mut image = Field::constant(&models.pixels.image, 1.0);
     Speckling::of(&open, &models, exposure).apply(&mut image);
     Ok(image)
 }

@@ -93,20 +93,20 @@ pub(super) fn draw(
         let (mut fields, accuracy) = stages.draw(memory, &mut sea, clock);
         let workspace = &mut memory.workspace;
         out.accuracy = out.accuracy.and(&accuracy);
-        let pixels = models.image.strip(&strip.image);
+        let pixels = models.pixels.image.strip(&strip.image);
         let intensity = std::mem::take(&mut fields.intensity);
         if models.response.is_some() {
-            let rows = [strip.own.clone(), 0..models.computed.rows];
+            let rows = [strip.own.clone(), 0..models.pixels.computed.rows];
             put(workspace, &mut out.fields.intensity, rows, intensity);
         } else {
-            let rows = [strip.image.clone(), 0..models.image.rows];
+            let rows = [strip.image.clone(), 0..models.pixels.image.rows];
             let intensity = means(workspace, intensity, &stages.computed, &pixels);
             put(workspace, &mut out.fields.intensity, rows, intensity);
         }
         if wanted == Wanted::Fields {
             let pairs = out.fields.each().into_iter().zip(fields.each());
             for (to, from) in pairs.take(Fields::RESULTS) {
-                let rows = [strip.image.clone(), 0..models.image.rows];
+                let rows = [strip.image.clone(), 0..models.pixels.image.rows];
                 let from = std::mem::take(from);
                 let part = means(workspace, from, &stages.site.raster, &pixels);
                 put(workspace, to, rows, part);
@@ -143,8 +143,8 @@ impl<'a> Stages<'a> {
                 whole,
                 first_row: strip.raster.start,
             },
-            last: strip.image.end == models.image.rows,
-            computed: models.computed.strip(&strip.computed),
+            last: strip.image.end == models.pixels.image.rows,
+            computed: models.pixels.computed.strip(&strip.computed),
             quantities: quantities(|term| prepared.plan.uses(term), wanted),
         }
     }

@@ -5,7 +5,7 @@
 //! σ⁰), which stays within the shares of the tolerance that these have. Rows are computed beyond a strip as far as echoes are
 //! displaced, twice the margin of the image.
 
-use crate::computed::{Parts, means_over};
+use crate::pixels::{Parts, means_over};
 use crate::prepared::Prepared;
 use crate::raster::{Field, Raster};
 use crate::workspace::Workspace;
@@ -32,10 +32,10 @@ impl Strip {
     pub(super) fn whole(prepared: &Prepared<'_>) -> Self {
         let models = &prepared.models;
         Self {
-            image: 0..models.image.rows,
-            computed: 0..models.computed.rows,
-            own: 0..models.computed.rows,
-            raster: 0..models.computed.rows + 2 * prepared.plan.sizes.margin[0],
+            image: 0..models.pixels.image.rows,
+            computed: 0..models.pixels.computed.rows,
+            own: 0..models.pixels.computed.rows,
+            raster: 0..models.pixels.computed.rows + 2 * prepared.plan.sizes.margin[0],
         }
     }
 
@@ -44,7 +44,7 @@ impl Strip {
         let (models, plan) = (&prepared.models, &prepared.plan);
         let count = plan.sizes.strips;
         let whole = Self::whole(prepared);
-        let parts = Parts::new(&models.computed, &models.image);
+        let parts = Parts::new(&models.pixels.computed, &models.pixels.image);
         let margin = plan.sizes.margin[0];
         let one = |n: usize| {
             let [start, end] = [n, n + 1].map(|n| n * whole.image.end / count);
@@ -247,7 +247,7 @@ mod tests {
                     let below = strip.raster.end - (strip.computed.end + margin);
                     assert!(above >= margin && below >= margin);
                 }
-                assert_eq!(next, [170, prepared.models.computed.rows]);
+                assert_eq!(next, [170, prepared.models.pixels.computed.rows]);
             }
         }
     }

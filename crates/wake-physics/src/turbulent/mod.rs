@@ -83,15 +83,7 @@ impl TurbulentWake {
         centre * (-0.5 * off * off).exp() * fade(forward, self.length)
     }
 
-    /// [`Self::damping`] at every pixel; the Bragg spectrum is multiplied by 1 − it.
-    #[must_use]
-    pub fn damping_field(&self, raster: &Raster) -> Field {
-        let mut field = Field::constant(raster, 0.0);
-        self.fill_damping(&mut field, raster);
-        field
-    }
-
-    /// [`Self::damping_field`] over a field of the raster's size.
+    /// Fills a field of the raster's size with [`Self::damping`]; the Bragg spectrum is multiplied by 1 − it.
     pub(crate) fn fill_damping(&self, field: &mut Field, raster: &Raster) {
         let farthest = self.track.farthest_astern(raster);
         // Six standard deviations: exp(−18) ≈ 1.5e-8 lies below the rounding of 1 − damping in f32.
@@ -115,6 +107,12 @@ impl TurbulentWake {
 #[allow(clippy::float_cmp, reason = "exact ends and symmetry")]
 mod tests {
     use super::*;
+
+    fn damping_field(wake: &TurbulentWake, raster: &Raster) -> Field {
+        let mut field = Field::constant(raster, 0.5);
+        wake.fill_damping(&mut field, raster);
+        field
+    }
 
     fn wake() -> TurbulentWake {
         TurbulentWake {
@@ -159,13 +157,16 @@ mod tests {
             ..wake()
         };
         let raster = Raster::image(20, 30, 10.0);
-        assert_eq!(still.damping_field(&raster), Field::constant(&raster, 0.0));
+        assert_eq!(
+            damping_field(&still, &raster),
+            Field::constant(&raster, 0.0)
+        );
     }
 
     #[test]
     fn field_is_the_function() {
         let raster = Raster::image(60, 80, 25.0);
-        let field = wake().damping_field(&raster);
+        let field = damping_field(&wake(), &raster);
         let mut dark = 0;
         for i in 0..raster.rows {
             for j in 0..raster.columns {

@@ -29,29 +29,31 @@ const VISIBLE: f64 = 1e-4;
 const MOST_DIVISIONS: usize = 4;
 const MOST_PIXELS: usize = 1 << 22;
 
-/// What is computed.
+/// The pixels of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Computed {
-    /// The pixels, without the margin.
-    pub(crate) raster: Raster,
-    /// Spacing that the waves of a ship ask for \[m\], where it is below that of the raster.
-    pub(crate) asked: Option<f64>,
+pub(crate) struct Pixels {
+    /// Pixels of the image.
+    pub(crate) image: Raster,
+    /// Pixels that are computed, without the margin: those of the image or finer ones, and the guard of an impulse response.
+    pub(crate) computed: Raster,
+    /// Spacing that the waves of a ship ask for \[m\], where what is computed is coarser.
+    pub(crate) asked_spacing: Option<f64>,
 }
 
-impl Computed {
-    /// Chooses the pixels for those of an image.
+impl Pixels {
+    /// Chooses what is computed for the image of a grid.
     pub(crate) fn new(
         grid: &Grid,
-        image: &Raster,
         response: Option<&ImpulseResponse>,
         wakes: &[KelvinWake],
     ) -> Self {
+        let image = Raster::image(grid.rows, grid.columns, grid.spacing);
         let divisions = |spacing: f64| (image.spacing / spacing * (1.0 - 1e-12)).ceil().max(1.0);
         let carried = response.map_or(1.0, |r| divisions(r.carrying_spacing()));
         let for_response = response.map_or(1.0, |r| divisions(r.largest_spacing()));
         let cusp = |wake: &KelvinWake| {
             let spacing = wake.transverse_wavelength() / 1.5 / PIXELS_A_CUSP_WAVE;
-            visible(wake, image, spacing).then_some(spacing)
+            visible(wake, &image, spacing).then_some(spacing)
         };
         let asked = wakes.iter().filter_map(cusp).fold(f64::INFINITY, f64::min);
         let most = (MOST_PIXELS as f64 / image.len() as f64).sqrt().floor();
@@ -62,12 +64,18 @@ impl Computed {
         };
         let fine = image.divided(chosen as usize);
         Self {
-            raster: response.map_or(fine, |response| {
+            image,
+            computed: response.map_or(fine, |response| {
                 let [rows, columns] = response.guard(fine.spacing);
                 fine.with_margin(rows, columns)
             }),
-            asked: (asked < fine.spacing * (1.0 - 1e-9)).then_some(asked),
+            asked_spacing: (asked < fine.spacing * (1.0 - 1e-9)).then_some(asked),
         }
+    }
+
+    /// Whether what is computed are not the pixels of the image.
+    pub(crate) fn are_refined(&self) -> bool {
+        self.computed != self.image
     }
 }
 
@@ -194,13 +202,13 @@ mod tests {
     use crate::Scene;
     use crate::models::Models;
 
-    fn computed(keys: &[&str]) -> (Models, f64) {
+    fn computed(keys: &[&str]) -> (Pixels, f64) {
         let size = ["grid.rows=64", "grid.columns=48"];
         let scene = Scene::default()
             .with_assignments(&[&size[..], keys].concat())
             .unwrap();
-        let models = Models::new(&scene);
-        (models.clone(), models.computed.spacing)
+        let pixels = Models::new(&scene).pixels;
+        (pixels, pixels.computed.spacing)
     }
 
     /// `λ_cusp` = 2π 6.5²/(1.5 · 9.807) = 18.05 m asks for 5.16 m: the fraction of the image's spacing below it.
@@ -226,17 +234,17 @@ mod tests {
             }
         }
         // The waves of the default ship have 17 pixels as it is.
-        let (models, _) = computed(&[]);
-        assert!(!models.is_refined() && models.computed == models.image);
+        let (pixels, _) = computed(&[]);
+        assert!(!pixels.are_refined() && pixels.computed == pixels.image);
     }
 
     /// Neither a slow ship nor a large image makes more pixels than the limits; what is asked for is known.
     #[test]
     fn the_limits_hold() {
-        let (models, spacing) = computed(&["ship.speed=2", "grid.spacing=10"]);
+        let (pixels, spacing) = computed(&["ship.speed=2", "grid.spacing=10"]);
         assert!((spacing - 2.5).abs() < 1e-12);
         let asked = 2.0 / 3.0 * std::f64::consts::TAU * 4.0 / 9.80665 / 3.5;
-        assert!((models.asked_spacing.unwrap() / asked - 1.0).abs() < 1e-12);
+        assert!((pixels.asked_spacing.unwrap() / asked - 1.0).abs() < 1e-12);
         let large = [
             "ship.speed=2",
             "grid.spacing=10",
@@ -244,8 +252,8 @@ mod tests {
             "grid.columns=1500",
         ];
         assert!((computed(&large).1 - 10.0).abs() < 1e-12);
-        let (models, spacing) = computed(&["ship.speed=6.5", "grid.spacing=10"]);
-        assert!((spacing - 5.0).abs() < 1e-12 && models.asked_spacing.is_none());
+        let (pixels, spacing) = computed(&["ship.speed=6.5", "grid.spacing=10"]);
+        assert!((spacing - 5.0).abs() < 1e-12 && pixels.asked_spacing.is_none());
     }
 
     #[test]
