@@ -48,14 +48,19 @@ pub(crate) fn opened(path: &Path, arguments: &ProductArguments) -> Outcome<Optio
     let is_product = path.is_dir() && (has("annotation") || has("manifest.safe"))
         || path.file_name().is_some_and(|name| name == "manifest.safe")
         || matches!(ending.as_deref(), Some("zip" | "safe"));
-    if !(is_product || is_tiff && path.is_file()) {
+    if is_tiff && path.is_file() {
+        // Whatever the other reader takes is an image.
+        let product = Product::open(path).ok();
+        let is_map = |product: &Product| product.has_places() || GreyImage::read(path).is_err();
+        return Ok(product.filter(is_map));
+    }
+    if !is_product {
         return Ok(None);
     }
-    let product = match arguments.polarization {
+    Ok(Some(match arguments.polarization {
         Some(polarization) => Product::open_polarization(path, polarization)?,
         None => Product::open(path)?,
-    };
-    Ok(Some(product).filter(|product| is_product || product.has_places()))
+    }))
 }
 
 /// Searches a product; writes `wakes.geojson`, `wakes.csv`, `wakes.json`, `quicklook.png` and `report.html` into the folder. A search
@@ -76,6 +81,8 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
         None => detector,
     };
     let land = land(product, options)?;
+    // A product without pixels leaves no folder behind.
+    product.read_window(0..1, 0..1)?;
     make_folder(out)?;
     let settings = json!({
         "spacing": spacing, "least_score": arguments.least_score, "weights": arguments.weights, "land": options.land,
