@@ -97,7 +97,8 @@ fn product(raster: &Raster, waves: &PlaneWaves) -> (f64, Vec<Field>) {
     let whole = raster.rows <= WHOLE;
     let rows = if whole { raster.rows } else { PRODUCT_ROWS };
     let part = Raster { rows, ..*raster };
-    let (seconds, fields) =
-        median_seconds(1, || reference::matrix_product(waves, &TRANSFER, &QUANTITIES, &part));
+    let (seconds, fields) = median_seconds(1, || {
+        reference::matrix_product(waves, &TRANSFER, &QUANTITIES, &part)
+    });
     (seconds * raster.rows as f64 / rows as f64, fields)
 }
