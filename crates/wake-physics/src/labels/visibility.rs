@@ -118,7 +118,8 @@ impl<'a> Background<'a> {
         open: &OpenSea,
     ) -> Option<Self> {
         let drawn = |term| scene.model.terms.allow(term);
-        if open.mean[0] + open.mean[1] <= 0.0 {
+        let mean = open.mean();
+        if mean[0] + mean[1] <= 0.0 {
             return None;
         }
         let [range_resolution, own] = models.response.map_or([0.0; 2], |response| {
@@ -141,7 +142,7 @@ impl<'a> Background<'a> {
             .into_iter()
             .zip(effects.added())
             .filter(|(term, _)| drawn(*term))
-            .map(|(_, sigma0)| over_mean(sigma0, open.mean))
+            .map(|(_, sigma0)| over_mean(sigma0, mean))
             .sum();
         let mut background = Self {
             models,

@@ -19,7 +19,7 @@ use crate::sar::AzimuthResolution;
 use crate::scattering::SlopeCovariance;
 use crate::scattering::modulation::ModulationTransfer;
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, Quantity};
-use open_sea::{bragg_share, slopes};
+use open_sea::slopes;
 use std::f64::consts::{PI, SQRT_2};
 use waves::rms;
 
@@ -63,14 +63,11 @@ impl FirstOrder {
         // Where the wake is, terms matter most; the mean is that of the whole image.
         let [mean_slopes, resolved] = wake_slopes.map(|wake| open.slopes.plus(&wake));
         let mean = match wake.is_empty() {
-            true => open.mean,
+            true => open.mean(),
             false => open.backscatter.mean_over(&mean_slopes),
         };
         Self {
-            modulation: ModulationTransfer {
-                bragg_share: bragg_share(mean),
-                ..open.modulation
-            },
+            modulation: open.modulation_of_mean(mean),
             resolution: models.resolution(),
             mean,
             resolved,

@@ -6,6 +6,8 @@ use crate::models::Models;
 use crate::scattering::modulation::ModulationTransfer;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::Scene;
+use crate::waves::Transfer;
+use std::sync::OnceLock;
 
 /// Step of the differences that give the slope of ln σ⁰ \[1\].
 pub(super) const SLOPE_STEP: f64 = 0.05;
@@ -21,10 +23,12 @@ pub(crate) struct OpenSea {
     pub(crate) slopes: SlopeCovariance,
     /// σ⁰ of facets with the average over subpixel slopes and the specular return.
     pub(crate) backscatter: Backscatter,
-    /// Mean σ⁰: Bragg and specular.
-    pub(crate) mean: [f64; 2],
-    /// Modulation of the intensity by waves.
-    pub(crate) modulation: ModulationTransfer,
+    /// Mean σ⁰: Bragg and specular; computed where a scene needs it.
+    mean: OnceLock<[f64; 2]>,
+    transfer: Transfer,
+    /// First derivatives of ln σ⁰ by the slopes.
+    tilt: [f64; 2],
+    range_to_velocity: f64,
     /// ½ ∂²ln σ⁰/∂slope² along x and y, absolute.
     pub(crate) curvature: [f64; 2],
 }
@@ -44,20 +48,16 @@ impl OpenSea {
         waves.extend_from_slice(&swell);
         let slopes = slopes(&waves);
         let backscatter = models.backscatter(true, true);
-        let mean = backscatter.mean_over(&slopes);
         let (tilt, curvature) = slope_of_ln_sigma(&backscatter);
         Self {
             waves,
             swell,
             slopes,
-            modulation: ModulationTransfer {
-                transfer: models.transfer,
-                tilt,
-                bragg_share: bragg_share(mean),
-                range_to_velocity: models.range_to_velocity,
-            },
+            mean: OnceLock::new(),
+            transfer: models.transfer,
+            tilt,
+            range_to_velocity: models.range_to_velocity,
             backscatter,
-            mean,
             curvature,
         }
     }
@@ -67,22 +67,43 @@ impl OpenSea {
         self.waves.len() == self.swell.len()
     }
 
+    /// Mean σ⁰: Bragg and specular.
+    pub(crate) fn mean(&self) -> [f64; 2] {
+        let mean = || self.backscatter.mean_over(&self.slopes);
+        *self.mean.get_or_init(mean)
+    }
+
+    /// Modulation of the intensity by waves.
+    pub(crate) fn modulation(&self) -> ModulationTransfer {
+        self.modulation_of_mean(self.mean())
+    }
+
+    /// Modulation of an intensity of this mean σ⁰, Bragg and specular.
+    pub(super) fn modulation_of_mean(&self, mean: [f64; 2]) -> ModulationTransfer {
+        ModulationTransfer {
+            transfer: self.transfer,
+            tilt: self.tilt,
+            bragg_share: bragg_share(mean),
+            range_to_velocity: self.range_to_velocity,
+        }
+    }
+
     /// Standard deviation of the line-of-sight velocity of the resolved waves [m/s].
     pub(crate) fn velocity(&self) -> f64 {
-        let transfer = &self.modulation.transfer;
+        let transfer = &self.transfer;
         rms(&self.waves, |w: &WaveSample| transfer.radial(w.k, w.omega))
     }
 
     /// Mean velocity toward the radar by the Doppler shift [m/s].
     pub(crate) fn mean_velocity(&self, scene: &Scene, models: &Models) -> f64 {
-        doppler::mean_velocity(scene, models, &self.modulation)
+        doppler::mean_velocity(scene, models, &self.modulation())
     }
 
     /// Share of the mean intensity that waves modulate \[1\].
     ///
     /// - `added`: σ⁰ that no wave modulates
     pub(crate) fn modulated_share(&self, added: &[f64]) -> f64 {
-        let share = added.iter().map(|&sigma0| over_mean(sigma0, self.mean));
+        let share = added.iter().map(|&sigma0| over_mean(sigma0, self.mean()));
         1.0 / share.fold(1.0, |sum, share| sum + share)
     }
 
@@ -97,13 +118,13 @@ impl OpenSea {
     pub(crate) fn modulation_of(&self, models: &Models) -> ModulationTransfer {
         ModulationTransfer {
             tilt: slope_of_ln_sigma(&models.backscatter(true, true)).0,
-            ..self.modulation
+            ..self.modulation()
         }
     }
 }
 
 /// Share of the Bragg return in a mean σ⁰, Bragg and specular \[1\].
-pub(super) fn bragg_share(mean: [f64; 2]) -> f64 {
+fn bragg_share(mean: [f64; 2]) -> f64 {
     let total = mean[0] + mean[1];
     if total > 0.0 { mean[0] / total } else { 0.0 }
 }

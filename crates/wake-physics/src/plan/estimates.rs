@@ -150,15 +150,12 @@ mod tests {
             bragg_share: 0.5,
             range_to_velocity: 50.0,
         };
-        let models = Models::new(&Scene::default());
+        let mut open = OpenSea::new(&Models::new(&Scene::default()));
+        open.waves = vec![wave([0.1, 0.0], 0.04)];
+        open.swell = vec![wave([0.1, 0.0], 0.01)];
+        open.curvature = [3.0, 7.0];
         FirstOrder {
-            open: OpenSea {
-                waves: vec![wave([0.1, 0.0], 0.04)],
-                swell: vec![wave([0.1, 0.0], 0.01)],
-                curvature: [3.0, 7.0],
-                modulation,
-                ..OpenSea::new(&models)
-            },
+            open,
             wake: vec![wave([0.0, 0.2], 1e-4)],
             modulation,
             resolution: AzimuthResolution {
