@@ -120,6 +120,10 @@ pub enum Error {
         smallest: usize,
     },
 
+    /// A product that would be written over.
+    #[error("{} exists; choose another folder, or move it away", shown(path))]
+    Exists { path: PathBuf },
+
     /// A file that could not be written as asked.
     #[error("cannot write {}: {why}", shown(path))]
     Unwritable { path: PathBuf, why: String },

@@ -27,6 +27,8 @@ const BEHIND: f32 = 10.0;
 const LONGEST: f32 = 240.0;
 /// A contrast of fewer standard deviations is none.
 const CLEAR: f64 = 4.0;
+/// Pixels brighter than the median of all around by this factor are of an echo.
+const ECHO: f64 = 5.0;
 /// How far the line may lie from where it was found, and by which angle it may be turned: pixels and degrees, in steps.
 const ASIDE: i32 = 14;
 const TURN: [f32; 2] = [4.0, 0.5];
@@ -37,6 +39,8 @@ pub(crate) struct Surroundings {
     rows: Range<usize>,
     columns: Range<usize>,
     of_amplitudes: bool,
+    /// Brighter pixels are left out: an echo is no line.
+    brightest: f64,
 }
 
 /// A line through the pixels: its brightness over that of the sea beside it, and how many standard deviations it is off 1.
@@ -76,15 +80,33 @@ impl Surroundings {
             return None;
         }
         let window = product.read_window(rows.clone(), columns.clone()).ok()?;
+        let of_amplitudes = product.values() == Values::Samples;
+        let mut there: Vec<f32> = window
+            .values
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite())
+            .collect();
+        let middle = there.len() / 2;
+        if there.is_empty() {
+            return None;
+        }
+        let median = f64::from(*there.select_nth_unstable_by(middle, f32::total_cmp).1);
+        let median = if of_amplitudes {
+            median * median
+        } else {
+            median
+        };
         Some(Self {
             window,
             rows,
             columns,
-            of_amplitudes: product.values() == Values::Samples,
+            of_amplitudes,
+            brightest: ECHO * median,
         })
     }
 
-    /// Power of the pixel at a place, if it is there.
+    /// Power of the pixel at a place, if it is there and of the sea.
     fn power(&self, [x, y]: [f32; 2]) -> Option<f64> {
         let [column, row] = [x, y].map(|v| v.round() as i64);
         let column = usize::try_from(column).ok()?;
@@ -98,7 +120,7 @@ impl Surroundings {
         } else {
             value
         };
-        power.is_finite().then_some(power)
+        (power <= self.brightest).then_some(power)
     }
 
     /// The contrast along a line; `None` where too few pixels are there.

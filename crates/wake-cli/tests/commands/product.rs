@@ -55,7 +55,12 @@ fn a_ship_on_the_map_is_found_on_the_map() {
     done("simulate", &arguments, &again);
     let all = |root: &Path| -> Vec<Option<Vec<u8>>> { files(root).into_values().collect() };
     assert!(all(&out) == all(&again), "another product of the same seed");
-    refused_into("simulate", &arguments, &["it exists"], &out);
+    refused_into(
+        "simulate",
+        &arguments,
+        &["exists; choose another folder"],
+        &out,
+    );
 
     let found = folder.path().join("found");
     let map = folder.path().join("map.geojson");

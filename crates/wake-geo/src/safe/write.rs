@@ -46,14 +46,8 @@ impl Sentinel1 {
         )?;
         let part = Part { lines, pixels };
         let target = out.join(format!("{}.SAFE", self.part_name(&part)));
-        let unwritable = |why: &str| Error::Unwritable {
-            path: target.clone(),
-            why: why.to_owned(),
-        };
         if target.exists() {
-            return Err(unwritable(
-                "it exists; choose another folder, or move it away",
-            ));
+            return Err(Error::Exists { path: target });
         }
         fs::create_dir_all(out).map_err(|e| Error::io(out, e))?;
         let temporary = tempfile::Builder::new()

@@ -1,0 +1,53 @@
+"""Compares the wakes of `wake detect` with the ships of `wake simulate --product`: positions, headings, radial velocities.
+
+    python3 tests/foreign/compare_map.py SHIPS.geojson wakes.geojson AZIMUTH
+
+AZIMUTH is the direction of increasing range from true north (`platformHeading` of the annotation plus 90 degrees).
+"""
+import json
+import math
+import statistics
+import sys
+
+RADIUS = 6_371_000.0  # m
+FARTHEST = 600.0  # m
+
+ships = json.load(open(sys.argv[1]))["features"]
+wakes = json.load(open(sys.argv[2]))["features"]
+range_azimuth = math.radians(float(sys.argv[3]))
+wakes = [wake for wake in wakes if wake["properties"]["type"] == "wake" and wake["properties"]["sure"]]
+middle = statistics.mean(ship["geometry"]["coordinates"][1] for ship in ships)
+
+
+def metres(place):
+    """East and north on a plane: 40 km are off by some metres."""
+    longitude, latitude = (math.radians(value) for value in place)
+    return longitude * RADIUS * math.cos(math.radians(middle)), latitude * RADIUS
+
+
+errors = {"position [m]": [], "heading [deg]": [], "radial velocity [m/s]": []}
+taken = set()
+for ship in ships:
+    heading = math.radians(ship["properties"]["heading"])
+    speed, length = ship["properties"]["speed"], ship["properties"]["length"]
+    x, y = metres(ship["geometry"]["coordinates"])
+    stern = x - 0.5 * length * math.sin(heading), y - 0.5 * length * math.cos(heading)
+
+    def away(n):
+        return math.dist(stern, metres(wakes[n]["geometry"]["coordinates"][0]))
+
+    free = [n for n in range(len(wakes)) if n not in taken]
+    nearest = min(free, key=away, default=None)
+    if nearest is None or away(nearest) > FARTHEST:
+        continue
+    taken.add(nearest)
+    found = wakes[nearest]["properties"]
+    turn = (found["heading_deg"] - math.degrees(heading) + 180) % 360 - 180
+    errors["position [m]"].append(away(nearest))
+    errors["heading [deg]"].append(abs(turn))
+    if found["radial_velocity_m_s"] is not None:
+        toward = -speed * math.cos(heading - range_azimuth) * math.sin(math.radians(found["incidence_deg"]))
+        errors["radial velocity [m/s]"].append(abs(found["radial_velocity_m_s"] - toward))
+print(f"{len(taken)} of {len(ships)} ships found, {len(wakes) - len(taken)} other sure wakes")
+for name, values in errors.items():
+    print(f"{name}: median {statistics.median(values):.2f}, largest {max(values):.2f}, of {len(values)}")
