@@ -9,7 +9,7 @@ use wake_physics::{Field, Scene};
 use wake_text::Wording;
 use wake_train::evaluation::{ImageSource, SIZE, Told};
 
-/// Steps from noise to image, as the paper has them.
+/// Steps of DDIM from noise to image: chosen, the paper does not state its own.
 const STEPS: usize = 50;
 
 /// A pipeline in the layout of diffusers; it is told the paper's sentence, whatever else there is.

@@ -16,7 +16,7 @@ use wake_train::evaluation::{ImageSource, SIZE, Told, held_out};
 
 /// Pixels along a side.
 const SIZES: [usize; 3] = [128, 256, 512];
-/// Waves of sea and wake each: the scale of the paper's simulator.
+/// Waves of sea and wake each: chosen, the paper does not state its own.
 const WAVES: usize = 10_000;
 /// Pixels on which the harmonic sum runs; its time is scaled to the image.
 const SAMPLE: usize = 512;
