@@ -1,4 +1,4 @@
-//! Attack on the readers of satellite products, which need no burn; as `main.rs`.
+//! Attack on the readers of satellite products, of ships and of land, which need no burn; as `main.rs`.
 //!
 //! ```text
 //! cargo test -p wake --no-default-features --features checks --test fuzz_products
@@ -10,7 +10,8 @@ mod mutation;
 use std::path::Path;
 
 use attack::{attack, said, said_harmlessly, with_file};
-use wake_geo::{Product, locate};
+use wake_geo::{Land, Product, locate};
+use wake_product::read_ships;
 
 /// Opens a product, asks for places, and reads a window.
 fn open(path: &Path) {
@@ -25,6 +26,29 @@ fn open(path: &Path) {
     }
     let (first, left) = (lines.saturating_sub(64), pixels.saturating_sub(64));
     said_harmlessly(product.read_window(first..lines, left..pixels));
+    // What can be read can be cut, or is refused.
+    if let (Some(sentinel), 64..=512, 64..=512) = (product.sentinel1(), lines, pixels) {
+        let out = tempfile::tempdir().expect("a folder");
+        let cut = sentinel.write_part(out.path(), 0..lines, 0..pixels, |_, _| Ok(()));
+        if let Some(path) = said(cut) {
+            said(Product::open(path));
+        }
+    }
+}
+
+#[test]
+fn ships_and_land() {
+    let folder = tempfile::tempdir().expect("a folder");
+    attack("ships", |input| {
+        with_file(folder.path(), "ships.geojson", input, |path| {
+            said(read_ships(path));
+        });
+    });
+    attack("land", |input| {
+        with_file(folder.path(), "land.geojson", input, |path| {
+            said(Land::read(path));
+        });
+    });
 }
 
 #[test]

@@ -170,7 +170,7 @@ fn what_cannot_be_simulated_is_refused() {
         let result = simulate(&template(), &[], options, &out, &mut |_| ());
         result.unwrap_err().to_string()
     };
-    assert!(refused(&options(0..20, 0..500)).contains("at least 128"));
+    assert!(refused(&options(0..20, 0..500)).contains("at least 64"));
     let mut windy = options(0..500, 0..500);
     windy.wind.speed = 99.0;
     assert!(refused(&windy).contains("wind_speed"));

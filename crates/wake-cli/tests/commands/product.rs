@@ -120,7 +120,7 @@ fn products_that_cannot_be_are_refused() {
             words,
         );
     };
-    simulate(&["--lines", "0..10"], &["at least 128"]);
+    simulate(&["--lines", "0..10"], &["at least 64"]);
     simulate(&["--lines", "10"], &["two whole numbers"]);
     simulate(&["--polarization", "VH"], &["VH"]);
     simulate(&["--wind-speed", "70"], &["wind_speed"]);

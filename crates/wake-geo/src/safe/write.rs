@@ -12,8 +12,8 @@ use crate::geolocation::GridPoint;
 use crate::geotiff::{Compression, GeoTiffLayout, Placement, write_geotiff};
 use crate::window::check_part;
 
-/// Fewest lines and pixels of a part: tables have a value every 40 pixels.
-const SMALLEST: usize = 128;
+/// Fewest lines and pixels of a part: the geolocation grid has 21 pixels a line, and tables a value every 40.
+const SMALLEST: usize = 64;
 
 impl Sentinel1 {
     /// Writes a product of one polarization into a folder: the annotation of this one, cut to some lines and pixels, and
@@ -28,7 +28,7 @@ impl Sentinel1 {
     ///
     /// # Errors
     ///
-    /// A part that leaves the image, or of fewer than 128 lines or pixels; a folder of that name; files that cannot be
+    /// A part that leaves the image, or of fewer than 64 lines or pixels; a folder of that name; files that cannot be
     /// written; what `fill` returns.
     pub fn write_part(
         &self,
