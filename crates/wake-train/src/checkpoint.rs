@@ -147,7 +147,7 @@ impl Checkpoint {
         }
         let mut tensors = Tensors::new();
         for (name, stored) in WeightFiles::open(&file)?.tensors()? {
-            tensors.insert(name, (stored.shape().to_vec(), stored.read()?));
+            tensors.insert(name, (stored.shape().to_vec(), stored.numbers()?));
         }
         Ok(Self {
             step,

@@ -242,18 +242,27 @@ impl Stored<'_> {
         )
     }
 
+    /// Reads the numbers, as f32, whatever they are.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if the file cannot be read.
+    pub fn numbers(&self) -> Result<Vec<f32>> {
+        match self.dtype() {
+            Dtype::F16 => self.converted(|b: [u8; 2]| f16::from_le_bytes(b).to_f32()),
+            Dtype::BF16 => self.converted(|b: [u8; 2]| bf16::from_le_bytes(b).to_f32()),
+            Dtype::F64 => self.converted(|b: [u8; 8]| f64::from_le_bytes(b) as f32),
+            _ => self.converted(f32::from_le_bytes),
+        }
+    }
+
     /// Reads the numbers, as f32; all must be finite.
     ///
     /// # Errors
     ///
     /// [`Error::Io`] if the file cannot be read, [`Error::InvalidWeight`] for a number that is not finite.
     pub fn read(&self) -> Result<Vec<f32>> {
-        let numbers = match self.dtype() {
-            Dtype::F16 => self.converted(|b: [u8; 2]| f16::from_le_bytes(b).to_f32()),
-            Dtype::BF16 => self.converted(|b: [u8; 2]| bf16::from_le_bytes(b).to_f32()),
-            Dtype::F64 => self.converted(|b: [u8; 8]| f64::from_le_bytes(b) as f32),
-            _ => self.converted(f32::from_le_bytes),
-        }?;
+        let numbers = self.numbers()?;
         match numbers.iter().find(|x| !x.is_finite()) {
             None => Ok(numbers),
             Some(x) => Err(Error::InvalidWeight {

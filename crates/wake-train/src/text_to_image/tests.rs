@@ -70,8 +70,8 @@ fn images_are_coded_and_decoded() {
         assert!(run.step(&task).unwrap().0.applied);
     }
     let places: Vec<(usize, [usize; 2])> = (0..4).map(|image| (image, [0, 0])).collect();
-    let pixels = images.windows(&places, [32, 32], &device);
     let model = run.averaged();
+    let pixels = model.scaled(images.windows(&places, [32, 32], &device));
     let means = model.encode(pixels.clone()).mode();
     let decoded = model.decode(means.clone());
     let squares = |x: Tensor<4>| f64::from(x.square().mean().into_scalar::<f32>());
