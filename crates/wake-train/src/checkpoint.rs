@@ -45,7 +45,7 @@ pub struct Checkpoint {
 
 impl Checkpoint {
     /// Writes the checkpoint below a folder and removes all but the two newest, and what killed runs left: a folder
-    /// belongs to one run and one process, see [`RunFolder`](super::folder::RunFolder).
+    /// belongs to one run and one process.
     ///
     /// # Errors
     ///

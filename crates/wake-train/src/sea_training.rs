@@ -51,14 +51,14 @@ impl SeaTraining<'_> {
         constants(options, Value::Null).validate(options.devices.len())
     }
 
-    /// Makes all steps. Writes `sea.safetensors`, which [`SeaTexture::load`] reads, a log, and what a [`RunFolder`] has; a run
+    /// Makes all steps. Writes `sea.safetensors`, which [`SeaTexture::load`] reads, a log, `config.json`, `run.json` and `checkpoints/`; a run
     /// that was killed goes on from its last checkpoint.
     ///
     /// - `draw`: draws the sea as it is now into a file, `sea.png`, after every checkpoint
     ///
     /// # Errors
     ///
-    /// Those of `draw`, and as [`check`](Self::check), [`SeaTexture::new`], [`RunFolder::open`] and [`Stage::train`].
+    /// Those of `draw`, and as [`check`](Self::check), [`SeaTexture::new`]; [`wake_nn::Error::InvalidOption`] for a folder of another run.
     pub fn train<E: From<Error>>(
         &self,
         out: &Path,

@@ -97,12 +97,12 @@ impl PipelineTraining<'_> {
         self.pairs.len().saturating_mul(each as u64)
     }
 
-    /// Makes all steps. Writes what [`Pipeline::load`] reads, `sheet.png`, logs, and what a [`RunFolder`] has; a run that was
+    /// Makes all steps. Writes what [`Pipeline::load`] reads, `sheet.png`, logs, `config.json`, `run.json` and `checkpoints/`; a run that was
     /// killed goes on from its last checkpoints.
     ///
     /// # Errors
     ///
-    /// As [`check`](Self::check), [`RunFolder::open`] and [`Stage::train`].
+    /// As [`check`](Self::check); [`wake_nn::Error::InvalidOption`] for a folder of another run.
     pub fn train(&self, out: &Path, progress: &(dyn Fn(Progress) + Sync)) -> Result<()> {
         self.check()?;
         let options = &self.options;

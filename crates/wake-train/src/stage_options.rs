@@ -25,7 +25,7 @@ pub(crate) struct StageDefaults {
 /// How a stage of training runs.
 #[derive(Debug, Clone)]
 pub struct StageOptions {
-    /// Steps in all; `None`: the [`StageDefaults`] number.
+    /// Steps in all; `None`: the usual number.
     pub steps: Option<usize>,
     /// Examples of a batch; `None`: the usual number.
     pub batch: Option<usize>,

@@ -15,7 +15,7 @@ const GROUPS: [&str; 4] = ["weights", "average", "first", "second"];
 /// So many steps in a row without a finite gradient end a run.
 const LOST: usize = 20;
 
-/// Constants of a [`Trainer`].
+/// Constants of a training loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainerOptions {
     /// Size of the steps.

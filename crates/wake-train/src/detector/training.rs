@@ -124,12 +124,12 @@ pub struct DetectorTraining {
 
 impl DetectorTraining {
     /// Makes all steps. Writes `detector.safetensors` (averaged weights, which
-    /// [`Detector::load`](wake_detector::Detector::load) takes), a log, and what a [`RunFolder`] has; a run that was killed goes
-    /// on from its last checkpoint.
+    /// [`Detector::load`](wake_detector::Detector::load) takes), a log, `config.json`, `run.json` and `checkpoints/`; a run that
+    /// was killed goes on from its last checkpoint.
     ///
     /// # Errors
     ///
-    /// As [`RunOptions::validate`], [`RunFolder::open`] and [`Stage::train`];
+    /// As [`RunOptions::validate`]; [`wake_nn::Error::InvalidOption`] for a folder of another run;
     /// [`wake_detector::Error::WrongMaps`] for first weights as [`Detector::load`](wake_detector::Detector::load).
     pub fn train(&self, out: &Path, progress: &dyn Fn(Progress)) -> Result<()> {
         let options = &self.options;

@@ -34,7 +34,7 @@ pub struct AblationRow {
     pub crest_variance: Option<f64>,
     /// Squared differences of neighbours across the borders of the model's squares over those elsewhere.
     pub seams: Option<f64>,
-    /// Against simulated images of the same scenes, see [`told_apart`].
+    /// Against simulated images of the same scenes, see [`classifier_two_sample_test`](crate::classifier_two_sample_test).
     pub two_sample: Option<TwoSample>,
 }
 
@@ -46,7 +46,7 @@ pub struct AblationRow {
 ///
 /// # Errors
 ///
-/// As [`ImageSource::draw`] and [`told_apart`].
+/// As [`ImageSource::draw`] and [`classifier_two_sample_test`](crate::classifier_two_sample_test).
 pub(super) fn ablation(
     scenes: &[Scene],
     kinds: &[(&'static str, &dyn ImageSource)],

@@ -63,7 +63,7 @@ impl Views {
     ///
     /// # Errors
     ///
-    /// As [`told_apart`].
+    /// As [`classifier_two_sample_test`](crate::classifier_two_sample_test).
     pub fn row(&self, image: &'static str, simulated: &Self, device: &Device) -> Result<DomainRow> {
         Ok(DomainRow {
             image,

@@ -46,21 +46,21 @@ pub struct FineTuning<'a> {
     pub data: &'a Folder,
     /// Rank of the changes of the attentions; `None`: the whole U-Net learns.
     pub rank: Option<usize>,
-    /// γ of the weights by signal-to-noise ratio, see [`FineTuneTask::with_snr_gamma`].
+    /// γ of the weights by signal-to-noise ratio, Hang et al. (2023), "Efficient Diffusion Training via Min-SNR Weighting Strategy".
     pub snr_gamma: Option<f64>,
     /// How it runs.
     pub options: StageOptions,
 }
 
 impl FineTuning<'_> {
-    /// Makes all steps. Writes the model, `pytorch_lora_weights.safetensors` where changes are what learns, a log, and what a
-    /// [`RunFolder`] has; a run that was killed goes on from its last checkpoint.
+    /// Makes all steps. Writes the model, `pytorch_lora_weights.safetensors` where changes are what learns, a log, and `config.json`,
+    /// `run.json` and `checkpoints/`; a run that was killed goes on from its last checkpoint.
     ///
     /// # Errors
     ///
     /// [`wake_nn::Error::InvalidOption`] for images of another size than the autoencoder takes and a set without pairs to learn
     /// from; [`wake_nn::Error::Unsupported`] for a scheduler without a noise schedule, or the prediction of a flow; else as
-    /// [`Pipeline::load`], [`RunOptions::validate`], [`RunFolder::open`] and [`Stage::train`].
+    /// [`Pipeline::load`], [`RunOptions::validate`]; [`wake_nn::Error::InvalidOption`] for a folder of another run.
     pub fn train(&self, out: &Path, progress: &dyn Fn(Progress)) -> Result<()> {
         let constants = self.constants()?;
         let device = self.options.device();

@@ -53,7 +53,7 @@ fn results(part: Part) -> &'static [&'static str] {
 ///
 /// A stage runs the earlier ones first, or to their end, where their weights are not in the folder yet. They leave there
 /// what [`WakeSampler::from_folder`](wake_ldm::WakeSampler::from_folder) reads (weights averaged, 16 bits),
-/// `explained_variance.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, and what a [`RunFolder`] has.
+/// `explained_variance.json`, a log `STAGE.jsonl` for each stage, `sheet.png`, `config.json`, `run.json` and `checkpoints/`.
 ///
 /// ```no_run
 /// use wake_dataset::Recipe;
@@ -96,7 +96,7 @@ impl<'a> WakeTraining<'a> {
     ///
     /// # Errors
     ///
-    /// As [`RunFolder::open`], [`RunOptions::validate`](super::RunOptions::validate) and [`StageOptions::learning_devices`].
+    /// [`wake_nn::Error::InvalidOption`] for a folder of another run; else as [`RunOptions::validate`](super::RunOptions::validate) and [`StageOptions::learning_devices`].
     pub fn open(
         out: PathBuf,
         (part, options): (Part, StageOptions),
@@ -131,7 +131,7 @@ impl<'a> WakeTraining<'a> {
     ///
     /// # Errors
     ///
-    /// As [`Stage::train`] and [`LatentSet::of`]; [`wake_nn::Error::InvalidOption`] without pairs for any part but the parser,
+    /// Those of the pairs and of files; [`Error::Diverged`]; [`wake_nn::Error::InvalidOption`] without pairs for any part but the parser,
     /// and when an earlier part was begun with other values.
     pub fn run(&mut self) -> Result<()> {
         let options = self.options.clone();
