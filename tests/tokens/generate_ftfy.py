@@ -2,7 +2,7 @@
 
 pip install ftfy==6.3.1; python generate_ftfy.py > ftfy.json
 
-Prompts in which ftfy guesses an encoding are left out (docs/cleaning.md, "Not done").
+Prompts in which ftfy guesses an encoding are left out (Tokenizer::encode does not guess).
 """
 
 import json

@@ -86,7 +86,7 @@ fn looks_misdecoded(text: &str) -> bool {
 }
 
 /// Where the tokenizers part, ours follows Stable Diffusion's with `ftfy`. The listed exception is text
-/// decoded with the wrong encoding, which is left as it is (`docs/cleaning.md`, "Not done").
+/// decoded with the wrong encoding, which is left as it is (table "not done" of `cleaning.md`).
 #[test]
 fn ids_where_tokenizers_part_follow_the_stated_cleaning() {
     for case in cases().iter().filter(|case| !case.all_agree) {
@@ -184,11 +184,10 @@ proptest! {
     }
 }
 
-/// The table of rules in `docs/cleaning.md`, with `\u{…}` and `\t` as in Rust.
+/// The table of rules of `Tokenizer::encode`, with `\u{…}` and `\t` as in Rust.
 #[test]
-fn the_page_on_cleaning_is_true() {
-    let page = include_str!("../../docs/cleaning.md");
-    let rules = page.split("## Not done").next().unwrap();
+fn the_documented_rules_of_cleaning_are_true() {
+    let rules = include_str!("../../crates/wake-text/src/cleaning.md");
     let mut count = 0;
     for line in rules.lines().filter(|line| line.starts_with("| ")) {
         let cells: Vec<&str> = line.trim_matches('|').split(" | ").collect();

@@ -1,24 +1,5 @@
-//! Cleaning: what happens to a prompt before it is split into words.
-//!
-//! Stable Diffusion v1.4 feeds its prompts through `ftfy` and lower case. Of `ftfy`'s repairs those that
-//! need no guess are made here, in this order:
-//!
-//! | rule | example |
-//! | --- | --- |
-//! | HTML entities become characters, repeatedly, up to the line of the first `<` | `&amp;lt;` → `<` |
-//! | C1 control characters (U+0080–009F) are read as Windows-1252 | U+0085 → `…` |
-//! | Latin ligatures become letters | `ﬁn` → `fin` |
-//! | full-width and half-width forms become the usual ones | `ＳＡＲ１` → `SAR1` |
-//! | curly quotes become straight | `“it’s”` → `"it's"` |
-//! | terminal colour codes go | `ESC [31m` |
-//! | control characters (U+0000–0008, 000B, 000E–001F, 007F, 206A–206F, FEFF, FFF9–FFFC) go | `a\0b` → `ab` |
-//! | Unicode form NFC | `e` + U+0301 → `é` |
-//! | lower case, by Unicode's default rules | `SAR` → `sar` |
-//!
-//! White space of any kind and length only separates words. Not done: undoing text that was decoded with
-//! the wrong encoding (`Ã©` for `é`), removing accents, spacing out Chinese characters.
-//!
-//! A prompt of printable ASCII without `&` only becomes lower case, as with every CLIP tokenizer.
+//! Cleaning of a prompt before it is split into words. The rules are in `cleaning.md`, shown at
+//! [`Tokenizer::encode`](crate::Tokenizer::encode).
 
 use std::ops::Range;
 use unicode_normalization::{

@@ -92,16 +92,9 @@ impl Tokenizer {
         Self { vocabulary }
     }
 
-    /// The tokens of a prompt; a longer one is cut, with the end mark kept last.
+    /// Encodes a prompt as [`TOKENS`] token ids. A longer prompt is truncated; the end mark stays last.
     ///
-    /// The prompt is cleaned first, as Stable Diffusion does with `ftfy`, short of guesses. In this order:
-    /// HTML entities are decoded, up to the line of the first `<`; ligatures, full-width forms and curly quotes
-    /// become the usual characters; terminal and control codes go; Unicode form NFC; lower case. White space
-    /// only separates words. Text in a wrong encoding is not repaired. Printable ASCII without `&` only becomes
-    /// lower case.
-    ///
-    /// The marks `<|startoftext|>` and `<|endoftext|>` within a prompt become their tokens, as in Stable
-    /// Diffusion.
+    #[doc = include_str!("cleaning.md")]
     pub fn encode(&self, prompt: &str) -> Tokens {
         let cleaned = clean(prompt);
         let mut row = Row::new(&self.vocabulary);
