@@ -1,4 +1,4 @@
-//! Where land is: a coarse coastline of the whole Earth, or one from a file.
+//! Land: a coarse coastline of the whole Earth, or one from a file.
 
 use std::io::Read;
 use std::path::Path;
@@ -83,7 +83,7 @@ impl Land {
         Self { rings: all }
     }
 
-    /// The polygons of a GeoJSON file; other geometries in it are not looked at.
+    /// Reads the polygons of a GeoJSON file; other geometries are ignored.
     ///
     /// # Errors
     ///

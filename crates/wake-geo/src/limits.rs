@@ -1,4 +1,4 @@
-//! Limits on what an untrusted file may ask for.
+//! Limits on sizes and counts in untrusted files.
 
 /// Largest size of one XML file \[bytes\]; the annotation of an extra-wide scene has about 4 MB.
 pub const XML_BYTES: u64 = 32 << 20;

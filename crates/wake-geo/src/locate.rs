@@ -1,9 +1,9 @@
-//! What is known of single pixels.
+//! Place, calibration and σ⁰ of single pixels.
 
 use crate::error::{Result, check_range};
 use crate::product::Product;
 
-/// What a product says of one pixel: place, calibration, σ⁰.
+/// Place, calibration and σ⁰ of one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Located {
     /// Line, from 0.

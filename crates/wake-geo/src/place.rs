@@ -1,6 +1,6 @@
-//! Where a pixel lies on Earth.
+//! Places of pixels on Earth.
 
-/// Place of a pixel. What the product does not say is `None`.
+/// Place of a pixel; values that the product does not have are `None`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Place {
     /// Geodetic latitude on WGS84, north positive \[degrees\].

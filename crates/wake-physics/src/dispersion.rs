@@ -1,4 +1,4 @@
-//! How fast waves travel: gravity–capillary waves over water of any depth.
+//! Dispersion of gravity–capillary waves over water of any depth.
 
 use crate::constants::{GRAVITY, KINEMATIC_SURFACE_TENSION};
 

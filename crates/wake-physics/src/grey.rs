@@ -29,11 +29,11 @@ pub struct GreyScale {
     pub mapping: Mapping,
 }
 
-/// What grey is linear in.
+/// Quantity that grey is linear in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mapping {
-    /// The decibel of σ⁰: every level is the same contrast.
+    /// σ⁰ in dB: every level is the same contrast.
     #[default]
     Decibel,
     /// The amplitude √σ⁰, as in the quick-looks and 8-bit products of real sensors.

@@ -43,7 +43,7 @@ pub struct Gusts {
     pub strength: f64,
     /// Outer scale `L₀` \[m\].
     pub scale: f64,
-    /// Where the wind blows to \[rad\], clockwise from azimuth.
+    /// Wind direction (toward) \[rad\], clockwise from azimuth.
     pub wind_toward: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Relative permittivity of sea water: how strongly it reflects the radar's wave.
+//! Relative permittivity of sea water.
 //!
 //! Time factor e^{−iωt}: the imaginary part is positive.
 

@@ -35,7 +35,7 @@ pub struct Slicks {
 type Wave = ([f64; 2], Complex64);
 
 impl Slicks {
-    /// What is left of the short waves at every pixel, 1 − damping \[1\]; 1 everywhere in a wind above
+    /// Remaining share of the short waves at every pixel, 1 − damping \[1\]; 1 everywhere in a wind above
     /// [`STRONGEST_WIND`].
     ///
     /// Drawn at pixels up to a tenth of the width apart and interpolated linearly between them: in the mean within 0.005 of the damping.

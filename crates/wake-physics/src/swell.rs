@@ -32,7 +32,7 @@ pub struct Swell {
     pub height: f64,
     /// Wavelength of the peak \[m\].
     pub wavelength: f64,
-    /// Where it goes to \[rad\], clockwise from azimuth.
+    /// Direction of travel \[rad\], clockwise from azimuth.
     pub toward: f64,
 }
 
@@ -82,7 +82,7 @@ impl Swell {
         cells
     }
 
-    /// One draw of it as plane waves.
+    /// Draws one realisation as plane waves.
     ///
     /// - `depth` \[m\] of the water, `time` \[s\], `band` [rad/m]: largest wavenumber of the pixels
     /// - `seed`: the same seed gives the same waves

@@ -8,20 +8,20 @@ use crate::spreading::{Spread, Spreading};
 /// Beyond this peak wavenumber [rad/m] (a wave of 0.06 mm) there is no wave: the sea is flat.
 const LARGEST_PEAK: f64 = 1e5;
 
-/// What makes a wind sea.
+/// Parameters of a wind sea.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindSea {
     /// Wind speed at 10 m height U₁₀ [m/s], at least 0; 0 is a flat sea.
     pub wind_speed: f64,
-    /// Where the wind blows to [rad clockwise from +y].
+    /// Wind direction (toward) [rad clockwise from +y].
     pub wind_toward: f64,
-    /// Distance over which the wind has blown F \[m\], above 0.
+    /// Fetch F \[m\], above 0.
     pub fetch: f64,
     /// Water depth h \[m\], above 0, may be infinite.
     pub depth: f64,
     /// Spectrum of the waves.
     pub spectrum: SpectrumModel,
-    /// How the waves spread around the wind.
+    /// Directional spreading of the waves.
     pub spreading: SpreadingModel,
 }
 
@@ -97,7 +97,7 @@ impl DirectionalSpectrum {
         self.flat
     }
 
-    /// Unit vector (x, y) of where the wind blows to.
+    /// Unit vector (x, y) of the wind direction (toward).
     #[must_use]
     pub fn wind(&self) -> [f64; 2] {
         self.wind

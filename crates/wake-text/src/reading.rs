@@ -12,7 +12,7 @@ use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 
-/// What was understood of a prompt, and what was not.
+/// Result of reading a prompt: the values it states, and the parts that were not understood.
 ///
 /// Every number and every word of a prompt is a part of `scene`, filler that changes no value ("a", "of", "image",
 /// "sea"), or named in `unread`; so is every sign that is neither punctuation nor a part of a number. A text without a
@@ -40,16 +40,16 @@ use std::ops::Range;
 pub struct Reading {
     /// The values the prompt states.
     pub scene: PartialScene,
-    /// What stays unread, in the order of the prompt.
+    /// Unread parts, in the order of the prompt.
     pub unread: Vec<Unread>,
 }
 
 /// A part of a prompt that was not understood.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Unread {
-    /// Its bytes in the prompt.
+    /// Byte range in the prompt.
     pub place: Range<usize>,
-    /// Its text.
+    /// Text of the part.
     pub text: String,
     #[serde(skip)]
     of_the_field: bool,
@@ -117,7 +117,7 @@ impl Reading {
         Ok(Self { scene, unread })
     }
 
-    /// Whether the prompt states nothing of a scene.
+    /// Whether the prompt states nothing about a scene.
     pub fn states_nothing(&self) -> bool {
         self.scene.is_empty()
     }

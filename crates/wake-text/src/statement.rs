@@ -1,4 +1,4 @@
-//! What a prompt states of a scene, and how its statements come together.
+//! Values that a prompt states, and their consistency.
 
 use crate::amounts::Dimension;
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use std::fmt;
 use std::ops::Range;
 use wake_physics::{Scene, scene::Ship};
 
-/// The values a prompt states; what it does not say is `None`.
+/// Scene values that a prompt states; a value that it does not state is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PartialScene {
@@ -30,7 +30,7 @@ pub struct PartialScene {
 }
 
 impl PartialScene {
-    /// What the prompt of a scene states: speeds rounded to 0.1 m/s, the others to 1, directions within
+    /// Values that the prompt of a scene states: speeds rounded to 0.1 m/s, the others to 1, directions within
     /// 0 up to 360; halves away from zero.
     ///
     /// Without a ship its speed and heading stay open; without wind its direction and the fetch. Of several ships the
@@ -50,7 +50,7 @@ impl PartialScene {
         }
     }
 
-    /// `base` with the stated values in place of its own.
+    /// Replaces values of `base` by the stated ones.
     ///
     /// A stated speed or heading brings a ship, the default one if `base` has none. Of several ships the first gets them,
     /// and "no ship" takes all away.
@@ -83,7 +83,7 @@ impl PartialScene {
         radar.incidence = self.incidence.unwrap_or(radar.incidence);
     }
 
-    /// These values, and those of `other` where they leave one open; without a ship there are no values of one.
+    /// Fills open values from `other`; without a ship, the ship's values stay open.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         let ship = self.says_of_ships().or(other.ship);

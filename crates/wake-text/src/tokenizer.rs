@@ -11,7 +11,7 @@ use tokenizers::utils::SysRegex;
 /// Number of tokens the text encoder of CLIP takes, start and end mark included.
 pub const TOKENS: usize = 77;
 
-/// A prompt as the text encoder takes it.
+/// A tokenized prompt, as CLIP's text encoder takes it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tokens {
     /// Start mark, words, end mark, padding.
@@ -25,7 +25,7 @@ pub struct Tokens {
 }
 
 impl Tokens {
-    /// Whether a part of the prompt was cut off.
+    /// Whether the prompt was truncated.
     pub fn truncated(&self) -> bool {
         self.truncated_at.is_some()
     }
@@ -33,7 +33,7 @@ impl Tokens {
 
 /// CLIP's tokenizer: cleans, splits into words and merges byte pairs.
 ///
-/// Built once, shared by all threads: nothing in it changes.
+/// It is immutable and may be shared by threads.
 ///
 /// # Examples
 ///
@@ -117,7 +117,7 @@ impl Tokenizer {
         row.finish(&cleaned)
     }
 
-    /// The tokens of many prompts, in their order, on all cores.
+    /// Encodes many prompts on all cores, in their order.
     pub fn encode_batch<S: AsRef<str> + Sync>(&self, prompts: &[S]) -> Vec<Tokens> {
         prompts
             .par_iter()

@@ -4,10 +4,10 @@ use crate::error::Result;
 use crate::statement::PartialScene;
 use wake_physics::Scene;
 
-/// One way to say a scene in words.
+/// Wording of a prompt.
 ///
-/// All state the same values, and [`PartialScene::read`] reads all of them back. Different words for the
-/// same scene keep a text encoder from learning one sentence by heart.
+/// All state the same values, and [`PartialScene::read`] reads all of them back. Different wordings
+/// keep a text encoder from memorising one sentence.
 ///
 /// Of several ships they state how many there are, and speed and heading of the first: "wakes from 2 ships, the first
 /// moving at 10 mps toward 135 degrees". The number stays unread when the prompt is read back.

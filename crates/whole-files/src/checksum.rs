@@ -5,9 +5,9 @@ use std::path::Path;
 
 use crate::read::open_regular;
 
-/// CRC-32 of some bytes, the one of PNG and ZIP, as eight hexadecimal digits.
+/// CRC-32 of bytes (the variant of PNG and ZIP), as eight hexadecimal digits.
 ///
-/// A change of up to 32 neighbouring bits changes it, any other does but for one in 2³².
+/// Detects every change within 32 neighbouring bits, and any other change with probability 1 − 2⁻³².
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> String {
     format!("{:08x}", crc32fast::hash(bytes))
@@ -30,7 +30,7 @@ pub fn file_checksum(path: &Path) -> io::Result<String> {
     }
 }
 
-/// The text of a JSON object with one more entry at its end: `crc32`, the [`checksum`] of all text before that entry.
+/// Appends the entry `crc32`, the [`checksum`] of all text before it, to a JSON object.
 ///
 /// - `object`: as `serde_json` writes it, on one line or on several, with at least one entry
 #[must_use]
@@ -44,7 +44,7 @@ pub fn sealed(object: &str) -> String {
     }
 }
 
-/// The JSON object that [`sealed`] was given, without the entry; `None` for text that was changed since, or never sealed.
+/// Removes the entry that [`sealed`] appended; `None` if the text has changed since, or was never sealed.
 #[must_use]
 pub fn unsealed(text: &str) -> Option<String> {
     let (entries, _) = text.rsplit_once(',')?;

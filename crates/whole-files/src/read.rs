@@ -1,4 +1,4 @@
-//! Text files that are read to a limit, and short names of the content of files.
+//! Text files that are read up to a limit, and fingerprints of files.
 
 use crate::error::{Result, failed};
 use std::fs::{self, File};
@@ -25,7 +25,7 @@ pub fn read_text(path: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// The bytes of a file.
+/// Reads the bytes of a file.
 ///
 /// # Errors
 ///
@@ -34,7 +34,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     read_regular(path).map_err(|source| failed("read", path, source))
 }
 
-/// Opens a regular file: opening a pipe would wait for somebody to write into it.
+/// Opens a regular file; refuses pipes, whose opening would block.
 ///
 /// # Errors
 ///
@@ -46,7 +46,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     }
 }
 
-/// The bytes of a regular file, as [`open_regular`] opens it.
+/// Reads the bytes of a regular file.
 ///
 /// # Errors
 ///
@@ -57,7 +57,7 @@ pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A short name of the content of a file, which is read piece by piece: FNV-1a of 64 bits.
+/// Fingerprint of a file's content: 64-bit FNV-1a.
 ///
 /// # Errors
 ///

@@ -1,6 +1,6 @@
 //! Foreign text in error messages: one line of limited length, without control characters.
 
-/// Text that somebody else wrote, as it may stand in a sentence: at most 80 characters, control characters escaped.
+/// Escapes foreign text for an error message: at most 80 characters, control characters escaped.
 ///
 /// ```
 /// assert_eq!(whole_files::quoted("a\u{1b}[31mb"), "a\\u{1b}[31mb");
@@ -10,7 +10,7 @@ pub fn quoted(text: &str) -> String {
     shortened(text, 80)
 }
 
-/// A message that may quote foreign text: one line of at most 400 characters, of which the middle is left out.
+/// Shortens a message that may quote foreign text to one line of at most 400 characters, without its middle.
 pub fn sentence(text: &str) -> String {
     let text = text.trim();
     // A character becomes ten at most; what cannot stay need not be looked at.

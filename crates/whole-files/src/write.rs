@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all.
+//! Atomic file writing.
 //!
 //! A file is written under another name, `.NAME.PROCESS-NUMBER.tmp`, and locked while it is; then it takes its own name.
 
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Tells apart the files that one process writes at the same time.
 static COUNTER: AtomicU64 = AtomicU64::new(0);
 
-/// Writes bytes to a temporary neighbour and renames it: the file is whole, or as it was before.
+/// Writes bytes to a temporary file and renames it: the file is complete, or as it was before.
 ///
 /// # Errors
 ///
@@ -21,7 +21,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |file| file.write_all(bytes)).map_err(|e| failed("write", path, e))
 }
 
-/// Writes a file piece by piece, whole or not at all: it takes its name when all of it is on disk.
+/// Writes a file piece by piece; the file gets its name when all of it is on disk.
 ///
 /// # Errors
 ///
@@ -84,7 +84,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write_atomically(path, text.as_bytes())
 }
 
-/// Whether a name is one of a file that is being written.
+/// Whether a name is that of a temporary file of this crate.
 pub fn is_temporary(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.starts_with('.') && name.ends_with(".tmp")

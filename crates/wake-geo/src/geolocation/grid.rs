@@ -11,7 +11,7 @@ pub struct GridPoint {
     pub line: f64,
     /// Pixel; pixel 0 is the centre of the first pixel.
     pub pixel: f64,
-    /// Where it lies.
+    /// Its place.
     pub place: Place,
 }
 

@@ -18,7 +18,7 @@ pub(crate) enum Geolocation {
     Grid(Grid),
     /// From an affine map of projected coordinates.
     Affine(Affine, Projection),
-    /// Not at all, and why.
+    /// No places, with the reason.
     Unknown(String),
 }
 

@@ -66,7 +66,7 @@ pub struct SwathLooks {
     pub azimuth_look_bandwidth: f64,
 }
 
-/// What the annotation of one polarization says. Line 0 is the first that was acquired; pixel 0 is in near range.
+/// Annotation of one polarization. Line 0 is the first that was acquired; pixel 0 is in near range.
 #[derive(Clone, Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct Annotation {

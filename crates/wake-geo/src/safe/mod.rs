@@ -98,7 +98,7 @@ impl Sentinel1 {
         })
     }
 
-    /// What the annotation says.
+    /// Annotation of the product.
     pub fn annotation(&self) -> &Annotation {
         &self.annotation
     }

@@ -17,7 +17,7 @@ const SMALLEST: usize = 64;
 
 impl Sentinel1 {
     /// Writes a product of one polarization into a folder: the annotation of this one, cut to some lines and pixels, and
-    /// digital numbers of one's own. Gives the path of the new `.SAFE` folder.
+    /// your digital numbers. Returns the path of the new `.SAFE` folder.
     ///
     /// Times, sizes, geolocation, coordinate conversion, swath bounds, calibration and noise are those of the part; what
     /// describes the acquisition (orbit, attitude, Doppler, antenna) stays whole. The manifest has the new files alone, without

@@ -14,7 +14,7 @@ const PANEL_NODES: usize = 32;
 /// Error of a panel as part of the tolerance: the sum of all amplitudes is some ten times a field's rms.
 const PANEL_SHARE: f64 = 0.01;
 
-/// A range of wave directions that is computed.
+/// Computed range of wave directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Zone {
     /// Smallest and largest direction θ to the track \[rad\], to port positive.
@@ -41,7 +41,7 @@ pub struct WakePlan {
     pub error_bound: f64,
     /// Nodes u and weights, window included.
     quadrature: Vec<(f64, f64)>,
-    /// Rings of waves in the place of the nodes, behind a ship that turns.
+    /// Rings of waves instead of nodes, behind a ship that turns.
     rings: Option<Rings>,
     ring_work: RingWork,
 }

@@ -1,5 +1,4 @@
-//! Figures of one image that stand beside those of others, simulated or real: the texture of its sea, and what lies across
-//! its wakes.
+//! Measurements of one image, for comparison of simulated and real images: texture of its sea, profiles across its wakes.
 
 use serde::Serialize;
 
@@ -15,23 +14,23 @@ const SIDE: usize = 256;
 /// Stretches of a wake from its tip \[pixels\].
 const STRETCHES: [[f64; 2]; 3] = [[25.0, 85.0], [85.0, 170.0], [170.0, 300.0]];
 
-/// What is measured in one image of amplitude.
+/// Measurements of one amplitude image.
 #[derive(Debug, Clone, Serialize)]
 pub struct ImageFigures {
     /// Name of the image.
     pub name: String,
-    /// What window, resolution and looks say of the speckle of a simulated image.
+    /// Speckle of a simulated image by its window, resolution and looks.
     pub stated: Option<StatedSpeckle>,
     /// The texture of its open sea, in windows of 256 pixels a side; `None` where no window holds sea alone.
     pub texture: Option<Texture>,
-    /// What lies across its wakes.
+    /// Profiles across its wakes.
     pub wakes: Vec<WakeFigures>,
 }
 
 /// Speckle in closed form, see [`amplitude_correlation`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StatedSpeckle {
-    /// Independent looks that overlapping ones are worth.
+    /// Equivalent number of looks.
     pub looks: f64,
     /// Correlation of amplitudes one, two and three pixels apart in a row.
     pub along_rows: [f64; 3],
@@ -39,7 +38,7 @@ pub struct StatedSpeckle {
     pub along_columns: [f64; 3],
 }
 
-/// What lies across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
+/// Profiles across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
 #[derive(Debug, Clone, Serialize)]
 pub struct WakeFigures {
     /// Names of the image and of the wake in it.
@@ -51,7 +50,7 @@ pub struct WakeFigures {
 }
 
 impl ImageFigures {
-    /// Those of a simulated image with speckle; its wakes are called by letters.
+    /// Measures a simulated image with speckle; its wakes are named by letters.
     #[must_use]
     pub fn of_simulation(name: &str, simulation: &Simulation) -> Self {
         let mut amplitude = simulation.speckled.clone();
@@ -73,7 +72,7 @@ impl ImageFigures {
         }
     }
 
-    /// Those of an image that is linear in amplitude.
+    /// Measures an image that is linear in amplitude.
     ///
     /// - `wakes`: the axes of its wakes by their names
     #[must_use]
@@ -97,7 +96,7 @@ impl ImageFigures {
 }
 
 impl StatedSpeckle {
-    /// That of a scene's radar.
+    /// Speckle of a scene's radar.
     ///
     /// - `spacing`: of the pixels \[m\]
     #[must_use]

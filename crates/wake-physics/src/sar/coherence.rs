@@ -64,7 +64,7 @@ pub fn azimuth_cutoff(range_to_velocity: f64, velocity_deviation: f64) -> f64 {
     2.0 * PI * range_to_velocity * velocity_deviation
 }
 
-/// Part of the power of an azimuth wave that random motion leaves in the image.
+/// Share of an azimuth wave's power that remains in the image under random motion.
 ///
 /// ```text
 /// exp(−k_y² (R/V)² σ_u²)

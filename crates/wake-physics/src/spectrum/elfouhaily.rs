@@ -24,7 +24,7 @@ const DEVELOPED_FETCH: f64 = 2.2e4;
 /// Largest inverse wave age for which the peak enhancement was fitted \[1\].
 const YOUNGEST_SEA: f64 = 5.0;
 
-/// How strongly the wind drags the water: C₁₀ = (u*/U₁₀)².
+/// Drag law of the wind, C₁₀ = (u*/U₁₀)².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum DragLaw {
     /// C₁₀ = (0.8 + 0.065 U₁₀)·10⁻³ (Wu 1982): the choice of the author's programme.
@@ -207,7 +207,7 @@ impl Elfouhaily {
         }
     }
 
-    /// How much more waves run along the wind than across it, Δ(k) \[1\].
+    /// Anisotropy Δ(k) \[1\]: how many more waves run along the wind than across it.
     ///
     /// ```text
     /// D(k, φ) = (1 + Δ cos 2φ)/(2π),   Δ = tanh[ln2/4 + 4 (c/c_p)^2.5 + 0.13 (u*/c_m)(c_m/c)^2.5]
@@ -231,7 +231,7 @@ impl Elfouhaily {
 
     /// Spectral density Ψ(kx, ky) \[m⁴\], two-sided and even.
     ///
-    /// - `k` [rad/m]; `wind` unit vector of where the wind blows to
+    /// - `k` [rad/m]; `wind`: unit vector of the wind direction (toward)
     #[must_use]
     pub fn density(&self, k: [f64; 2], wind: [f64; 2]) -> f64 {
         if self.is_flat() {

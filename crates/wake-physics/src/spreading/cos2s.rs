@@ -4,7 +4,7 @@ use super::spread::Spread;
 use crate::constants::GRAVITY;
 use std::f64::consts::PI;
 
-/// Waves around the wind, few against it.
+/// Cos-2s spreading: most waves run with the wind.
 ///
 /// ```text
 /// D(δ) = Γ(s+1)/(2√π Γ(s+½)) · cos^{2s}(δ/2),   cos²(δ/2) = (1 + cos δ)/2

@@ -3,7 +3,7 @@
 use super::spread::Spread;
 use crate::spectrum::Elfouhaily;
 
-/// Waves along the wind more than across it, as many against it as with it.
+/// Even spreading: more waves along the wind than across it, as many against it as with it.
 ///
 /// ```text
 /// D(k, δ) = (1 + Δ(k) cos 2δ)/(2π)

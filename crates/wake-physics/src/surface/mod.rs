@@ -99,10 +99,10 @@ pub struct Surface {
 impl Surface {
     /// Draws a sea.
     ///
-    /// - `spectrum` what the waves are drawn from
-    /// - `seed` which of all seas
+    /// - `spectrum`: density of the waves
+    /// - `seed`: of the random numbers
     /// - `time` t \[s\], from 0 to 10⁵: each wave has moved along its k by ωt
-    /// - `raster` where the sea will be seen, margins included
+    /// - `raster`: of the fields, margins included
     #[must_use]
     pub fn new(spectrum: &DirectionalSpectrum, seed: u64, time: f64, raster: &Raster) -> Self {
         let mut workspace = Workspace::default();
@@ -173,7 +173,7 @@ impl Surface {
         self.carried <= 0.0
     }
 
-    /// Variance ⟨ζ²⟩ that the waves have on average over seeds \[m²\].
+    /// Expected variance ⟨ζ²⟩ of the waves, over seeds \[m²\].
     #[must_use]
     pub fn variance(&self) -> f64 {
         self.carried
