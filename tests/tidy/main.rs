@@ -7,6 +7,7 @@ mod crates;
 mod imports;
 mod pages;
 mod picture;
+mod quotes;
 mod scene_keys;
 
 use std::collections::BTreeSet;
@@ -196,6 +197,22 @@ fn links_of_all_pages_lead_somewhere() {
         .flat_map(|page| pages::broken_links(page))
         .collect();
     assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+/// Every number that a page quotes from a report is the report's.
+#[test]
+fn numbers_of_the_pages_are_those_of_the_reports() {
+    let mut all = pages::pages(&root().join("docs"));
+    all.insert(root().join("README.md"));
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for page in all {
+        let (quotes, differ) = quotes::wrong_quotes(&page);
+        count += quotes;
+        wrong.extend(differ);
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count >= 20, "only {count} numbers quoted");
 }
 
 /// Every page is in the book, decisions by way of their own list.

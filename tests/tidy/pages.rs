@@ -49,19 +49,33 @@ pub(crate) fn broken_links(page: &Path) -> Vec<String> {
 
 /// Targets of the links and pictures of a page, code excepted.
 pub(crate) fn links(text: &str) -> Vec<String> {
-    let mut targets = Vec::new();
+    let links = titled_links(text).into_iter();
+    links.map(|(_, target, _)| target).collect()
+}
+
+/// Text, target and title of the links and pictures of a page, code excepted: `[text](target "title")`.
+pub(crate) fn titled_links(text: &str) -> Vec<(String, String, String)> {
     let mut fenced = false;
-    for line in text.lines() {
-        fenced ^= line.trim_start().starts_with("```");
-        if fenced || line.starts_with("    ") {
-            continue;
-        }
-        // Every second piece between backticks is code.
-        let prose: String = line.split('`').step_by(2).collect();
-        let ends = prose.match_indices("](").map(|(at, _)| &prose[at + 2..]);
-        targets.extend(ends.filter_map(|rest| Some(rest[..rest.find(')')?].to_owned())));
-    }
-    targets
+    let lines = text.lines().filter(|line| {
+        let fence = line.trim_start().starts_with("```");
+        fenced ^= fence;
+        !fenced && !fence && !line.starts_with("    ")
+    });
+    let lines: Vec<&str> = lines.collect();
+    let text = lines.join(" ");
+    // Every second piece between backticks is code.
+    let prose: String = text.split('`').step_by(2).collect();
+    let ends = prose.match_indices("](").filter_map(|(at, _)| {
+        let label = &prose[prose[..at].rfind('[')? + 1..at];
+        let rest = &prose[at + 2..];
+        let (target, rest) = rest.split_at(rest.find([' ', ')'])?);
+        let title = rest
+            .strip_prefix(" \"")
+            .and_then(|title| title.split_once("\")"));
+        let title = title.map_or("", |(title, _)| title);
+        Some((label.to_owned(), target.to_owned(), title.to_owned()))
+    });
+    ends.collect()
 }
 
 /// The name under which a heading is linked.
