@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {action} {}: {source}", path.display())]
 pub struct Error {
-    /// Attempted action, such as "write".
+    /// What was tried, such as "write".
     pub action: &'static str,
-    /// File or folder.
+    /// Where.
     pub path: PathBuf,
-    /// Error of the system.
+    /// What the system says.
     pub source: std::io::Error,
 }
 

@@ -18,15 +18,15 @@ pub fn make_folder(folder: &Path) -> Result<()> {
     sweep(folder)
 }
 
-/// Exclusive lock of this process on a folder, released when dropped.
+/// A folder that only one process works in, until this is dropped.
 #[derive(Debug)]
 pub struct FolderLock {
     _folder: Option<File>,
 }
 
-/// Makes a folder and locks it for this process.
+/// Makes a folder, and takes it for this process alone.
 ///
-/// On systems that cannot lock folders nothing is locked.
+/// Where the system cannot lock a folder nothing is locked.
 ///
 /// # Errors
 ///
@@ -52,7 +52,7 @@ pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
     }
 }
 
-/// Removes temporary files of killed processes from a folder; keeps those of running ones.
+/// Removes what killed processes left half-written in a folder, and nothing that a living one writes.
 ///
 /// # Errors
 ///

@@ -1,4 +1,5 @@
-//! Measurements of one image, for comparison of simulated and real images: texture of its sea, profiles across its wakes.
+//! Figures of one image that stand beside those of others, simulated or real: the texture of its sea, and what lies across
+//! its wakes.
 
 use serde::Serialize;
 
@@ -14,23 +15,23 @@ const SIDE: usize = 256;
 /// Stretches of a wake from its tip \[pixels\].
 const STRETCHES: [[f64; 2]; 3] = [[25.0, 85.0], [85.0, 170.0], [170.0, 300.0]];
 
-/// Measurements of one amplitude image.
+/// What is measured in one image of amplitude.
 #[derive(Debug, Clone, Serialize)]
 pub struct ImageFigures {
     /// Name of the image.
     pub name: String,
-    /// Speckle of a simulated image by its window, resolution and looks.
+    /// What window, resolution and looks say of the speckle of a simulated image.
     pub stated: Option<StatedSpeckle>,
     /// The texture of its open sea, in windows of 256 pixels a side; `None` where no window holds sea alone.
     pub texture: Option<Texture>,
-    /// Profiles across its wakes.
+    /// What lies across its wakes.
     pub wakes: Vec<WakeFigures>,
 }
 
 /// Speckle in closed form, see [`amplitude_correlation`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StatedSpeckle {
-    /// Equivalent number of looks.
+    /// Independent looks that overlapping ones are worth.
     pub looks: f64,
     /// Correlation of amplitudes one, two and three pixels apart in a row.
     pub along_rows: [f64; 3],
@@ -38,7 +39,7 @@ pub struct StatedSpeckle {
     pub along_columns: [f64; 3],
 }
 
-/// Profiles across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
+/// What lies across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
 #[derive(Debug, Clone, Serialize)]
 pub struct WakeFigures {
     /// Names of the image and of the wake in it.
@@ -50,7 +51,7 @@ pub struct WakeFigures {
 }
 
 impl ImageFigures {
-    /// Measures a simulated image with speckle; its wakes are named by letters.
+    /// Those of a simulated image with speckle; its wakes are called by letters.
     #[must_use]
     pub fn of_simulation(name: &str, simulation: &Simulation) -> Self {
         let mut amplitude = simulation.speckled.clone();
@@ -72,7 +73,7 @@ impl ImageFigures {
         }
     }
 
-    /// Measures an image that is linear in amplitude.
+    /// Those of an image that is linear in amplitude.
     ///
     /// - `wakes`: the axes of its wakes by their names
     #[must_use]
@@ -96,7 +97,7 @@ impl ImageFigures {
 }
 
 impl StatedSpeckle {
-    /// Speckle of a scene's radar.
+    /// That of a scene's radar.
     ///
     /// - `spacing`: of the pixels \[m\]
     #[must_use]

@@ -26,7 +26,7 @@ const FEWEST: usize = 12;
 /// The axis of a wake in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WakeAxis {
-    /// Start of the wake, (column, row).
+    /// Where the wake starts, (column, row).
     pub tip: Pixel,
     /// From the tip along the wake [deg clockwise from the image's up].
     pub direction: f64,
@@ -45,7 +45,7 @@ pub struct Streak {
     pub width: f64,
 }
 
-/// Dark line and bright streak across a stretch of a wake.
+/// What lies across a stretch of a wake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WakeProfile {
     /// The darkest line within 10° of the axis, if one shows.

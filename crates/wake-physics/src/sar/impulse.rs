@@ -69,20 +69,20 @@ pub struct ImpulseResponse {
 /// A point that scatters coherently.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointTarget {
-    /// Imaged place (x, y) \[m\].
+    /// Where it is imaged, (x, y) \[m\].
     pub position: [f64; 2],
     /// Radar cross section \[m²\], at least 0.
     pub cross_section: f64,
 }
 
-/// Imaged surface and points.
+/// What the radar looks at.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflectivity<'a> {
     /// Places of the intensity; at least the image and its guard.
     pub raster: &'a Raster,
     /// Mean intensity of the rough surface, noise included, in the unit of σ⁰.
     pub intensity: &'a Field,
-    /// Ships and their azimuth ambiguities.
+    /// Ships and their ghosts.
     pub points: &'a [PointTarget],
 }
 

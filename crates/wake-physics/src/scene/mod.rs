@@ -96,7 +96,7 @@ pub struct Sea {
     pub fetch: f64,
     /// Spectrum of the resolved waves.
     pub spectrum: SpectrumModel,
-    /// Directional spreading of the resolved waves.
+    /// How the resolved waves spread around the wind.
     pub spreading: SpreadingModel,
     /// Water depth \[m\], 1 to infinite (`inf`, or the word "infinite" where a format has no infinity).
     #[serde(with = "forms::depth")]
@@ -190,9 +190,9 @@ pub struct Ship {
     pub draft: f64,
     /// Speed U [m/s], 0 to 40.
     pub speed: f64,
-    /// Direction of travel at time 0 [deg clockwise from azimuth].
+    /// Where it moves to at time 0 [deg clockwise from azimuth].
     pub heading: f64,
-    /// Turn rate [deg/s], −10 to 10, positive to starboard; 0: straight on. It has turned by half a circle, and came
+    /// How fast it turns [deg/s], −10 to 10, positive to starboard; 0: straight on. It has turned by half a circle, and came
     /// straight before. The radius is at least two lengths of the ship and of its transverse waves, at most 100 km.
     pub turn_rate: f64,
     /// Midship (x, y) at time 0 \[m\].
@@ -274,7 +274,7 @@ pub enum HullForm {
 /// and `pulse_rate`; [`Scene::to_toml`] writes the names of the fields, and every reader accepts both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Radar {
-    /// Satellite mode that sets the radar keys below and `grid.spacing`, unless the scene sets them.
+    /// The satellite that set what follows, where no key beside it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<Sensor>,
     /// Frequency \[Hz\], 1e9 to 2e10.

@@ -7,7 +7,7 @@
 //! damping(d, η) = D(d) · exp(−η²/(2 (W(d)/2)²)),     d astern of the stern, η off the track
 //! ```
 //!
-//! It models neither the bright edges of the wake (the narrow V) nor the influence of wind and sea state. Every constant
+//! It says nothing of the bright edges of the wake (the narrow V), of wind, or of the sea state. Every constant
 //! below carries its source or the word "chosen".
 
 pub mod current;
