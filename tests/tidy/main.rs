@@ -298,6 +298,39 @@ fn the_readers_of_the_scene_are_those_of_the_page() {
     assert_eq!(named, readers, "page and code name other readers");
 }
 
+/// The lists that tests of random numbers go through hold every stream there is.
+#[test]
+fn lists_of_streams_are_whole() {
+    let source = |path: &str| fs::read_to_string(root().join("crates").join(path)).expect(path);
+    let physics = source("wake-physics/src/random.rs");
+    let train = source("wake-train/src/streams.rs");
+    let (_, uses) = train.split_once("mod tests").expect("a test of streams");
+    let (streams, rest) = physics
+        .split_once("enum Stream {")
+        .and_then(|(_, rest)| rest.split_once('}'))
+        .expect("streams");
+    let (_, list) = rest.split_once("const ALL").expect("a list of streams");
+    let list = list.split_once("];").expect("an end of the list").0;
+    let variants = streams.lines().filter_map(|line| {
+        let name = line.trim().strip_suffix(',')?;
+        (!name.starts_with('/')).then(|| (format!("Stream::{name}"), list))
+    });
+    let mut all: Vec<(String, &str)> = variants.collect();
+    for name in ["wake-dataset", "wake-ldm", "wake-train"] {
+        for line in source(&format!("{name}/src/streams.rs")).lines() {
+            let rest = line.split_once("const ").map_or("", |(_, rest)| rest);
+            if let Some((name, _)) = rest.split_once(": u32") {
+                all.push((name.to_owned(), uses));
+            }
+        }
+    }
+    assert!(all.len() >= 25, "only {} streams", all.len());
+    for (name, list) in all {
+        let mut words = list.split(|c: char| !(c.is_alphanumeric() || "_:".contains(c)));
+        assert!(words.any(|word| word == name), "{name} is in no list");
+    }
+}
+
 /// Asserts that a file of the documentation is what the code makes of it, or writes it where `DRAW` is set.
 fn is_drawn(name: &str, drawn: &str) {
     let path = root().join(name);
