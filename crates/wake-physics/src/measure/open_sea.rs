@@ -1,4 +1,4 @@
-//! Brightness, contrast and wave direction of the sea away from the wake.
+//! The sea away from the wake: how bright, how rough, how its waves lie.
 
 use super::spectrum::{PowerSpectrum, window};
 use super::wake::decibel;
@@ -6,7 +6,7 @@ use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 use serde::Serialize;
 
-/// Brightness, contrast and wave direction of the open sea in an image.
+/// What an image shows of its sea.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OpenSea {
     /// Mean intensity, in the unit of σ⁰ \[1\].

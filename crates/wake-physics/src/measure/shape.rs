@@ -1,4 +1,4 @@
-//! Differences of a sea from a Gaussian field of the same spectrum: skewed values, steep fronts, groups.
+//! What tells a sea from a Gaussian field of the same spectrum: skewed values, steep fronts, groups.
 
 use super::smooth::smooth;
 use crate::raster::Field;
@@ -102,7 +102,7 @@ pub fn crest_variance(image: &Field, expected: &Field) -> Option<f64> {
 /// Mean squared difference of neighbours across the borders of squares, over that elsewhere \[1\], along rows or columns,
 /// whichever is the larger; `None` where nothing differs or there is no border.
 ///
-/// 1 for an image without seams, more for an image assembled from squares.
+/// 1 for an image that knows of no squares, more for one that was put together from them.
 ///
 /// - `side`: of a square, at least 2 \[pixels\]; the first begins at the first pixel
 #[must_use]
