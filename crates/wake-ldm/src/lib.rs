@@ -6,6 +6,7 @@
     not(all(feature = "flex", feature = "dataset")),
     doc = "Latent diffusion of ship-wake radar images on burn."
 )]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod error;

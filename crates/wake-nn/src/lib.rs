@@ -3,6 +3,7 @@
     not(feature = "flex"),
     doc = "Layers of diffusion models and detectors on burn."
 )]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod error;

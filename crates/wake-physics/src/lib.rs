@@ -45,6 +45,7 @@
 //! Every fast method has a slow oracle in this crate ([`Method::Direct`], at some pixels [`direct_intensity`]).
 //! [`scene::Model::tolerance`] bounds, for every field, the largest difference to it relative to the field's root mean
 //! square, and for the image before speckle the root mean square of the difference relative to the mean.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 /// The examples of the README are tests of the documentation, too.

@@ -1,5 +1,6 @@
 #![cfg_attr(feature = "scene", doc = include_str!("../README.md"))]
 #![cfg_attr(not(feature = "scene"), doc = "CLIP tokens of prompts.")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(not(test), warn(unused_crate_dependencies))]
 
