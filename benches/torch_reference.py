@@ -1,10 +1,11 @@
 """What the benches measure, in PyTorch: run it on the same machine, at the same time of day.
 
-    pip install torch diffusers transformers
-    python benches/torch_reference.py [quick | training]
+    pip install torch diffusers transformers peft
+    python benches/torch_reference.py [quick | training | fine-tune]
 
 f32, random weights, as many threads as cores; seconds, median of the runs after one to warm up. `quick` leaves
-out Stable Diffusion's U-Net and decoder.
+out Stable Diffusion's U-Net and decoder. `fine-tune` makes steps of fine-tuning at the size of Stable Diffusion v1.4, as
+`crates/wake-train/src/fine_tune/full_size.rs` does with the same variables of the environment.
 """
 
 import os
@@ -79,6 +80,52 @@ def trainings():
     training("training: small U-Net, batch 16", UNet2DConditionModel(**SMALL), inputs)
 
 
+def fine_tune():
+    """Encoding, text and one step of AdamW on the noise of the latents."""
+    side, batch, rank = (int(os.environ.get(name, default)) for name, default in [("SIDE", 512), ("BATCH", 1), ("RANK", 0)])
+    text = CLIPTextModel(
+        CLIPTextConfig(hidden_size=768, intermediate_size=3072, num_hidden_layers=12, num_attention_heads=12)
+    ).requires_grad_(False)
+    vae = decoder().requires_grad_(False)
+    model = UNet2DConditionModel(cross_attention_dim=768, attention_head_dim=8).train()
+    if rank:
+        from peft import LoraConfig
+
+        model.requires_grad_(False)
+        model.add_adapter(LoraConfig(r=rank, lora_alpha=rank, target_modules=["to_k", "to_q", "to_v", "to_out.0"]))
+    if "CHECKPOINTING" in os.environ:
+        model.enable_gradient_checkpointing()
+    bf16 = torch.autocast("cpu", torch.bfloat16, enabled="BF16" in os.environ)
+    learning = [p for p in model.parameters() if p.requires_grad]
+    optimizer = torch.optim.AdamW(learning, lr=1e-5)
+    ids, images = torch.arange(77).repeat(batch, 1), 0.2 * torch.randn(batch, 3, side, side)
+    for step in range(1, 1 + int(os.environ.get("STEPS", 2))):
+        begin = time.perf_counter()
+        with torch.no_grad():
+            latents = vae.encode(images).latent_dist.sample() * 0.18215
+            context = text(ids).last_hidden_state
+        noise, steps = torch.randn_like(latents), torch.randint(0, 1000, (batch,))
+        with bf16:
+            found = model(latents + noise, steps, context).sample
+            loss = F.mse_loss(found.float(), noise)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(learning, 1.0)
+        optimizer.step()
+        optimizer.zero_grad()
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024e-9
+        print(f"step {step}: {time.perf_counter() - begin:.1f} s, loss {loss.item():.4f}, peak {peak:.2f} GB", flush=True)
+
+
+def decoder():
+    return AutoencoderKL(
+        block_out_channels=(128, 256, 512, 512),
+        down_block_types=("DownEncoderBlock2D",) * 4,
+        up_block_types=("UpDecoderBlock2D",) * 4,
+        layers_per_block=2,
+        latent_channels=4,
+    ).eval()
+
+
 def unet(name, batch, size, runs, **config):
     model = UNet2DConditionModel(**config).eval()
     channels, width = config.get("in_channels", 4), config["cross_attention_dim"]
@@ -102,6 +149,8 @@ SMALL = {
 def main():
     torch.set_num_threads(os.cpu_count())
     print(f"torch {torch.__version__}, {torch.get_num_threads()} threads")
+    if "fine-tune" in sys.argv:
+        return fine_tune()
     trainings()
     if "training" in sys.argv:
         return
@@ -115,13 +164,7 @@ def main():
     measure("text encoder, batch 2", lambda: text(ids), 5)
     if "quick" in sys.argv:
         return
-    vae = AutoencoderKL(
-        block_out_channels=(128, 256, 512, 512),
-        down_block_types=("DownEncoderBlock2D",) * 4,
-        up_block_types=("UpDecoderBlock2D",) * 4,
-        layers_per_block=2,
-        latent_channels=4,
-    ).eval()
+    vae = decoder()
     latents = torch.randn(1, 4, 64, 64)
     measure("decoder to 512x512", lambda: vae.decode(latents), 3)
     del vae

@@ -1,4 +1,5 @@
-//! A small part of the parity suite on wgpu: the models, one whole run, and the self-check.
+//! A small part of the parity suite on wgpu: the models, one whole run, and the self-checks, which draw an image of the wake model,
+//! run the detector and compute the gradients of a training step.
 //!
 //! Runs wherever wgpu finds a device; Mesa's software OpenGL is one (`.ci/run` says how), some hundred times slower
 //! than flex, so only the smallest cases of the fixtures are taken. Differences are allowed up to 1e-3 of the largest
@@ -147,4 +148,7 @@ fn a_whole_run_agrees_with_diffusers() {
 #[test]
 fn the_device_passes_the_self_check() {
     wake_ldm::self_check(&device()).unwrap();
+    wake_ldm::sampler::self_check(&device()).unwrap();
+    wake_detector::self_check::check_device(&device()).unwrap();
+    wake_train::self_check(&device()).unwrap();
 }

@@ -275,6 +275,13 @@ fn requests_that_make_no_sense_are_refused_by_name() {
 #[cfg(feature = "flex")]
 fn every_compiled_device_passes_the_self_check() {
     for (backend, device) in devices() {
-        wake_ldm::self_check(&device).unwrap_or_else(|error| panic!("{backend}: {error}"));
+        let failed = |error: &dyn std::fmt::Display| panic!("{backend}: {error}");
+        wake_ldm::self_check(&device).unwrap_or_else(|error| failed(&error));
+        #[cfg(feature = "train")]
+        {
+            wake_ldm::sampler::self_check(&device).unwrap_or_else(|error| failed(&error));
+            wake_detector::self_check::check_device(&device).unwrap_or_else(|error| failed(&error));
+            wake_train::self_check(&device).unwrap_or_else(|error| failed(&error));
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use wake_nn::weights::{Layout, load, load_bytes};
+use wake_nn::weights::{Layout, load};
 
 use crate::error::{Result, check_range};
 use crate::image::GreyImage;
@@ -11,7 +11,7 @@ use crate::maps::Maps;
 use crate::network::{INPUTS, Network, STRIDE};
 use crate::raster::Raster;
 use crate::search::{Mapper, Search, Tile, find, in_tile, merged};
-use crate::self_check::self_check;
+use crate::self_check::{check_once, self_check};
 use crate::wake::Detection;
 
 /// Finds ship wakes in radar images with a trained network.
@@ -37,12 +37,11 @@ impl Detector {
     ///
     /// # Errors
     ///
-    /// [`Error::Model`](crate::Error::Model) where the weights do not fit in memory.
+    /// [`Error::Model`](crate::Error::Model) where the weights do not fit in memory, and for a device that is no CPU and fails
+    /// [`check_device`](crate::self_check::check_device).
     pub fn pretrained(device: &Device) -> Result<Self> {
-        let bytes = include_bytes!("../assets/detector.safetensors");
-        let network = Network::new(device);
-        let network = load_bytes(network, Layout::Diffusers, "detector.safetensors", bytes)?;
-        Ok(Self::of(network, device))
+        check_once(device)?;
+        Ok(Self::of(Network::pretrained(device)?, device))
     }
 
     /// The network of a file, as training writes it, after a check on one fixed image.
@@ -52,6 +51,7 @@ impl Detector {
     /// [`Error::Model`](crate::Error::Model) for a file that is not there or does not fit,
     /// [`Error::WrongMaps`](crate::Error::WrongMaps) for weights that find nothing in any image, such as equal or huge ones.
     pub fn load(file: &Path, device: &Device) -> Result<Self> {
+        check_once(device)?;
         let network = load(Network::new(device), Layout::Diffusers, file)?;
         self_check(&network, file, device)?;
         Ok(Self::of(network, device))

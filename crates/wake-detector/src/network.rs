@@ -6,6 +6,7 @@ use burn::tensor::{Device, Tensor};
 use wake_nn::conv::{conv1x1, conv3x3, convolve};
 use wake_nn::norm::GroupNorm;
 use wake_nn::resample::{Downsample, Upsample};
+use wake_nn::weights::{Layout, load_bytes};
 
 /// Pixels of the image for one cell of the maps, in each direction.
 pub const STRIDE: usize = 4;
@@ -162,6 +163,21 @@ impl Network {
             norm: GroupNorm::new(GROUPS, fine, EPSILON, device),
             head,
         }
+    }
+
+    /// The network with the weights of this crate.
+    ///
+    /// # Errors
+    ///
+    /// None that a build from unchanged files can give.
+    pub fn pretrained(device: &Device) -> wake_nn::Result<Self> {
+        let bytes = include_bytes!("../assets/detector.safetensors");
+        load_bytes(
+            Self::new(device),
+            Layout::Diffusers,
+            "detector.safetensors",
+            bytes,
+        )
     }
 
     /// The maps of a batch of images.

@@ -1,13 +1,17 @@
-//! Can these weights find a wake at all? One fixed image tells.
+//! Can these weights find a wake at all, and does a device compute right numbers? One fixed image tells.
 
 use std::path::Path;
+use std::sync::Mutex;
 
 use burn::tensor::{Device, Tensor, TensorData};
+use wake_nn::self_check::{self as check, Stage};
 
 use crate::error::{Error, Result};
 use crate::network::{INPUTS, Network, OUTPUTS};
 use crate::normalize;
 
+/// What flex computes.
+const REFERENCE: &[u8] = include_bytes!("../assets/self_check.safetensors");
 /// Rows and columns of the image \[pixels\].
 const SIZE: usize = 256;
 /// Products that are summed for a number of a map: 3 × 3 cells of 24 channels.
@@ -23,13 +27,7 @@ const PRODUCTS: f32 = 9.0 * 24.0;
 ///
 /// [`Error::WrongMaps`] with the file, and what is wrong.
 pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<()> {
-    let contrast = normalize::contrast(&plain_wake(), SIZE, SIZE);
-    let seen: Vec<[f32; INPUTS]> = contrast.into_iter().map(normalize::inputs).collect();
-    let inputs: Vec<f32> = (0..INPUTS)
-        .flat_map(|k| seen.iter().map(move |x| x[k]))
-        .collect();
-    let inputs = TensorData::new(inputs, [1, INPUTS, SIZE, SIZE]);
-    let maps = network.forward(Tensor::from_data(inputs, device));
+    let maps = maps(network, device);
     let values: Vec<f32> = maps.into_data().iter::<f32>().collect();
     match fault(&values) {
         None => Ok(()),
@@ -39,6 +37,39 @@ pub fn self_check(network: &Network, weights: &Path, device: &Device) -> Result<
             why,
         }),
     }
+}
+
+/// Compares the maps of this crate's network on a device with numbers of the CPU backend flex.
+///
+/// # Errors
+///
+/// [`wake_nn::Error::WrongNumbers`] by how much they differ, and the allowed difference.
+pub fn check_device(device: &Device) -> wake_nn::Result<()> {
+    check::compare(device, REFERENCE, [stage(device)?])
+}
+
+/// Checks a device that is no CPU when a detector is made on it, once a process.
+pub(crate) fn check_once(device: &Device) -> wake_nn::Result<()> {
+    static CHECKED: Mutex<Vec<Device>> = Mutex::new(Vec::new());
+    check::check_once(&CHECKED, device, check_device)
+}
+
+fn stage(device: &Device) -> wake_nn::Result<Stage> {
+    Ok(Stage::new(
+        "detector",
+        maps(&Network::pretrained(device)?, device),
+    ))
+}
+
+/// The maps of the image.
+fn maps(network: &Network, device: &Device) -> Tensor<4> {
+    let contrast = normalize::contrast(&plain_wake(), SIZE, SIZE);
+    let seen: Vec<[f32; INPUTS]> = contrast.into_iter().map(normalize::inputs).collect();
+    let inputs: Vec<f32> = (0..INPUTS)
+        .flat_map(|k| seen.iter().map(move |x| x[k]))
+        .collect();
+    let inputs = TensorData::new(inputs, [1, INPUTS, SIZE, SIZE]);
+    network.forward(Tensor::from_data(inputs, device))
 }
 
 /// First fault of the maps `[OUTPUTS, rows, columns]`; `None` for good ones.
@@ -104,6 +135,15 @@ fn normal(place: u64) -> f32 {
 mod tests {
     use super::*;
     use crate::{Detector, GreyImage};
+
+    /// With `DRAW=1` this writes the file anew.
+    #[test]
+    fn the_file_has_what_flex_computes() {
+        let device = Device::flex();
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/self_check.safetensors");
+        check::draw(path.as_ref(), &[stage(&device).expect("a stage")]);
+        check_device(&device).expect("flex against flex");
+    }
 
     /// Numbers that maps may have: each varies, no two are equal.
     fn good() -> Vec<f32> {

@@ -17,7 +17,6 @@ pub mod unet;
 
 mod stable_diffusion;
 
-#[cfg(feature = "flex")]
 mod self_check;
 
 #[cfg(feature = "wake-model")]
@@ -29,7 +28,6 @@ mod sampled;
 pub use error::{Error, Result};
 #[cfg(feature = "dataset")]
 pub use sampled::Sampled;
-#[cfg(feature = "flex")]
 pub use self_check::self_check;
 pub use stable_diffusion::{autoencoder, lora, pipeline, scheduler, text};
 #[cfg(feature = "wake-model")]

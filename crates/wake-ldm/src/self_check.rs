@@ -2,26 +2,28 @@
 
 use std::sync::Mutex;
 
-use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use wake_nn::Result;
 use wake_nn::noise::{NoiseSource, normal_batch};
-use wake_nn::self_check::{self, Stage};
+use wake_nn::self_check::{self, Stage, seeded};
 
 use crate::stable_diffusion::autoencoder::AutoencoderKlConfig;
 use crate::stable_diffusion::text::ClipTextConfig;
 use crate::unet::{UNetConfig, UNetInput};
 
-/// Runs small models of every kind on a device and on the CPU (flex), and compares.
+/// What flex computes.
+const REFERENCE: &[u8] = include_bytes!("../assets/self_check.safetensors");
+
+/// Runs small models of every kind of Stable Diffusion on a device, and compares with numbers of the CPU backend flex.
 ///
-/// Takes about a second, on GPUs more, because kernels are compiled. Samplers and pipelines run it by themselves when
+/// Takes about a second, on GPUs more, because kernels are compiled. Pipelines run it by themselves when
 /// they are made on a device that is no CPU, once for each device.
 ///
 /// # Errors
 ///
 /// [`wake_nn::Error::WrongNumbers`] with the model that differs, by how much, and the allowed difference.
 pub fn self_check(device: &Device) -> Result<()> {
-    self_check::compare_stages(device, [text(device), unet(device), autoencoder(device)])
+    self_check::compare(device, REFERENCE, stages(device))
 }
 
 /// Checks a device that is no CPU when something is made on it, once a process.
@@ -34,71 +36,52 @@ pub(crate) fn check_once(device: &Device) -> Result<()> {
     self_check::check_once(&CHECKED, device, self_check)
 }
 
+fn stages(device: &Device) -> [Stage; 3] {
+    [text(device), unet(device), autoencoder(device)]
+}
+
 fn text(device: &Device) -> Stage {
-    let cpu = Device::flex();
     let config = ClipTextConfig::new()
         .with_vocab_size(100)
         .with_hidden_size(64)
         .with_intermediate_size(128)
         .with_layers(2)
         .with_heads(4);
-    let model = config.init(&cpu);
+    let model = seeded(config.init(device), 6);
     let ids: Vec<i32> = (0..77).map(|i| i * 7 % 100).collect();
-    let ids = |device: &Device| -> Tensor<2, Int> {
-        Tensor::from_data(TensorData::new(ids.clone(), [1, 77]), device)
-    };
-    let reference = model.forward(ids(&cpu)).last_hidden_state;
-    let found = model
-        .to_device(device)
-        .forward(ids(device))
-        .last_hidden_state;
-    Stage::new("text encoder", reference, found)
+    let ids: Tensor<2, Int> = Tensor::from_data(TensorData::new(ids, [1, 77]), device);
+    Stage::new("text encoder", model.forward(ids).last_hidden_state)
 }
 
 fn unet(device: &Device) -> Stage {
-    let cpu = Device::flex();
-    let config = UNetConfig::small(4, Some(64), None);
-    let model = config.init(&cpu);
-    let input = |device: &Device| UNetInput {
-        sample: normal_batch(
-            &[NoiseSource::new(1), NoiseSource::new(2)],
-            0,
-            [4, 16, 16],
-            device,
-        ),
+    let model = seeded(UNetConfig::small(4, Some(64), None).init(device), 7);
+    let noise =
+        |seeds: [u64; 2], shape| normal_batch(&seeds.map(NoiseSource::new), 0, shape, device);
+    let input = UNetInput {
+        sample: noise([1, 2], [4, 16, 16]),
         timesteps: Tensor::from_data([20.0, 980.0], device),
-        context: Some(
-            normal_batch(
-                &[NoiseSource::new(3), NoiseSource::new(4)],
-                0,
-                [1, 9, 64],
-                device,
-            )
-            .reshape([2, 9, 64]),
-        ),
+        context: Some(noise([3, 4], [1, 9, 64]).reshape([2, 9, 64])),
         condition: None,
     };
-    let reference = model.forward(input(&cpu));
-    let found = model.to_device(device).forward(input(device));
-    Stage::new("U-Net", reference, found)
+    Stage::new("U-Net", model.forward(input))
 }
 
 fn autoencoder(device: &Device) -> Stage {
-    let cpu = Device::flex();
-    let model = AutoencoderKlConfig::small(4, 2).init(&cpu);
-    let image = |device: &Device| normal_batch(&[NoiseSource::new(5)], 0, [1, 32, 32], device);
-    let reference = model.decode(model.encode(image(&cpu)).mode());
-    let model = model.to_device(device);
-    let found = model.decode(model.encode(image(device)).mode());
-    Stage::new("autoencoder", reference, found)
+    let model = seeded(AutoencoderKlConfig::small(4, 2).init(device), 8);
+    let image = normal_batch(&[NoiseSource::new(5)], 0, [1, 32, 32], device);
+    Stage::new("autoencoder", model.decode(model.encode(image).mode()))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "flex"))]
 mod tests {
     use super::*;
 
+    /// With `DRAW=1` this writes the file anew.
     #[test]
-    fn the_reference_backend_agrees_with_itself() {
-        self_check(&Device::flex()).expect("flex against flex");
+    fn the_file_has_what_flex_computes() {
+        let device = Device::flex();
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/self_check.safetensors");
+        self_check::draw(path.as_ref(), &stages(&device));
+        self_check(&device).expect("flex against flex");
     }
 }

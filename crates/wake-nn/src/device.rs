@@ -56,14 +56,15 @@ pub fn device_named(name: &str) -> Result<Device> {
 }
 
 /// Whether a device is a CPU, where compilers, not drivers, make the code.
-#[cfg(feature = "flex")]
 pub fn is_cpu(device: &Device) -> bool {
-    #[cfg(feature = "ndarray")]
-    #[allow(deprecated, reason = "kept until burn drops it")]
-    if *device == Device::ndarray() {
-        return true;
-    }
-    *device == Device::flex()
+    let cpus: &[Device] = &[
+        #[cfg(feature = "flex")]
+        Device::flex(),
+        #[cfg(feature = "ndarray")]
+        #[allow(deprecated, reason = "kept until burn drops it")]
+        Device::ndarray(),
+    ];
+    cpus.contains(device)
 }
 
 #[cfg(all(test, feature = "flex"))]

@@ -39,10 +39,10 @@ pub mod timestep;
 #[cfg(feature = "burn")]
 pub mod transformer;
 
-#[cfg(feature = "flex")]
-pub mod self_check;
 #[cfg(feature = "burn")]
 pub mod weights;
+#[cfg(feature = "burn")]
+pub mod self_check;
 
 #[cfg(feature = "burn")]
 pub use burn;

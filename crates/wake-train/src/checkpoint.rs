@@ -24,9 +24,6 @@ use crate::error::{Error, Result};
 
 /// The file of the tensors.
 const TENSORS: &str = "tensors.safetensors";
-/// How many of the newest checkpoints stay.
-const KEPT: usize = 2;
-
 /// Tensors by name: shape and numbers.
 pub type Tensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 
@@ -44,13 +41,15 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Writes the checkpoint below a folder and removes all but the two newest, and what killed runs left: a folder
+    /// Writes the checkpoint below a folder and removes all but the newest, and what killed runs left: a folder
     /// belongs to one run and one process.
+    ///
+    /// - `keep`: checkpoints that stay, at least this one
     ///
     /// # Errors
     ///
     /// [`wake_nn::Error::Io`] when something cannot be written; older checkpoints are then still there.
-    pub fn write(&self, folder: &Path) -> Result<PathBuf> {
+    pub fn write(&self, folder: &Path, keep: usize) -> Result<PathBuf> {
         let target = folder.join(format!("step-{:08}", self.step));
         let temporary = folder.join(format!(".step-{:08}.{}.tmp", self.step, std::process::id()));
         let written = self.write_files(&temporary).and_then(|()| {
@@ -66,7 +65,7 @@ impl Checkpoint {
         written.map_err(|source| io("write", &target, source))?;
         sweep(folder)?;
         let mut old = checkpoints(folder)?;
-        old.truncate(old.len().saturating_sub(KEPT));
+        old.truncate(old.len().saturating_sub(keep.max(1)));
         for (_, path) in old {
             fs::remove_dir_all(&path).map_err(|source| io("remove", &path, source))?;
         }
@@ -303,7 +302,7 @@ mod tests {
             None
         );
         for step in [5, 20, 100] {
-            checkpoint(step).write(folder.path()).unwrap();
+            checkpoint(step).write(folder.path(), 2).unwrap();
         }
         assert_eq!(
             Checkpoint::newest(folder.path()).unwrap(),
@@ -319,7 +318,7 @@ mod tests {
     #[test]
     fn half_a_checkpoint_is_none() {
         let folder = tempfile::tempdir().unwrap();
-        checkpoint(7).write(folder.path()).unwrap();
+        checkpoint(7).write(folder.path(), 2).unwrap();
         // What a killed run leaves behind has another name.
         let half = folder.path().join(".step-00000009.1.tmp");
         fs::create_dir(&half).unwrap();
@@ -327,7 +326,7 @@ mod tests {
             Checkpoint::newest(folder.path()).unwrap().map(|c| c.step),
             Some(7)
         );
-        checkpoint(8).write(folder.path()).unwrap();
+        checkpoint(8).write(folder.path(), 2).unwrap();
         assert!(!half.exists());
         fs::remove_dir_all(folder.path().join("step-00000008")).unwrap();
         let file = folder.path().join("step-00000007/tensors.safetensors");
@@ -349,7 +348,7 @@ mod tests {
             ..checkpoint(step)
         };
         for step in [7, 8] {
-            small(step).write(folder.path()).unwrap();
+            small(step).write(folder.path(), 2).unwrap();
         }
         let newest = folder.path().join("step-00000008");
         for name in ["state.json", "tensors.safetensors"] {

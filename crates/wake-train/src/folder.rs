@@ -231,7 +231,7 @@ mod tests {
             state: json!({}),
             tensors: crate::checkpoint::Tensors::new(),
         };
-        checkpoint.write(&folder.checkpoints(stage)).unwrap();
+        checkpoint.write(&folder.checkpoints(stage), 2).unwrap();
     }
 
     #[test]

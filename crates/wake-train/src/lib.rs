@@ -6,6 +6,7 @@ mod streams;
 
 // Loop.
 mod tensors;
+mod self_check;
 mod checkpoint;
 mod optimizer;
 mod progress;
@@ -49,7 +50,8 @@ pub use progress::Progress;
 pub use run::{Run, RunOptions, Task, Terms};
 pub use sea::SeaPatches;
 pub use sea_training::SeaTraining;
-pub use small_pipeline::PipelineTraining;
+pub use self_check::self_check;
+pub use small_pipeline::{LatentShape, PipelineTraining};
 pub use stage_options::StageOptions;
 pub use trainer::{StepReport, TrainerOptions};
 pub use two_sample::{TwoSample, TwoSampleOptions, classifier_two_sample_test};

@@ -9,6 +9,7 @@ use burn::tensor::{Device, Tensor};
 use serde_json::{Value, json};
 
 use super::checkpoint::Checkpoint;
+use super::self_check::check_once;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
 use crate::error::{Error, Result};
 use wake_ldm::network::WakeModelConfig;
@@ -133,7 +134,8 @@ impl<M: Module> Run<M> {
     ///
     /// # Errors
     ///
-    /// As [`RunOptions::validate`].
+    /// As [`RunOptions::validate`]; [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
+    /// [`self_check`](crate::self_check).
     pub fn of(
         part: &str,
         model: &Value,
@@ -142,6 +144,7 @@ impl<M: Module> Run<M> {
         devices: Vec<Device>,
     ) -> Result<Self> {
         options.validate(devices.len())?;
+        devices.iter().try_for_each(check_once)?;
         devices[0].seed(options.seed);
         let weights = init(&devices[0]);
         Ok(Self {
@@ -163,13 +166,13 @@ impl<M: Module> Run<M> {
         self.trainer.restore(checkpoint, &self.state)
     }
 
-    /// Writes a checkpoint.
+    /// Writes a checkpoint, and keeps some of the newest.
     ///
     /// # Errors
     ///
     /// [`Error::Diverged`] for weights that are no finite numbers, else as [`Checkpoint::write`].
-    pub fn checkpoint(&self, folder: &Path) -> Result<PathBuf> {
-        self.trainer.checkpoint(&self.state)?.write(folder)
+    pub fn checkpoint(&self, folder: &Path, keep: usize) -> Result<PathBuf> {
+        self.trainer.checkpoint(&self.state)?.write(folder, keep)
     }
 
     /// Steps made so far.

@@ -262,7 +262,7 @@ mod tests {
         };
         let weights = |run: &Run<SeaFlow>, name: &str| -> Tensors {
             let folder = folder.path().join(name);
-            run.checkpoint(&folder).unwrap();
+            run.checkpoint(&folder, 2).unwrap();
             Checkpoint::newest(&folder).unwrap().unwrap().tensors
         };
         let start = run(2, 4);

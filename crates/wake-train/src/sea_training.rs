@@ -89,6 +89,7 @@ impl SeaTraining<'_> {
             name: STAGE,
             resume: options.resume,
             every: options.every,
+            keep: options.keep,
             steps: options.steps(&DEFAULTS),
             results: &[WEIGHTS, SHEET],
         };

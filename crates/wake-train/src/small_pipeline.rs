@@ -46,8 +46,7 @@ const AT_ONCE: u64 = 64;
 /// Images of a sheet, and the steps that they are drawn with.
 const SHOWN: u64 = 8;
 const DRAWN: usize = 25;
-/// Channels of a latent pixel, and of a token.
-const LATENTS: usize = 32;
+/// Channels of a token.
 const TOKENS: usize = 128;
 
 /// How a small model of Stable Diffusion's kind is learnt from images and prompts alone.
@@ -57,8 +56,41 @@ pub struct PipelineTraining<'a> {
     pub pairs: &'a TrainingPairs,
     /// Steps of the autoencoder; `None`: the usual number.
     pub autoencoder_steps: Option<usize>,
+    /// Shape of the latents.
+    pub latents: LatentShape,
+    /// Steps of text encoder and U-Net after which it stops, to go on later; `None`: all.
+    pub stop_after: Option<usize>,
     /// How the stages run; the steps are those of text encoder and U-Net.
     pub options: StageOptions,
+}
+
+/// Shape of the latents of a small pipeline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LatentShape {
+    /// Channels.
+    pub channels: usize,
+    /// Levels of the autoencoder, 1 to 3: a latent pixel stands for 4, 8 or 16 pixels along each axis.
+    pub levels: usize,
+}
+
+impl Default for LatentShape {
+    /// 32 channels, 16 pixels.
+    fn default() -> Self {
+        Self {
+            channels: 32,
+            levels: 3,
+        }
+    }
+}
+
+impl LatentShape {
+    fn autoencoder(self) -> AutoencoderKlConfig {
+        AutoencoderKlConfig::small(self.channels, self.levels)
+    }
+
+    fn unet(self) -> UNetConfig {
+        UNetConfig::small(self.channels, Some(TOKENS), None)
+    }
 }
 
 impl PipelineTraining<'_> {
@@ -72,7 +104,7 @@ impl PipelineTraining<'_> {
         let constants = self.options.run(&DEFAULTS, Value::Null);
         constants.validate(self.options.devices.len())?;
         let [rows, columns] = self.pairs.source().size();
-        let multiple = 4 * autoencoder().downsampling();
+        let multiple = 4 * self.latents.autoencoder().downsampling();
         if rows == columns && rows.is_multiple_of(multiple) && !self.pairs.is_empty() {
             return Ok(());
         }
@@ -90,10 +122,10 @@ impl PipelineTraining<'_> {
     pub fn bytes(&self) -> u64 {
         let (pixels, down) = (
             self.pairs.source().size().iter().product::<usize>(),
-            autoencoder().downsampling(),
+            self.latents.autoencoder().downsampling(),
         );
         // Two bytes a pixel, and four a latent number while they are scaled.
-        let each = 2 * pixels + 6 * LATENTS * pixels / (down * down);
+        let each = 2 * pixels + 6 * self.latents.channels * pixels / (down * down);
         self.pairs.len().saturating_mul(each as u64)
     }
 
@@ -108,7 +140,8 @@ impl PipelineTraining<'_> {
         let options = &self.options;
         let examples = self.pairs.first(SHOWN)?;
         let model = json!({
-            "vae": autoencoder().to_json(), "text_encoder": text().to_json(), "unet": unet().to_json(),
+            "vae": self.latents.autoencoder().to_json(), "text_encoder": text().to_json(),
+            "unet": self.latents.unet().to_json(),
         });
         let identity = self.pairs.identity();
         let learning = options.learning_devices()?;
@@ -130,7 +163,7 @@ impl PipelineTraining<'_> {
         });
         let init = |device: &Device| TextToImage {
             text_encoder: text().init(device),
-            unet: unet().init(device),
+            unet: self.latents.unet().init(device),
         };
         let run = Run::of(
             MODEL,
@@ -153,7 +186,9 @@ impl PipelineTraining<'_> {
             Ok(pipeline.save(out, Precision::F16)?)
         };
         let results = ["model_index.json", SHEET];
-        let stage = self.stage(MODEL, options.steps(&DEFAULTS), &results, &folder);
+        let steps = options.steps(&DEFAULTS);
+        let steps = self.stop_after.map_or(steps, |last| last.min(steps));
+        let stage = self.stage(MODEL, steps, &results, &folder);
         stage.train(&mut folder, run, &task, progress, show)
     }
 
@@ -171,7 +206,7 @@ impl PipelineTraining<'_> {
             ..self.options.clone()
         };
         let constants = options.run(&AUTOENCODER_DEFAULTS, self.pairs.identity());
-        let init = |device: &Device| autoencoder().init(device);
+        let init = |device: &Device| self.latents.autoencoder().init(device);
         let run = Run::of(AUTOENCODER, &model["vae"], init, constants, learning)?;
         let task = AutoencoderTask {
             images,
@@ -206,6 +241,7 @@ impl PipelineTraining<'_> {
             name,
             resume: self.options.resume && folder.checkpoints(name).is_dir(),
             every: self.options.every,
+            keep: self.options.keep,
             steps,
             results,
         }
@@ -224,11 +260,6 @@ impl PipelineTraining<'_> {
     }
 }
 
-/// Widths of the three models.
-fn autoencoder() -> AutoencoderKlConfig {
-    AutoencoderKlConfig::small(LATENTS, 3)
-}
-
 fn text() -> ClipTextConfig {
     ClipTextConfig::new()
         .with_hidden_size(TOKENS)
@@ -236,10 +267,6 @@ fn text() -> ClipTextConfig {
         .with_layers(4)
         .with_heads(4)
         .with_end_token(49407)
-}
-
-fn unet() -> UNetConfig {
-    UNetConfig::small(LATENTS, Some(TOKENS), None)
 }
 
 fn schedule(scheduler: &SchedulerConfig) -> Result<&NoiseSchedule> {

@@ -19,6 +19,8 @@ pub(crate) struct Stage<'a> {
     pub resume: bool,
     /// Steps between checkpoints, at least 1.
     pub every: usize,
+    /// Checkpoints that are kept, at least 1.
+    pub keep: usize,
     /// Steps in all.
     pub steps: usize,
     /// Files of the folder that are written after every checkpoint.
@@ -69,7 +71,7 @@ impl Stage<'_> {
                 loss: report.loss,
             });
             if run.steps().is_multiple_of(self.every.max(1)) || run.steps() == steps {
-                run.checkpoint(&folder.checkpoints(name))?;
+                run.checkpoint(&folder.checkpoints(name), self.keep)?;
                 show(&run)?;
                 folder.note(name, run.steps(), steps)?;
             }

@@ -35,6 +35,8 @@ pub struct StageOptions {
     pub grad_accumulation_steps: usize,
     /// Steps between checkpoints, at least 1.
     pub every: usize,
+    /// Checkpoints that are kept, at least 1.
+    pub keep: usize,
     /// Seed of everything that is drawn.
     pub seed: u64,
     /// Whether it goes on from the newest checkpoint.
@@ -55,6 +57,7 @@ impl Default for StageOptions {
             rate: None,
             grad_accumulation_steps: 1,
             every: 500,
+            keep: 2,
             seed: 7,
             resume: false,
             checkpointing: false,

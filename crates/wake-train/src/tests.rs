@@ -95,7 +95,7 @@ fn resumed(workers: usize, accumulation: usize, checkpoint: &Checkpoint) -> Run<
 
 /// The weights after a checkpoint, as numbers.
 fn weights(run: &Run<Flow>, folder: &Path) -> Tensors {
-    run.checkpoint(folder).unwrap();
+    run.checkpoint(folder, 2).unwrap();
     Checkpoint::newest(folder).unwrap().unwrap().tensors
 }
 
@@ -116,7 +116,7 @@ fn advance(
 
 /// The same start for several runs: random initialisation draws from a generator that other tests share.
 fn start(folder: &Path) -> Checkpoint {
-    run(1, 1).checkpoint(folder).unwrap();
+    run(1, 1).checkpoint(folder, 2).unwrap();
     Checkpoint::newest(folder).unwrap().unwrap()
 }
 
@@ -128,7 +128,7 @@ fn a_killed_run_gives_the_same_curve_to_the_bit() {
     let curve = advance(&mut whole, &set, 6);
     let mut first = resumed(1, 1, &start);
     let mut pieces = advance(&mut first, &set, 3);
-    first.checkpoint(&folder.path().join("half")).unwrap();
+    first.checkpoint(&folder.path().join("half"), 2).unwrap();
     drop(first);
     let half = Checkpoint::newest(&folder.path().join("half"))
         .unwrap()

@@ -3,7 +3,7 @@
 use crate::exit::Outcome;
 use crate::sheet::Picture;
 use wake_physics::{Field, Scene};
-use wake_train::evaluation::{Baseline, Evaluation, ImageSource, Told, grey};
+use wake_train::evaluation::{Baseline, Evaluation, ImageSource, Told};
 
 /// Panels of the picture in a row.
 const ACROSS: usize = 3;
@@ -11,8 +11,9 @@ const ACROSS: usize = 3;
 /// One scene as every kind of image draws it, in one stretch of grey: three standard deviations of the simulator's image to each side of its mean.
 pub(crate) fn picture(scene: &Scene, judged: &Evaluation<'_>) -> Outcome<Picture> {
     let draw = |source: &dyn ImageSource| -> Outcome<Field> {
-        let images = source.draw(std::slice::from_ref(scene), Told::Both)?;
-        Ok(grey(&images[0]))
+        let view = &judged.view;
+        let images = view.draw(source, std::slice::from_ref(scene), Told::Both)?;
+        Ok(view.grey(&images[0]))
     };
     let mut panels = Vec::new();
     for (name, source) in judged.kinds() {

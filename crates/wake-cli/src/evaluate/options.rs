@@ -1,6 +1,6 @@
 //! The command line, and what it names.
 
-use super::{detector, domain, sea};
+use super::{detector, domain, pipeline, sea};
 use crate::exit::Outcome;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use wake_train::metrics::{Lpips, LpipsNetwork};
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) task: Option<Task>,
-    /// Judge the simulator itself, with another random sea, in the place of a model: what a perfect model would get
+    /// Evaluate the simulator itself, with another random sea, instead of a model: the score of a perfect model
     #[arg(long)]
     pub(crate) simulator_only: bool,
     /// Folder of a small model that `wake train` wrote; without it, the model in the crate
@@ -22,9 +22,13 @@ pub(crate) struct Arguments {
     /// Steps from noise to image; without it, the sampler's own number
     #[arg(long, conflicts_with = "simulator_only")]
     pub(crate) steps: Option<usize>,
-    /// Folder of a model that `wake train text-to-image` wrote, to stand beside the model
-    #[arg(long, value_name = "DIR")]
-    pub(crate) text_to_image: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) common: Common,
+}
+
+/// Options of every evaluation of images.
+#[derive(Args)]
+pub(crate) struct Common {
     /// Held-out scenes
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub(crate) count: u32,
@@ -47,12 +51,13 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 pub(crate) enum Task {
+    Pipeline(pipeline::Options),
     Domain(domain::Options),
     Sea(sea::Options),
     Detector(detector::Options),
 }
 
-impl Arguments {
+impl Common {
     /// The networks of LPIPS, where they are named.
     pub(crate) fn lpips(&self, device: &Device) -> Outcome<Option<Lpips>> {
         let (Some(backbone), Some(linear)) = (&self.lpips_backbone, &self.lpips_linear) else {

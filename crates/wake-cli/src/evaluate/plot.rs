@@ -38,8 +38,52 @@ pub(crate) fn spectrum(path: &Path, report: &Report) -> Outcome<()> {
         let points = points.map(|(n, &db)| (n as f64, db.clamp(-10.0, 5.0)));
         chart
             .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
-            .label(row.image)
+            .label(&row.image)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+    }
+    legend(&mut chart)?;
+    area.present()?;
+    Ok(())
+}
+
+/// Power of each ring of the model's images and of simulated ones [dB], with the borders of three bands.
+pub(crate) fn radial(path: &Path, report: &Report) -> Outcome<()> {
+    let area = SVGBackend::new(path, (900, 560)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let model = &report.figures.pixels[0];
+    let curves = [&model.power_db, &report.figures.pixels[1].power_db];
+    let rings = model.power_db.len();
+    let shown = || curves.iter().flat_map(|curve| curve.iter().skip(1));
+    let [low, high] = shown().fold([f64::MAX, f64::MIN], |[a, b], &v| [a.min(v), b.max(v)]);
+    let (low, high) = (low - 3.0, high + 3.0);
+    let mut chart = ChartBuilder::on(&area)
+        .caption("Radial spectra", ("sans-serif", 22))
+        .margin(16)
+        .x_label_area_size(44)
+        .y_label_area_size(64)
+        .build_cartesian_2d(0.0..rings as f64, low..high)?;
+    let mesh = &mut chart.configure_mesh();
+    mesh.x_desc("periods in the image")
+        .y_desc("power of grey, dB")
+        .draw()?;
+    let names = [report.figures.judged, "simulator, other sea"];
+    for ((curve, name), colour) in curves.into_iter().zip(names).zip(COLOURS) {
+        let points = curve
+            .iter()
+            .enumerate()
+            .skip(1)
+            .map(|(n, &db)| (n as f64, db));
+        chart
+            .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+    }
+    for third in [1, 2] {
+        let border = (third * rings / 3) as f64;
+        chart.draw_series(LineSeries::new(
+            [(border, low), (border, high)],
+            &RGBColor(120, 120, 120),
+        ))?;
     }
     legend(&mut chart)?;
     area.present()?;

@@ -1,10 +1,11 @@
-//! Seconds per image: the model, the simulator's fast methods, and its harmonic sum.
+//! Seconds per image: the simulator's fast methods, its harmonic sum, the wake model, and a text-to-image model.
 
 use crate::exit::Outcome;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 use std::time::Instant;
+use wake_ldm::WakeSampler;
 use wake_physics::hull::Hull;
 use wake_physics::kelvin::KelvinWake;
 use wake_physics::scene::{SpectrumModel, SpreadingModel};
@@ -12,7 +13,7 @@ use wake_physics::surface::Surface;
 use wake_physics::waves::{Quantity, Transfer, harmonic_sum};
 use wake_physics::wind_sea::{DirectionalSpectrum, WindSea};
 use wake_physics::{Raster, Scene, Track, simulate};
-use wake_train::evaluation::{ImageSource, SIZE, Told, held_out};
+use wake_train::evaluation::{HeldOut, ImageSource, TextToImage, Told};
 
 /// Pixels along a side.
 const SIZES: [usize; 3] = [128, 256, 512];
@@ -20,6 +21,8 @@ const SIZES: [usize; 3] = [128, 256, 512];
 const WAVES: usize = 10_000;
 /// Pixels on which the harmonic sum runs; its time is scaled to the image.
 const SAMPLE: usize = 512;
+/// Times the side of a model's own images up to which it is timed.
+const LARGER: usize = 4;
 /// Runs of which the median counts.
 const RUNS: usize = 3;
 /// Fields of the surface that an image needs.
@@ -41,21 +44,21 @@ pub(crate) struct TimingRow {
     /// Sums of 10⁴ waves of the sea and as many of the wake alone, without backscatter and imaging; scaled up from
     /// some pixels.
     pub(crate) simulator_harmonic_sum: f64,
-    /// Absent where the model draws another size only.
+    /// The wake model's; absent where it draws another size only.
     pub(crate) model: Option<f64>,
-    /// Of the model of images and prompts alone.
+    /// Absent where there is none, or where it cannot draw the size.
     pub(crate) text_to_image: Option<f64>,
 }
 
 /// Times all of them in one run.
 pub(crate) fn timings(
-    model: &dyn ImageSource,
-    text_to_image: Option<&dyn ImageSource>,
+    model: Option<&WakeSampler>,
+    text_to_image: Option<&TextToImage<'_>>,
 ) -> Outcome<Vec<TimingRow>> {
     SIZES
         .into_iter()
         .map(|size| {
-            let mut scene = held_out(0);
+            let mut scene = HeldOut::default().scene(0);
             (scene.grid.rows, scene.grid.columns) = (size, size);
             let fast = median(|| {
                 simulate(&scene)?;
@@ -68,14 +71,18 @@ pub(crate) fn timings(
                         Ok(())
                     })
                 };
-                source.filter(|_| size == SIZE).map(draw).transpose()
+                source.map(draw).transpose()
             };
+            let model = model.filter(|model| model.check_scene(&scene).is_ok());
+            // Attention over far more pixels than a model was made for takes minutes.
+            let text_to_image =
+                text_to_image.filter(|model| size <= LARGER * model.pipeline.image_size()[0]);
             Ok(TimingRow {
                 size,
                 simulator_fast: fast,
                 simulator_harmonic_sum: harmonic_seconds(&scene),
-                model: drawn(Some(model))?,
-                text_to_image: drawn(text_to_image)?,
+                model: drawn(model.map(|model| model as _))?,
+                text_to_image: drawn(text_to_image.map(|model| model as _))?,
             })
         })
         .collect()

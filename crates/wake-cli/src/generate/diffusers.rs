@@ -26,10 +26,13 @@ pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Outcome<()> {
     let prompt = prompt(arguments, scene.as_ref())?;
     let device = device_named(&arguments.device)?;
     let begin = Instant::now();
-    let pipeline = Pipeline::load(weights, &device)?;
+    let mut pipeline = Pipeline::load(weights, &device)?;
+    if let Some(lora) = &arguments.lora {
+        pipeline = pipeline.with_lora(lora, 1.0)?;
+    }
     let load = begin.elapsed().as_secs_f64();
     check_grid(scene.as_ref(), pipeline.image_size())?;
-    let scheduler = scheduler(arguments, &pipeline)?;
+    let scheduler = scheduler_of(&pipeline, arguments.scheduler.as_deref())?;
     let request = request(arguments, &prompt, scheduler.clone());
     let (images, mut seconds) = generate(&pipeline, &request, arguments, &prompt)?;
     seconds["load"] = json!(load);
@@ -55,9 +58,13 @@ fn check_grid(scene: Option<&Scene>, [rows, columns]: [usize; 2]) -> Result<(), 
     }
 }
 
-fn scheduler(arguments: &Arguments, pipeline: &Pipeline) -> wake_ldm::Result<SchedulerConfig> {
+/// A model's own scheduler, or one of another class with its options.
+pub(crate) fn scheduler_of(
+    pipeline: &Pipeline,
+    name: Option<&str>,
+) -> wake_ldm::Result<SchedulerConfig> {
     let own = pipeline.scheduler().clone();
-    match &arguments.scheduler {
+    match name {
         None => Ok(own),
         // A model's file may leave clipping to the default, which latents must not have.
         Some(name) => Ok(own

@@ -5,6 +5,8 @@
 mod diffusers;
 mod wake_model;
 
+#[cfg(feature = "train")]
+pub(crate) use diffusers::scheduler_of;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -29,6 +31,9 @@ pub(crate) struct Arguments {
     /// Folder of a model: one that `wake train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
+    /// Diffusers layout: a low-rank adaptation that is merged into the model
+    #[arg(long, value_name = "FILE", requires = "weights")]
+    lora: Option<PathBuf>,
     /// Draw on a sea learnt from real images: a file that `wake train sea` wrote; not in diffusers layout
     #[arg(long, value_name = "FILE", conflicts_with = "steps")]
     sea: Option<PathBuf>,
@@ -76,6 +81,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
             None => diffusers::run(arguments, folder),
             Some(_) => Err("--sea is for the wake model; leave it out, or --weights".into()),
         },
+        Some(_) if arguments.lora.is_some() => {
+            Err("--lora is for a model in diffusers layout; leave it out".into())
+        }
         Some(folder) if folder.join("config.json").is_file() => wake_model::run(arguments),
         Some(folder) => Err(format!(
             "--weights {}: no model there; a folder that `wake train` wrote holds config.json, one in diffusers layout unet/",

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use wake_dataset::Folder;
-use wake_train::FineTuning;
+use wake_train::{FineTuning, StageOptions};
 
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
-use crate::exit::Outcome;
+use crate::exit::{self, Outcome};
 
 /// Defaults of the options that all runs have; batch and rate are the paper's.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[
@@ -19,7 +19,13 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/fine_tune"),
 ];
 
+/// Bytes of checkpoints below which nobody is warned.
+const UNWARNED: u64 = 1 << 30;
+
 /// Fit a model in diffusers layout to simulated pairs: its U-Net, or low-rank changes of it.
+///
+/// The layout is that of Stable Diffusion's download: `unet`, `vae`, `text_encoder`, `tokenizer` and `scheduler`, each with its
+/// `config.json` and `*.safetensors`; other files are ignored. `docs/paper.md` repeats the paper's experiment with it.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of the model in diffusers layout
@@ -31,6 +37,9 @@ pub(crate) struct Options {
     /// Learn changes of this rank of the attentions, and leave all else [default: the whole U-Net learns]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     rank: Option<u16>,
+    /// How often every pair is seen, instead of --steps; the paper has 4000
+    #[arg(long, conflicts_with = "steps", value_parser = epochs)]
+    epochs: Option<f64>,
     /// γ of the weights by signal-to-noise ratio [default: all steps count the same]
     #[arg(long, value_name = "GAMMA")]
     snr_gamma: Option<f64>,
@@ -42,17 +51,54 @@ pub(crate) struct Options {
     thrift: Thrift,
 }
 
+fn epochs(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    match number > 0.0 && number <= 1e6 {
+        true => Ok(number),
+        false => Err("an epoch is a pass over all pairs: above 0, up to 1e6".to_owned()),
+    }
+}
+
 pub(crate) fn run(options: &Options) -> Outcome<()> {
+    let data = Folder::open(&options.data)?;
+    let stage = options.place.paced(&options.pace, &options.thrift)?;
+    let steps = options.epochs.map(|epochs| {
+        let steps = epochs * data.trainset().len() as f64 / f64::from(options.pace.batch);
+        (steps.ceil() as usize).max(1)
+    });
     let tuning = FineTuning {
         weights: &options.weights,
-        data: &Folder::open(&options.data)?,
+        data: &data,
         rank: options.rank.map(usize::from),
         snr_gamma: options.snr_gamma,
-        options: options.place.paced(&options.pace, &options.thrift)?,
+        options: StageOptions {
+            steps: steps.or(stage.steps),
+            ..stage
+        },
     };
+    warn_of_disk(&tuning)?;
     let screen = Screen::saying(&options.place.out, |_, steps, out| {
         format!("{steps} steps, model in {out}")
     });
     tuning.train(&options.place.out, &screen.watch())?;
     screen.end()
+}
+
+/// Says what the checkpoints take, if that is much.
+fn warn_of_disk(tuning: &FineTuning<'_>) -> Outcome<()> {
+    let [checkpoint, model] = tuning.disk()?;
+    let keep = tuning.options.keep as u64;
+    let most = (keep + 1) * checkpoint + model;
+    if checkpoint >= UNWARNED {
+        let gb = |bytes: u64| bytes as f64 * 1e-9;
+        exit::note(&format!(
+            "note: a checkpoint takes {:.1} GB and the model {:.1} GB; with --keep {keep}, {:.0} GB are needed while one is \
+             written, every {} steps",
+            gb(checkpoint),
+            gb(model),
+            gb(most),
+            tuning.options.every
+        ));
+    }
+    Ok(())
 }

@@ -11,8 +11,11 @@ use wake_train::{Result, StageOptions};
 #[derive(Args, Clone)]
 pub(crate) struct Place {
     /// Steps between checkpoints, and what is written of the results
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, visible_alias = "checkpoint-every", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) every: u32,
+    /// Checkpoints that are kept
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) keep: u16,
     /// Seed of everything that is drawn, simulated pairs included
     #[arg(long, default_value_t = 7)]
     pub(crate) seed: u64,
@@ -35,7 +38,7 @@ pub(crate) struct Pace {
     pub(crate) steps: u32,
     /// Examples of a batch
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-    batch: u16,
+    pub(crate) batch: u16,
     /// Largest step of the optimizer
     #[arg(long)]
     rate: f64,
@@ -82,6 +85,7 @@ impl Place {
             checkpointing: thrift.checkpointing,
             bf16: thrift.bf16,
             every: self.every as usize,
+            keep: usize::from(self.keep),
             seed: self.seed,
             resume: self.resume,
             devices: self.devices()?,

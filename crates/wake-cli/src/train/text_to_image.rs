@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use wake_dataset::Recipe;
-use wake_train::{PipelineTraining, TrainingPairs};
+use wake_train::{LatentShape, PipelineTraining, TrainingPairs};
 
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
@@ -38,7 +38,7 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 
 /// Train a small model of Stable Diffusion's layout from nothing, on images and prompts alone.
 ///
-/// The autoencoder first, then text encoder and U-Net together; `wake generate --weights`, `wake evaluate --text-to-image` and
+/// The autoencoder first, then text encoder and U-Net together; `wake generate --weights`, `wake evaluate pipeline --weights` and
 /// `wake train fine-tune --weights` read the model.
 #[derive(Args)]
 pub(crate) struct Options {
@@ -51,6 +51,15 @@ pub(crate) struct Options {
     /// Steps of the autoencoder; --steps are those of text encoder and U-Net
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
     autoencoder_steps: u32,
+    /// Stop after these of --steps, to go on with --resume
+    #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..))]
+    stop_after: Option<u32>,
+    /// Pixels that a latent pixel stands for along each axis: 4, 8 or 16
+    #[arg(long, default_value = "16", value_parser = ["4", "8", "16"])]
+    downsampling: String,
+    /// Channels of a latent pixel
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=512))]
+    latents: u16,
     #[command(flatten)]
     pace: Pace,
     #[command(flatten)]
@@ -71,6 +80,15 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     let training = PipelineTraining {
         pairs: &pairs,
         autoencoder_steps: Some(options.autoencoder_steps as usize),
+        latents: LatentShape {
+            channels: usize::from(options.latents),
+            levels: match options.downsampling.as_str() {
+                "4" => 1,
+                "8" => 2,
+                _ => 3,
+            },
+        },
+        stop_after: options.stop_after.map(|steps| steps as usize),
         options: constants,
     };
     training.check()?;

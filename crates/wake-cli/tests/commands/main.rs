@@ -15,6 +15,8 @@ mod faults;
 mod generate;
 #[cfg(feature = "locate")]
 mod locate;
+#[cfg(all(unix, feature = "train"))]
+mod paper;
 #[cfg(all(feature = "simulate", feature = "detect"))]
 mod product;
 #[cfg(feature = "train")]

@@ -3,6 +3,7 @@
 //! Images are `[batch, channels, rows, columns]` in row-major order, as in a contiguous tensor.
 //! All cores work; every sum has a fixed order, whatever their number.
 
+mod arch;
 pub(super) mod attention;
 pub(super) mod conv;
 pub(super) mod group_norm;

@@ -123,7 +123,7 @@ impl WeightFiles {
     }
 
     /// A file that is part of the program; `name` only serves messages.
-    pub(super) fn embedded(name: &str, bytes: &'static [u8]) -> Result<Self> {
+    pub(crate) fn embedded(name: &str, bytes: &'static [u8]) -> Result<Self> {
         Ok(Self {
             files: vec![WeightFile::new(Path::new(name), Contents::Memory(bytes))?],
         })

@@ -1,4 +1,4 @@
-//! Wind and incidence from the brightness of the open sea.
+//! Wind and incidence from the brightness of the open sea, fetch from its contrast.
 //!
 //! One brightness cannot tell three unknowns apart. Each is therefore found with the other two given, as the prompt of
 //! a generated image or the scene of a simulated one states them: the question is whether the image is as bright as
@@ -9,6 +9,7 @@ use crate::models::Models;
 use crate::raster::Raster;
 use crate::scattering::SlopeCovariance;
 use crate::scene::Scene;
+use crate::simulate::LinearSea;
 
 /// Winds tried [m/s]: first, step, number.
 const WINDS: Lattice = Lattice(2.0, 0.5, 21);
@@ -16,9 +17,15 @@ const WINDS: Lattice = Lattice(2.0, 0.5, 21);
 const INCIDENCES: Lattice = Lattice(10.0, 1.0, 36);
 /// Angles between wind and look direction tried \[deg\].
 const ANGLES: Lattice = Lattice(0.0, 5.0, 19);
+/// Logarithms of the fetches tried \[m\]: 3 to 240 km.
+const FETCHES: Lattice = Lattice(8.0, 0.4, 12);
 /// Least change of brightness with the value, [dB per m/s], [dB per degree], and between wind along and across the look
 /// direction \[dB\]: below it, the value is not measurable.
 const THRESHOLDS: [f64; 3] = [0.5, 0.15, 1.5];
+/// Least relative change of the variance of intensity with that of the fetch \[1\], likewise.
+const LEAST_GROWTH: f64 = 0.3;
+/// Pixels along a side of the sea whose variance is computed.
+const SIDE: usize = 128;
 /// How far outside the range of brightnesses the sea may be and still count as its end \[dB\].
 const TOLERANCE: f64 = 0.25;
 /// Least skew of the spectrum that tells one diagonal from the other \[1\].
@@ -88,6 +95,32 @@ pub fn incidence(sea: &OpenSea, scene: &Scene) -> crate::Result<Measured> {
         scene.radar.incidence = value;
     })
     .map(|(value, slope)| Measured::with_threshold(value, slope, THRESHOLDS[1]))
+}
+
+/// Fetch \[m\] whose waves give the sea of `scene` the contrast of the image, its wind and incidence given.
+///
+/// ```text
+/// contrast² = ∬ P(k; fetch) dk,    P the quasi-linear spectrum of the intensity
+/// ```
+///
+/// - `contrast`: standard deviation over mean of the intensity before speckle \[1\], see [`OpenSea::contrast`]
+/// - confidence: relative change of the variance with that of the fetch; 0 if no fetch of 3 to 240 km fits, or more than one
+///
+/// # Errors
+///
+/// As [`LinearSea::new`].
+pub fn fetch(contrast: f64, scene: &Scene) -> crate::Result<Measured> {
+    let mut scene = scene.clone();
+    (scene.grid.rows, scene.grid.columns) = (SIDE, SIDE);
+    let at = |logarithm: f64| {
+        scene.sea.fetch = logarithm.exp();
+        Ok((logarithm, LinearSea::new(&scene)?.variance().ln()))
+    };
+    let curve: Vec<(f64, f64)> = FETCHES.values().map(at).collect::<crate::Result<_>>()?;
+    Ok(match crossings(&curve, 2.0 * contrast.ln()).as_slice() {
+        &[(logarithm, growth)] => Measured::with_threshold(logarithm.exp(), growth, LEAST_GROWTH),
+        _ => Measured::NOTHING,
+    })
 }
 
 /// Axis of the wind [deg clockwise from azimuth, 0 up to 180], wind speed, fetch and incidence given.

@@ -1,4 +1,4 @@
-//! What an image tells of its scene: heading and speed of the ship, wind and incidence.
+//! What an image tells of its scene: heading and speed of the ship, wind, fetch and incidence.
 //!
 //! The measurements judge images, simulated or generated, by physics instead of by pixels. Each takes one image of
 //! intensity before speckle and gives a value with a confidence; an image that does not carry the quantity gives a
@@ -7,6 +7,7 @@
 //! ```text
 //! image ─► wake arms ─► heading ─► stationary waves ─► heading, speed
 //!    └──► open sea ─► brightness, skew of the spectrum ─► wind speed, wind direction, incidence
+//!                └──► contrast ─► fetch
 //! ```
 //!
 //! Physics gives the curves and the brightness. Windows, bands and the thresholds of confidence have no closed
@@ -28,7 +29,7 @@ mod wake;
 #[cfg(test)]
 mod tests;
 
-pub use inversion::{incidence, mean_sigma0, wind_axis, wind_speed};
+pub use inversion::{fetch, incidence, mean_sigma0, wind_axis, wind_speed};
 pub use median::median;
 pub use open_sea::{OpenSea, open_sea};
 pub use radial::{Binning, RadialSpectrum, radial_spectrum};

@@ -145,6 +145,13 @@ impl LinearSea {
         self.sum(waves, [self.period; 2])
     }
 
+    /// Variance \[1\] of a pixel.
+    #[must_use]
+    pub(crate) fn variance(&self) -> f64 {
+        let squares = self.amplitudes.iter().map(|&a| f64::from(a * a));
+        squares.sum()
+    }
+
     /// The real part of a sum of waves with kx ≥ 0.
     fn sum(&self, half: impl Iterator<Item = Complex32>, [rows, columns]: [usize; 2]) -> Field {
         let mut waves = Vec::with_capacity(self.period * self.period);

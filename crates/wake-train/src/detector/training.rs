@@ -168,6 +168,7 @@ impl DetectorTraining {
             name: STAGE,
             resume: options.resume,
             every: options.every,
+            keep: options.keep,
             steps: options.steps(&DEFAULTS),
             results: &[WEIGHTS],
         };

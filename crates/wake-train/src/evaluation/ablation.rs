@@ -1,4 +1,4 @@
-//! From the dumbest image to the simulator's, rung by rung: what of a sea each has that a judge can see.
+//! Kinds of images from a constant to the simulator's: the shape of the sea in each, and whether a classifier tells it from simulated ones.
 
 use burn::tensor::Device;
 use serde::Serialize;
@@ -7,10 +7,11 @@ use wake_physics::{Field, Scene};
 
 use super::baseline::Baseline;
 use super::judge::told_apart;
-use super::pixels::grey;
 use super::shape::{SeaShape, crest_variance, sea_shape};
-use super::source::{ImageSource, Told, draw_all, other_sea};
+use super::source::{ImageSource, Named, Told, other_sea};
 use super::statistics::mean;
+use super::view::View;
+use super::wake_correlation::wedge;
 use crate::TwoSample;
 use crate::error::Result;
 
@@ -34,6 +35,9 @@ pub struct AblationRow {
     pub crest_variance: Option<f64>,
     /// Squared differences of neighbours across the borders of the model's squares over those elsewhere.
     pub seams: Option<f64>,
+    /// Slope of the grey on that of the expected image inside the Kelvin wedge: 1 where the wake has the contrast of the physics, 0
+    /// without a wake.
+    pub wake_contrast: Option<f64>,
     /// Against simulated images of the same scenes, see [`classifier_two_sample_test`](crate::classifier_two_sample_test).
     pub two_sample: Option<TwoSample>,
 }
@@ -49,15 +53,22 @@ pub struct AblationRow {
 /// As [`ImageSource::draw`] and [`classifier_two_sample_test`](crate::classifier_two_sample_test).
 pub(super) fn ablation(
     scenes: &[Scene],
-    kinds: &[(&'static str, &dyn ImageSource)],
+    kinds: &[Named<'_>],
+    view: &View,
     device: &Device,
     mut step: impl FnMut(),
 ) -> Result<Vec<AblationRow>> {
     let draw = |source: &dyn ImageSource, scenes: &[Scene]| -> Result<Vec<Field>> {
-        let images = draw_all(source, scenes, Told::Both, |_| {})?;
-        Ok(images.iter().map(grey).collect())
+        let images = view.draw_all(source, scenes, Told::Both, |_| {})?;
+        Ok(images.iter().map(|image| view.grey(image)).collect())
     };
-    let expected = draw(&Baseline::Expected, scenes)?;
+    // The mean over all seas has no speckle, whatever the images have.
+    let plain = View {
+        speckle: false,
+        ..*view
+    };
+    let expected = plain.draw_all(&Baseline::Expected, scenes, Told::Both, |_| {})?;
+    let expected: Vec<Field> = expected.iter().map(|image| view.grey(image)).collect();
     // Neither the sea that pixels are compared with nor that of the rung of the simulator.
     let third: Vec<Scene> = scenes.iter().map(|scene| other_sea(scene, 2)).collect();
     let simulated = draw(&Baseline::Simulator, &third)?;
@@ -82,7 +93,7 @@ fn row(
     two_sample: Option<TwoSample>,
 ) -> AblationRow {
     let mut shapes: Vec<SeaShape> = Vec::new();
-    let (mut crests, mut borders) = (Vec::new(), Vec::new());
+    let (mut crests, mut borders, mut contrasts) = (Vec::new(), Vec::new(), Vec::new());
     for ((scene, image), expected) in scenes.iter().zip(images).zip(expected) {
         let left = image.values.iter().zip(&expected.values);
         let left = Field {
@@ -92,6 +103,7 @@ fn row(
         shapes.extend(sea_shape(&left, scene.sea.wind_toward.to_radians()));
         crests.extend(crest_variance(image, expected));
         borders.extend(seams(&left, SQUARE));
+        contrasts.extend(wake_contrast(scene, image, expected));
     }
     let of = |value: &dyn Fn(&SeaShape) -> f64| {
         let values: Vec<f64> = shapes.iter().map(value).collect();
@@ -105,6 +117,50 @@ fn row(
         grouping: of(&|s| s.grouping),
         crest_variance: mean(&crests),
         seams: mean(&borders),
+        wake_contrast: mean(&contrasts),
         two_sample,
+    }
+}
+
+/// Slope of an image on the expected one inside the Kelvin wedge, by least squares; `None` without a ship or where nothing is
+/// expected.
+fn wake_contrast(scene: &Scene, image: &Field, expected: &Field) -> Option<f64> {
+    let inside = wedge(scene).ok()?;
+    let within = |field: &Field| -> Vec<f64> {
+        let pixels = field.values.iter().zip(&inside);
+        let pixels = pixels.filter(|(_, inside)| **inside);
+        pixels.map(|(&v, _)| f64::from(v)).collect()
+    };
+    let [image, expected] = [image, expected].map(within);
+    let [of_image, of_expected] = [mean(&image)?, mean(&expected)?];
+    let pairs = || image.iter().zip(&expected);
+    let product = |(a, b): (&f64, &f64)| (a - of_image) * (b - of_expected);
+    let square: f64 = expected.iter().map(|b| (b - of_expected).powi(2)).sum();
+    (square > 0.0).then(|| pairs().map(product).sum::<f64>() / square)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// Half the contrast around another mean, with a sea that knows nothing of the wake: one half.
+    #[test]
+    fn the_contrast_of_a_wake_is_a_slope() {
+        let keys = ["grid.rows = 64", "grid.columns = 64"];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        let expected = wake_physics::expected_intensity(&scene).unwrap();
+        let image = Field {
+            values: expected.values.iter().map(|v| 3.0 + 0.5 * v).collect(),
+            ..expected
+        };
+        let slope = wake_contrast(&scene, &image, &expected).unwrap();
+        assert!((slope - 0.5).abs() < 1e-4, "{slope}");
+        let flat = Field {
+            values: vec![1.0; image.values.len()],
+            ..image
+        };
+        assert!(wake_contrast(&scene, &flat, &expected).unwrap().abs() < 1e-12);
+        assert_eq!(wake_contrast(&scene, &image, &flat), None);
     }
 }

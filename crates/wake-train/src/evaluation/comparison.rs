@@ -5,28 +5,28 @@ use wake_physics::sar::speckle::speckle;
 use wake_physics::{Field, Scene};
 
 use super::baseline::Baseline;
-use super::pixels::{PixelRow, PixelTally, blur, constant, grey};
+use super::pixels::{PixelRow, PixelTally, blur, constant};
 use super::reading::{Reading, raster};
-use super::source::{ImageSource, Told, drawn, other_sea};
+use super::source::{ImageSource, Named, Told, other_sea};
 use super::statistics::quantile;
+use super::view::View;
 use crate::error::Result;
 use crate::metrics::Lpips;
 
-/// Kinds of images, in the order of the tallies.
-const KINDS: [&str; 6] = [
-    "model",
+/// Kinds of images after the model, in the order of the tallies.
+const KINDS: [&str; 4] = [
     "simulator, other sea",
     "expected image, Gaussian sea",
     "constant",
     "blurred simulator",
-    "text to image",
 ];
 
 /// Figures over scenes, which are added some at a time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Comparison {
-    /// By kind, see [`KINDS`].
-    tallies: [PixelTally; 6],
+    view: View,
+    /// The model, the kinds in [`KINDS`], and whatever stands beside.
+    tallies: Vec<PixelTally>,
     /// What is read from simulated images, scene by scene.
     pub simulated: Vec<Reading>,
     /// What is read from the model's.
@@ -37,10 +37,18 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
+    /// Nothing yet.
+    pub(super) fn new(view: View) -> Self {
+        Self {
+            view,
+            ..Self::default()
+        }
+    }
+
     /// Draws scenes in every way and counts the images against simulated ones.
     ///
     /// - `model`: what is judged, told sentence and numbers
-    /// - `beside`: a second model, whose pixels count alone
+    /// - `beside`: other sources, whose pixels count alone
     ///
     /// # Errors
     ///
@@ -50,43 +58,52 @@ impl Comparison {
         &mut self,
         scenes: &[Scene],
         model: &dyn ImageSource,
-        beside: Option<&dyn ImageSource>,
+        beside: &[Named<'_>],
         lpips: Option<&Lpips>,
     ) -> Result<()> {
-        let references = drawn(&Baseline::Simulator, scenes, Told::Both)?;
+        let view = self.view;
+        let draw = |source: &dyn ImageSource, scenes| view.draw(source, scenes, Told::Both);
+        let references = draw(&Baseline::Simulator, scenes)?;
         let others: Vec<Scene> = scenes.iter().map(|scene| other_sea(scene, 1)).collect();
-        let seconds = drawn(&Baseline::Simulator, &others, Told::Both)?;
-        let generated = drawn(model, scenes, Told::Both)?;
-        let linear = drawn(&Baseline::Gaussian, scenes, Told::Both)?;
-        let latent = beside.map_or(Ok(Vec::new()), |source| drawn(source, scenes, Told::Both))?;
+        let seconds = draw(&Baseline::Simulator, &others)?;
+        let generated = draw(model, scenes)?;
+        let linear = draw(&Baseline::Gaussian, scenes)?;
+        let others: Vec<Vec<Field>> = beside
+            .iter()
+            .map(|(_, source)| draw(*source, scenes))
+            .collect::<Result<_>>()?;
+        self.tallies
+            .resize_with(1 + KINDS.len() + others.len(), PixelTally::default);
         for (n, scene) in scenes.iter().enumerate() {
             let images = [&references[n], &seconds[n], &generated[n], &linear[n]];
-            let [reference, second, model, gaussian] = images.map(grey);
+            let [reference, second, model, gaussian] = images.map(|image| view.grey(image));
             let (flat, soft) = (constant(&reference), blur(&second));
             let images = [&model, &second, &gaussian, &flat, &soft];
             for (tally, image) in self.tallies.iter_mut().zip(images) {
                 tally.add(&reference, image, lpips);
             }
-            if let Some(image) = latent.get(n) {
-                self.tallies[5].add(&reference, &grey(image), lpips);
+            for (tally, images) in self.tallies[1 + KINDS.len()..].iter_mut().zip(&others) {
+                tally.add(&reference, &view.grey(&images[n]), lpips);
             }
-            self.simulated.push(Reading::of(&references[n], scene)?);
-            self.generated.push(Reading::of(&generated[n], scene)?);
-            self.gaussian.push(Reading::of(&linear[n], scene)?);
+            self.simulated.push(view.read(&references[n], scene)?);
+            self.generated.push(view.read(&generated[n], scene)?);
+            self.gaussian.push(view.read(&linear[n], scene)?);
             for (looks, image) in self.looks.iter_mut().zip([&references[n], &generated[n]]) {
-                looks.extend(equivalent_looks(image, scene));
+                looks.extend(equivalent_looks(image, scene, &view));
             }
         }
         Ok(())
     }
 
-    /// The figures of pixels: of the model first, of the simulator with another sea second; the last is that of the model
-    /// beside, where there was one.
+    /// The figures of pixels: of the model first, of the simulator with another sea second, of other sources last.
+    ///
+    /// - `model`: its name
     #[must_use]
-    pub(super) fn pixels(&self) -> Vec<PixelRow> {
-        let kinds = self.tallies.iter().zip(KINDS);
-        let drawn = kinds.filter(|(tally, kind)| !tally.is_empty() || *kind != KINDS[5]);
-        drawn.map(|(tally, kind)| tally.row(kind)).collect()
+    pub(super) fn pixels(&self, model: &str, beside: &[Named<'_>]) -> Vec<PixelRow> {
+        let names = [model].into_iter().chain(KINDS);
+        let names = names.chain(beside.iter().map(|(name, _)| *name));
+        let rows = self.tallies.iter().zip(names);
+        rows.map(|(tally, name)| tally.row(name)).collect()
     }
 
     /// Equivalent looks of the open sea after speckle is applied, medians over the scenes: on simulated images, and on the
@@ -97,10 +114,12 @@ impl Comparison {
     }
 }
 
-/// Equivalent number of looks of the open sea, mean²/variance, after speckle is applied.
-fn equivalent_looks(intensity: &Field, scene: &Scene) -> Option<f64> {
+/// Equivalent number of looks of the open sea, mean²/variance, with speckle.
+fn equivalent_looks(intensity: &Field, scene: &Scene, view: &View) -> Option<f64> {
     let mut image = intensity.clone();
-    speckle(&mut image, scene.radar.looks, scene.seed);
+    if !view.speckle {
+        speckle(&mut image, scene.radar.looks, scene.seed);
+    }
     let ship = scene.ships.first();
     let ship = ship.map(|ship| (ship.position, ship.heading));
     let sea = open_sea(&image, &raster(scene), ship)?;
@@ -118,7 +137,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.ships.clear();
         let image = Field::constant(&raster(&scene), 0.05);
-        let looks = equivalent_looks(&image, &scene).unwrap();
+        let looks = equivalent_looks(&image, &scene, &View::default()).unwrap();
         let expected = f64::from(scene.radar.looks);
         assert!((looks / expected - 1.0).abs() < 0.05, "{looks}");
     }
@@ -130,9 +149,9 @@ mod tests {
         let scene = Scene::default().with_assignments(&keys).unwrap();
         let mut comparison = Comparison::default();
         comparison
-            .add(&[scene], &Baseline::Simulator, None, None)
+            .add(&[scene], &Baseline::Simulator, &[], None)
             .unwrap();
-        let rows = comparison.pixels();
+        let rows = comparison.pixels("model", &[]);
         assert_eq!(rows.len(), 5);
         assert!(rows[0].ssim.is_some_and(|ssim| (ssim - 1.0).abs() < 1e-9));
         assert!(rows[1].ssim.is_some_and(|ssim| ssim < 0.99));

@@ -4,8 +4,9 @@ use serde::Serialize;
 use wake_physics::Scene;
 
 use super::baseline::Baseline;
-use super::reading::{Quantity, Reading};
-use super::source::{ImageSource, Told, drawn};
+use super::reading::Quantity;
+use super::source::{ImageSource, Told};
+use super::view::View;
 use crate::error::Result;
 
 /// How often a measured value followed.
@@ -27,7 +28,7 @@ pub struct ControllabilityRow {
 /// another sea first, then of the model for each of `told`.
 ///
 /// Values move by a fixed step toward the other end of the paper's range (ship 6 to 12 m/s, wind 3 to 7 m/s, incidence 16 to 32°),
-/// headings by 60°, winds by 40°. Scenes whose ship would have to change but is not there do not count.
+/// headings by 60°, winds by 40°, fetches to three times or a third. Scenes whose ship would have to change but is not there do not count.
 ///
 /// - `scenes`: bases of the pairs, with values in those ranges
 /// - `step`: called after each scene
@@ -38,14 +39,14 @@ pub struct ControllabilityRow {
 pub(super) fn controllability(
     quantity: Quantity,
     scenes: &[Scene],
-    model: &dyn ImageSource,
-    told: &[Told],
+    (model, told): (&dyn ImageSource, &[Told]),
+    view: &View,
     mut step: impl FnMut(),
 ) -> Result<Vec<ControllabilityRow>> {
     let mut counted = Vec::new();
     for base in scenes {
         if let Some(pair) = Swap::new(base, quantity)
-            && pair.is_followed(&Baseline::Simulator, Told::Both)?
+            && pair.is_followed(view, &Baseline::Simulator, Told::Both)?
         {
             counted.push(pair);
         }
@@ -55,7 +56,7 @@ pub(super) fn controllability(
         |name: &'static str, source: &dyn ImageSource, told: Told| -> Result<ControllabilityRow> {
             let mut right = 0;
             for pair in &counted {
-                right += usize::from(pair.is_followed(source, told)?);
+                right += usize::from(pair.is_followed(view, source, told)?);
             }
             Ok(ControllabilityRow {
                 quantity: quantity.name()[0],
@@ -95,6 +96,9 @@ impl Swap {
             Quantity::WindSpeed => toward(3.0, 7.0, 2.0),
             Quantity::WindDirection => 40.0,
             Quantity::Incidence => toward(16.0, 32.0, 8.0),
+            // Three times as much or a third: seas grow with the logarithm.
+            Quantity::Fetch if before < 26.0 => 2.0 * before,
+            Quantity::Fetch => -before / 1.5,
         };
         let (after, turned) = (before + change, (before + change).rem_euclid(360.0));
         let mut scene = base.clone();
@@ -104,6 +108,7 @@ impl Swap {
             Quantity::WindSpeed => scene.sea.wind_speed = after,
             Quantity::WindDirection => scene.sea.wind_toward = turned,
             Quantity::Incidence => scene.radar.incidence = after,
+            Quantity::Fetch => scene.sea.fetch = 1e3 * after,
         }
         Some(Self {
             quantity,
@@ -115,10 +120,10 @@ impl Swap {
     /// Whether the measured value moves the way the scene's did; not where either image does not show it.
     ///
     /// Both images are read with the base's other values given: they differ in nothing else.
-    fn is_followed(&self, source: &dyn ImageSource, told: Told) -> Result<bool> {
-        let images = drawn(source, &self.scenes, told)?;
+    fn is_followed(&self, view: &View, source: &dyn ImageSource, told: Told) -> Result<bool> {
+        let images = view.draw(source, &self.scenes, told)?;
         let read = |n: usize| -> Result<Option<f64>> {
-            let reading = Reading::of(&images[n], &self.scenes[0])?;
+            let reading = view.read(&images[n], &self.scenes[0])?;
             Ok(reading.value(self.quantity).measurable_value())
         };
         let (Some(before), Some(after)) = (read(0)?, read(1)?) else {
@@ -154,6 +159,7 @@ mod tests {
                 assert!((6.0..=12.0).contains(&other.ships[0].speed));
                 assert!((3.0..=7.0).contains(&other.sea.wind_speed));
                 assert!((16.0..=32.0).contains(&other.radar.incidence));
+                assert!((10e3..=78e3).contains(&other.sea.fetch));
             }
         }
         let open = Scene {

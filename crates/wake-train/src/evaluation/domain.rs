@@ -8,8 +8,8 @@ use serde::Serialize;
 use wake_physics::{Field, Scene};
 
 use super::judge::told_apart;
-use super::pixels::grey;
-use super::source::{ImageSource, Told, draw_all};
+use super::source::{ImageSource, Told};
+use super::view::View;
 use crate::TwoSample;
 use crate::error::Result;
 use wake_ldm::sampler::speckled;
@@ -48,11 +48,12 @@ impl Views {
     /// As [`ImageSource::draw`].
     pub fn draw(source: &dyn ImageSource, scenes: &[Scene], step: impl FnMut(u64)) -> Result<Self> {
         let start = Instant::now();
-        let images = draw_all(source, scenes, Told::Scene, step)?;
+        let view = View::default();
+        let images = view.draw_all(source, scenes, Told::Scene, step)?;
         let seconds = start.elapsed().as_secs_f64() / scenes.len().max(1) as f64;
         Ok(Self {
             speckled: greys_with_speckle(scenes, &images)?,
-            plain: images.iter().map(grey).collect(),
+            plain: images.iter().map(|image| view.grey(image)).collect(),
             seconds,
         })
     }
@@ -79,6 +80,6 @@ fn greys_with_speckle(scenes: &[Scene], images: &[Field]) -> Result<Vec<Field>> 
     let pairs: Vec<_> = scenes.iter().zip(images).collect();
     let greys = pairs
         .par_iter()
-        .map(|(scene, image)| Ok(grey(&speckled(image, scene)?)));
+        .map(|(scene, image)| Ok(View::default().grey(&speckled(image, scene)?)));
     greys.collect()
 }

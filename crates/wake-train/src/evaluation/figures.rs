@@ -8,11 +8,12 @@ use super::ablation::{AblationRow, ablation};
 use super::baseline::Baseline;
 use super::comparison::Comparison;
 use super::controllability::{ControllabilityRow, controllability};
-use super::held_out::held_out;
+use super::held_out::HeldOut;
 use super::measurements::MeasurementRow;
 use super::pixels::PixelRow;
 use super::reading::{Quantity, Reading};
-use super::source::{BATCH, ImageSource, Told};
+use super::source::{BATCH, ImageSource, Named, Told};
+use super::view::View;
 use super::wake_correlation::{WakeCorrelation, wake_correlation};
 use crate::error::Result;
 use crate::metrics::Lpips;
@@ -29,8 +30,12 @@ pub struct Evaluation<'a> {
     pub name: &'static str,
     /// Whether it is a model, not the simulator in its place.
     pub has_network: bool,
-    /// A model of images and prompts alone, beside it.
-    pub text_to_image: Option<&'a dyn ImageSource>,
+    /// Other sources, whose pixels and sea are compared too.
+    pub beside: Vec<Named<'a>>,
+    /// The scenes.
+    pub held_out: HeldOut,
+    /// How images are looked at.
+    pub view: View,
     /// What the source can be told besides sentence and numbers together; none for the simulator.
     pub conditions: Vec<Told>,
     /// Scenes; some figures take a share of them.
@@ -92,7 +97,7 @@ impl std::fmt::Debug for Evaluation<'_> {
 impl<'a> Evaluation<'a> {
     /// Kinds of images from the dumbest upward, without the simulator's own.
     #[must_use]
-    pub fn kinds(&self) -> Vec<(&'static str, &'a dyn ImageSource)> {
+    pub fn kinds(&self) -> Vec<Named<'a>> {
         let baseline = |of: &'static Baseline| (of.name(), of as &dyn ImageSource);
         let mut kinds = vec![
             baseline(&Baseline::Constant),
@@ -100,11 +105,9 @@ impl<'a> Evaluation<'a> {
             baseline(&Baseline::Gaussian),
         ];
         if self.has_network {
-            kinds.push(("model", self.source));
+            kinds.push((self.name, self.source));
         }
-        if let Some(source) = self.text_to_image {
-            kinds.push(("text to image", source));
-        }
+        kinds.extend(&self.beside);
         kinds.push(baseline(&Baseline::OtherSea));
         kinds
     }
@@ -149,23 +152,26 @@ impl<'a> Evaluation<'a> {
         device: &Device,
         step: &dyn Fn(&'static str, u64),
     ) -> Result<Figures> {
-        let scenes: Vec<Scene> = (0..self.scenes as u64).map(held_out).collect();
-        let mut compared = Comparison::default();
+        let scenes = self.held_out.scenes(0, self.scenes);
+        let mut compared = Comparison::new(self.view);
         for batch in scenes.chunks(BATCH) {
-            compared.add(batch, self.source, self.text_to_image, lpips)?;
+            compared.add(batch, self.source, &self.beside, lpips)?;
             step("pixels and values", batch.len() as u64);
         }
-        let ablation = ablation(&scenes, &self.kinds(), device, || step("ablation", 1))?;
+        let ablation = ablation(&scenes, &self.kinds(), &self.view, device, || {
+            step("ablation", 1);
+        })?;
         let with_wake = &scenes[..self.wake_scenes()];
-        let wake_correlation =
-            wake_correlation(with_wake, self.source, || step("wake correlation", 8))?;
+        let wake_correlation = wake_correlation(with_wake, self.source, &self.view, || {
+            step("wake correlation", 8);
+        })?;
         let conditions = self.conditions(&scenes[..self.condition_scenes()], &compared, step)?;
         let controllability = self.controllability(step)?;
         let [simulator, model] = compared.looks();
         Ok(Figures {
             judged: self.name,
             scenes: scenes.len(),
-            pixels: compared.pixels(),
+            pixels: compared.pixels(self.name, &self.beside),
             ablation,
             speckle: Speckle {
                 looks: scenes[0].radar.looks,
@@ -198,7 +204,12 @@ impl<'a> Evaluation<'a> {
         };
         let mut all = vec![row(Told::Both, &compared.generated[..scenes.len()])];
         for &told in &self.conditions {
-            let read = Reading::of_source(self.source, scenes, told, |n| step("conditions", n))?;
+            let images = self
+                .view
+                .draw_all(self.source, scenes, told, |n| step("conditions", n))?;
+            let read = images.iter().zip(scenes);
+            let read = read.map(|(image, scene)| self.view.read(image, scene));
+            let read: Vec<Reading> = read.collect::<Result<_>>()?;
             all.push(row(told, &read));
         }
         Ok(all)
@@ -210,16 +221,10 @@ impl<'a> Evaluation<'a> {
         let mut rows = Vec::new();
         for quantity in Quantity::ALL {
             let first = FIRST_CHANGED + ((quantity as u64) << 12);
-            let scenes = (first..first + self.pairs() as u64).map(held_out);
-            let scenes: Vec<Scene> = scenes.collect();
+            let scenes = self.held_out.scenes(first, self.pairs());
+            let model = (self.source, told.as_slice());
             let done = || step("controllability", 1);
-            rows.extend(controllability(
-                quantity,
-                &scenes,
-                self.source,
-                &told,
-                done,
-            )?);
+            rows.extend(controllability(quantity, &scenes, model, &self.view, done)?);
         }
         Ok(rows)
     }

@@ -7,30 +7,50 @@ use wake_physics::scene::Ship;
 
 /// First seed of the scenes: data sets count theirs from small numbers.
 const FIRST_SEED: u64 = 0xE7A1_0000_0000_0000;
-/// Pixels along a side of a held-out scene: those of the model.
-pub const SIZE: usize = 256;
-/// Their size \[m\].
-const SPACING: f64 = 4.0;
 
-/// The scene of an index: values anywhere in the ranges of the paper's grid, as exact as a prompt states them.
-#[must_use]
-pub fn held_out(index: u64) -> Scene {
-    let seed = FIRST_SEED + (index << 16);
-    let mut random = StdRng::seed_from_u64(seed);
-    let mut whole = |from: i32, to: i32| f64::from(random.random_range(from..=to));
-    let mut scene = Scene {
-        seed,
-        ..Scene::default()
-    };
-    (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (SIZE, SIZE, SPACING);
-    scene.ships = vec![Ship {
-        speed: 0.1 * whole(60, 120),
-        heading: whole(0, 359),
-        ..Ship::default()
-    }];
-    scene.sea.wind_speed = 0.1 * whole(30, 70);
-    scene.sea.wind_toward = whole(0, 359);
-    scene.sea.fetch = 100.0 * whole(100, 700);
-    scene.radar.incidence = whole(16, 32);
-    scene
+/// Scenes whose values lie anywhere in the ranges of the paper's grid, as exact as a prompt states them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldOut {
+    /// Every value that no prompt states, the pixels included; of its ships the first counts.
+    pub base: Scene,
+}
+
+impl Default for HeldOut {
+    /// Those of the wake model: 256 × 256 pixels of 4 m.
+    fn default() -> Self {
+        let mut base = Scene::default();
+        (base.grid.rows, base.grid.columns, base.grid.spacing) = (256, 256, 4.0);
+        Self { base }
+    }
+}
+
+impl HeldOut {
+    /// The scene of an index.
+    #[must_use]
+    pub fn scene(&self, index: u64) -> Scene {
+        let seed = FIRST_SEED + (index << 16);
+        let mut random = StdRng::seed_from_u64(seed);
+        let mut whole = |from: i32, to: i32| f64::from(random.random_range(from..=to));
+        let mut scene = Scene {
+            seed,
+            ..self.base.clone()
+        };
+        scene.ships = vec![Ship {
+            speed: 0.1 * whole(60, 120),
+            heading: whole(0, 359),
+            ..self.base.ships.first().cloned().unwrap_or_default()
+        }];
+        scene.sea.wind_speed = 0.1 * whole(30, 70);
+        scene.sea.wind_toward = whole(0, 359);
+        scene.sea.fetch = 100.0 * whole(100, 700);
+        scene.radar.incidence = whole(16, 32);
+        scene
+    }
+
+    /// Some scenes from the first index.
+    #[must_use]
+    pub fn scenes(&self, first: u64, count: usize) -> Vec<Scene> {
+        let indices = first..first + count as u64;
+        indices.map(|index| self.scene(index)).collect()
+    }
 }

@@ -10,9 +10,11 @@ use crate::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
 /// finds nothing proves little.
 const NETWORKS: u64 = 3;
 const FOUND: f64 = 0.9;
+/// Side of the smallest patches of a test [pixels].
+const SMALLEST: usize = 16;
 
 /// What the network that tells two kinds of images apart best says of them, the best of up to three
-/// [`classifier_two_sample_test`] tests of their default options with seeds of their own; `None` of less than four images.
+/// [`classifier_two_sample_test`] tests of their default options with seeds of their own; `None` of less than four images and of images below 16 pixels.
 ///
 /// - `first`, `second`: images of one size, as many of both kinds; image k of both may show the same scene
 /// - `device`: one that holds no gradients
@@ -26,12 +28,19 @@ pub(super) fn told_apart(
     device: &Device,
 ) -> Result<Option<TwoSample>> {
     let mut best: Option<TwoSample> = None;
-    if first.len() < 4 {
+    let patch = TwoSampleOptions::default().patch;
+    let side = first
+        .iter()
+        .map(|image| image.rows.min(image.columns))
+        .min();
+    let patch = patch.min(side.unwrap_or(0) / 8 * 8);
+    if first.len() < 4 || patch < SMALLEST {
         return Ok(best);
     }
     for seed in 1..=NETWORKS {
         let options = TwoSampleOptions {
             seed,
+            patch,
             ..TwoSampleOptions::default()
         };
         let told = classifier_two_sample_test(first, second, &options, device)?;

@@ -71,7 +71,7 @@ mod tests {
                 confidence: 1.0,
                 measurable,
             };
-            let mut values = [measured(false); 5];
+            let mut values = [measured(false); 6];
             values[Quantity::Speed as usize] = measured(shown);
             Reading { values }
         };

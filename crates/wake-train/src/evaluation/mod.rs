@@ -1,7 +1,7 @@
 //! How good generated images are: every figure beside the simulator's own.
 //!
 //! ```text
-//! scenes ─► ImageSource ─► intensity ─► readings of heading, speed, wind and incidence ─► rows of errors, controllability
+//! scenes ─► ImageSource ─► intensity ─► readings of heading, speed, wind, fetch and incidence ─► rows of errors, controllability
 //!                              └─► grey ─► pixels, ablation, wake correlation, two-sample judge, domain
 //! real images ─► pairs of windows ─► kinds of sea ─► rows
 //! ```
@@ -35,14 +35,16 @@ mod pixels;
 mod reading;
 mod shape;
 mod statistics;
+mod view;
+mod text_to_image;
 
 // Figures of sources, over scenes.
 mod comparison;
 mod domain;
 mod measurements;
+mod wake_correlation;
 mod ablation;
 mod controllability;
-mod wake_correlation;
 
 mod figures;
 
@@ -53,10 +55,12 @@ pub use baseline::Baseline;
 pub use controllability::ControllabilityRow;
 pub use domain::{DomainRow, Views};
 pub use figures::{ConditionRow, Evaluation, Figures, Speckle};
-pub use held_out::{SIZE, held_out};
+pub use held_out::HeldOut;
 pub use measurements::MeasurementRow;
-pub use pixels::{PixelRow, grey};
+pub use pixels::PixelRow;
 pub use reading::{Quantity, Reading};
-pub use source::{ImageSource, Told, other_sea};
+pub use source::{ImageSource, Named, Told, other_sea};
 pub use statistics::AbsoluteErrors;
+pub use text_to_image::{Reconstructed, TextToImage};
+pub use view::View;
 pub use wake_correlation::WakeCorrelation;

@@ -3,7 +3,6 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use serde::Serialize;
 use wake_physics::Field;
-use wake_physics::grey::GreyScale;
 use wake_physics::measure::{Binning, radial_spectrum};
 
 use super::statistics::mean;
@@ -13,17 +12,6 @@ use crate::metrics::{Lpips, Plane, SsimWindow, blurred, psnr, ssim};
 const BLUR: f64 = 4.0;
 /// Smallest power of a ring, so that a constant image has a logarithm.
 const LEAST_POWER: f64 = 1e-6;
-
-/// Grey 0 to 1 of intensity, by the default mapping, which all figures are of.
-#[must_use]
-pub fn grey(intensity: &Field) -> Field {
-    let scale = GreyScale::default();
-    let grey = |&v: &f32| scale.grey(f64::from(v)) as f32;
-    Field {
-        values: intensity.values.iter().map(grey).collect(),
-        ..*intensity
-    }
-}
 
 /// A constant image with the mean of another.
 pub(super) fn constant(image: &Field) -> Field {
@@ -49,15 +37,15 @@ pub(super) struct PixelTally {
     lpips: Vec<f64>,
     mean: Vec<f64>,
     contrast: Vec<f64>,
-    /// Per ring, power of the image less that of the reference [dB], summed.
-    spectrum: Vec<f64>,
+    /// Per ring, power of the image and of the reference [dB], summed.
+    powers: [Vec<f64>; 2],
 }
 
 /// The figures of one kind of image.
 #[derive(Debug, Clone, Serialize)]
 pub struct PixelRow {
     /// Kind of image.
-    pub image: &'static str,
+    pub image: String,
     /// Structural similarity of grey of range 1, with a Gaussian window, mean over scenes.
     pub ssim: Option<f64>,
     /// Peak signal-to-noise ratio of range 1, mean over scenes \[dB\].
@@ -72,6 +60,26 @@ pub struct PixelRow {
     pub spectrum_db: Option<f64>,
     /// The difference, ring by ring \[dB\].
     pub spectrum_curve_db: Vec<f64>,
+    /// Power of the image's rings, mean over scenes \[dB\].
+    pub power_db: Vec<f64>,
+    /// Mean difference over the rings of each third up to the Nyquist frequency \[dB\].
+    pub bands_db: [f64; 3],
+}
+
+impl PixelRow {
+    /// The figures of some images against their references, grey and of one size.
+    ///
+    /// # Panics
+    ///
+    /// If sizes differ.
+    #[must_use]
+    pub fn of(name: &str, references: &[Field], images: &[Field], lpips: Option<&Lpips>) -> Self {
+        let mut tally = PixelTally::default();
+        for (reference, image) in references.iter().zip(images) {
+            tally.add(reference, image, lpips);
+        }
+        tally.row(name)
+    }
 }
 
 impl PixelTally {
@@ -94,43 +102,49 @@ impl PixelTally {
         self.contrast.push(deviation(image) / deviation(reference));
         let powers = [reference, image].map(|f| radial_spectrum(f, Binning::Round).power);
         let rings = reference.rows.min(reference.columns) / 2;
-        self.spectrum.resize(rings, 0.0);
-        for (n, sum) in self.spectrum.iter_mut().enumerate() {
-            let ratio = powers[1][n].max(LEAST_POWER) / powers[0][n].max(LEAST_POWER);
-            *sum += 10.0 * ratio.log10();
+        for (sums, power) in self.powers.iter_mut().zip([&powers[1], &powers[0]]) {
+            sums.resize(rings, 0.0);
+            for (sum, power) in sums.iter_mut().zip(power) {
+                *sum += 10.0 * power.max(LEAST_POWER).log10();
+            }
         }
-    }
-
-    /// Number of images.
-    #[must_use]
-    pub(super) fn len(&self) -> usize {
-        self.ssim.len()
-    }
-
-    /// Whether no image was counted.
-    #[must_use]
-    pub(super) fn is_empty(&self) -> bool {
-        self.ssim.is_empty()
     }
 
     /// The means.
     #[must_use]
-    pub(super) fn row(&self, image: &'static str) -> PixelRow {
-        let count = self.len().max(1) as f64;
-        let curve: Vec<f64> = self.spectrum.iter().map(|sum| sum / count).collect();
+    pub(super) fn row(&self, image: &str) -> PixelRow {
+        let count = self.ssim.len().max(1) as f64;
+        let [power, reference] = self
+            .powers
+            .each_ref()
+            .map(|sums| sums.iter().map(move |sum| sum / count));
+        let power: Vec<f64> = power.collect();
+        let curve: Vec<f64> = power.iter().zip(reference).map(|(a, b)| a - b).collect();
         // Ring 0 is the mean, counted as brightness; the rings end at the Nyquist frequency.
         let half = curve.iter().take(curve.len() / 2 + 1).skip(1);
         PixelRow {
-            image,
+            image: image.to_owned(),
             ssim: mean(&self.ssim),
             psnr_db: mean(&self.psnr),
             lpips: mean(&self.lpips),
             brightness_difference: mean(&self.mean),
             contrast_ratio: mean(&self.contrast),
             spectrum_db: half.map(|d| d.abs()).reduce(f64::max),
+            bands_db: thirds(&curve),
             spectrum_curve_db: curve,
+            power_db: power,
         }
     }
+}
+
+/// Means over the thirds of a curve, without its first point.
+fn thirds(curve: &[f64]) -> [f64; 3] {
+    let third = |n: usize| {
+        let end = (n + 1) * curve.len() / 3;
+        let begin = (n * curve.len() / 3).max(1).min(end);
+        mean(&curve[begin..end]).unwrap_or(0.0)
+    };
+    [0, 1, 2].map(third)
 }
 
 /// Standard deviation of the pixels.
@@ -151,6 +165,16 @@ mod tests {
     use super::*;
     use wake_nn::noise::NoiseSource;
 
+    /// Ring 0 belongs to no third.
+    #[test]
+    fn thirds_of_a_curve_have_its_means() {
+        let curve = [9.0, 1.0, 2.0, 3.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+        for (found, expected) in thirds(&curve).iter().zip([1.5, 14.0 / 3.0, 8.0]) {
+            assert!((found - expected).abs() < 1e-12);
+        }
+        assert!(thirds(&[1.0]).iter().all(|mean| mean.abs() < 1e-12));
+    }
+
     /// Twice the contrast around the same mean: 20 lg 2 dB in every ring, no difference of brightness.
     #[test]
     fn contrast_shows_in_every_ring_of_the_spectrum() {
@@ -161,15 +185,16 @@ mod tests {
             columns: side,
             values: noise.iter().map(|x| 0.5 + contrast * x).collect(),
         };
-        let mut tally = PixelTally::default();
-        tally.add(&image(0.05), &image(0.1), None);
-        let row = tally.row("twice the contrast");
+        let row = PixelRow::of("twice the contrast", &[image(0.05)], &[image(0.1)], None);
         let expected = 20.0 * 2f64.log10();
         // Ring 0 holds the mean.
         for db in &row.spectrum_curve_db[1..] {
             assert!((db - expected).abs() < 1e-3, "{row:?}");
         }
+        for db in row.bands_db {
+            assert!((db - expected).abs() < 1e-3, "{row:?}");
+        }
         assert!(row.contrast_ratio.is_some_and(|r| (r - 2.0).abs() < 1e-5));
-        assert!(row.lpips.is_none() && tally.len() == 1);
+        assert!(row.lpips.is_none());
     }
 }

@@ -1,13 +1,12 @@
 //! What is read from an image, against what its scene says.
 
 use wake_physics::measure::{
-    Measured, ShipPlace, angle_between, axis_between, incidence, measure_wake, open_sea, wind_axis,
-    wind_speed,
+    Measured, ShipPlace, angle_between, axis_between, fetch, incidence, measure_wake, open_sea,
+    wind_axis, wind_speed,
 };
 use wake_physics::scene::Ship;
 use wake_physics::{Field, Raster, Scene};
 
-use super::source::{ImageSource, Told, draw_all};
 use crate::error::Result;
 
 /// What can be read from an image.
@@ -23,6 +22,8 @@ pub enum Quantity {
     WindDirection,
     /// Incidence \[deg\].
     Incidence,
+    /// Fetch of the wind \[km\].
+    Fetch,
 }
 
 /// Not measured.
@@ -34,12 +35,13 @@ const NOTHING: Measured = Measured {
 
 impl Quantity {
     /// All of them, in the order of every list.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Heading,
         Self::Speed,
         Self::WindSpeed,
         Self::WindDirection,
         Self::Incidence,
+        Self::Fetch,
     ];
 
     /// Name and unit in reports.
@@ -51,6 +53,7 @@ impl Quantity {
             Self::WindSpeed => ["wind speed", "m/s"],
             Self::WindDirection => ["wind direction, to 180°", "deg"],
             Self::Incidence => ["incidence", "deg"],
+            Self::Fetch => ["fetch", "km"],
         }
     }
 
@@ -63,6 +66,7 @@ impl Quantity {
             Self::WindSpeed => Some(scene.sea.wind_speed),
             Self::WindDirection => Some(scene.sea.wind_toward),
             Self::Incidence => Some(scene.radar.incidence),
+            Self::Fetch => Some(1e-3 * scene.sea.fetch),
         }
     }
 
@@ -81,7 +85,7 @@ impl Quantity {
 #[derive(Debug, Clone, Copy)]
 pub struct Reading {
     /// In the order of [`Quantity::ALL`].
-    pub values: [Measured; 5],
+    pub values: [Measured; 6],
 }
 
 impl Reading {
@@ -92,6 +96,20 @@ impl Reading {
     ///
     /// [`Error::Scene`](crate::Error::Scene) for a value of the scene out of its range.
     pub fn of(image: &Field, scene: &Scene) -> Result<Self> {
+        Self::read(image, scene, 0.0)
+    }
+
+    /// Reads an image of intensity with the speckle of the scene's radar.
+    ///
+    /// # Errors
+    ///
+    /// As [`of`](Self::of).
+    pub fn of_speckled(image: &Field, scene: &Scene) -> Result<Self> {
+        Self::read(image, scene, 1.0 / f64::from(scene.radar.looks.max(1)))
+    }
+
+    /// - `speckle`: its variance over its squared mean \[1\]
+    fn read(image: &Field, scene: &Scene, speckle: f64) -> Result<Self> {
         let raster = raster(scene);
         let ship = scene.ships.first();
         let wake = ship.map(|ship| measure_wake(image, &raster, &place(ship, scene)));
@@ -99,36 +117,27 @@ impl Reading {
             let heading = wake.heading.measurable_value();
             (ship.position, heading.unwrap_or(ship.heading))
         });
-        let [wind, axis, angle] = match &open_sea(image, &raster, seen) {
-            Some(sea) => [
-                wind_speed(sea, scene)?,
-                wind_axis(sea, scene)?,
-                incidence(sea, scene)?,
-            ],
-            None => [NOTHING; 3],
+        let [wind, axis, angle, fetch] = match &open_sea(image, &raster, seen) {
+            Some(sea) => {
+                // Speckle multiplies: 1 + c² is a product of both.
+                let squared = (1.0 + sea.contrast.powi(2)) / (1.0 + speckle) - 1.0;
+                let fetch = fetch(squared.max(0.0).sqrt(), scene)?;
+                [
+                    wind_speed(sea, scene)?,
+                    wind_axis(sea, scene)?,
+                    incidence(sea, scene)?,
+                    Measured {
+                        value: 1e-3 * fetch.value,
+                        ..fetch
+                    },
+                ]
+            }
+            None => [NOTHING; 4],
         };
         let [heading, speed] = wake.map_or([NOTHING; 2], |wake| [wake.heading, wake.speed]);
         Ok(Self {
-            values: [heading, speed, wind, axis, angle],
+            values: [heading, speed, wind, axis, angle, fetch],
         })
-    }
-
-    /// Readings of all images that a source draws.
-    ///
-    /// - `step`: told the number of images after each batch
-    ///
-    /// # Errors
-    ///
-    /// As [`ImageSource::draw`] and [`of`](Self::of).
-    pub fn of_source(
-        source: &dyn ImageSource,
-        scenes: &[Scene],
-        told: Told,
-        step: impl FnMut(u64),
-    ) -> Result<Vec<Self>> {
-        let images = draw_all(source, scenes, told, step)?;
-        let pairs = images.iter().zip(scenes);
-        pairs.map(|(image, scene)| Self::of(image, scene)).collect()
     }
 
     /// What was read of a quantity.

@@ -8,7 +8,7 @@ use wake_text::Wording;
 use crate::error::{Error, Result};
 use wake_ldm::sampler::{PromptMode, WakeSampler};
 
-/// Images that [`draw_all`] asks a source for at once.
+/// Images that a source is asked for at once.
 pub(super) const BATCH: usize = 8;
 
 /// What a model is told about a scene.
@@ -50,6 +50,11 @@ pub trait ImageSource: Debug {
     ///
     /// If one cannot be drawn. Another number of images, or another size, is refused by whatever judges them.
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
+
+    /// Whether its images have speckle already, as those of a model that learnt speckled images.
+    fn has_speckle(&self) -> bool {
+        false
+    }
 }
 
 /// The wake model is told what is asked for, whatever [`PromptMode`] it has; [`Told::Scene`] is told with its own.
@@ -81,27 +86,6 @@ impl ImageSource for WakeSampler {
     }
 }
 
-/// All images of a source, [`BATCH`] at once.
-///
-/// - `step`: told the number of images after each batch
-///
-/// # Errors
-///
-/// As [`ImageSource::draw`].
-pub(super) fn draw_all(
-    source: &dyn ImageSource,
-    scenes: &[Scene],
-    told: Told,
-    mut step: impl FnMut(u64),
-) -> Result<Vec<Field>> {
-    let mut images = Vec::with_capacity(scenes.len());
-    for batch in scenes.chunks(BATCH) {
-        images.extend(drawn(source, batch, told)?);
-        step(batch.len() as u64);
-    }
-    Ok(images)
-}
-
 /// Images of a source, one of each scene and of its size, which a source of a user's own might miss.
 pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
     let images = source.draw(scenes, told)?;
@@ -119,6 +103,9 @@ pub(super) fn drawn(source: &dyn ImageSource, scenes: &[Scene], told: Told) -> R
         expected: "one of each scene, with its rows and columns".to_owned(),
     }))
 }
+
+/// A source of images, and its name in reports.
+pub type Named<'a> = (&'static str, &'a dyn ImageSource);
 
 /// The same scene with another random sea, that of the seed `number` further on.
 #[must_use]
@@ -149,17 +136,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn scenes_are_drawn_some_at_a_time() {
-        let mut scene = Scene::default();
-        (scene.grid.rows, scene.grid.columns) = (1, 1);
-        let scenes = vec![scene; BATCH + 3];
-        let mut steps = Vec::new();
-        let images = draw_all(&Counted, &scenes, Told::Both, |n| steps.push(n)).unwrap();
-        let counts: Vec<usize> = images.iter().map(|f| f.values[0] as usize).collect();
-        assert_eq!(counts, [vec![BATCH; BATCH], vec![3; 3]].concat());
-        assert_eq!(steps, [BATCH as u64, 3]);
-    }
     /// One pixel is not the image of a scene of more, and no image is not that of one.
     #[test]
     fn other_images_than_were_asked_for_are_refused() {

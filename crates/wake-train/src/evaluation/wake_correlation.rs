@@ -5,10 +5,10 @@ use wake_physics::measure::kelvin_wedge;
 use wake_physics::{Field, Scene};
 
 use super::baseline::Baseline;
-use super::pixels::grey;
 use super::reading::{place, raster};
-use super::source::{ImageSource, Told, drawn, other_sea};
+use super::source::{ImageSource, Told, other_sea};
 use super::statistics::quantile;
+use super::view::View;
 use crate::error::{Error, Result};
 use crate::metrics::{Plane, correlation};
 
@@ -41,17 +41,18 @@ pub struct WakeCorrelation {
 pub(super) fn wake_correlation(
     scenes: &[Scene],
     model: &dyn ImageSource,
+    view: &View,
     mut step: impl FnMut(),
 ) -> Result<WakeCorrelation> {
     let (mut simulator, mut generated) = (Vec::new(), Vec::new());
     for scene in scenes {
         let inside = wedge(scene)?;
         let seas: Vec<Scene> = (1..=IMAGES).map(|n| other_sea(scene, 100 + n)).collect();
-        let simulated = greys(&Baseline::Simulator, &seas)?;
+        let simulated = greys(view, &Baseline::Simulator, &seas)?;
         let half = simulated.len() / 2;
         let halves = [mean_of(&simulated[..half]), mean_of(&simulated[half..])];
         simulator.push(correlated(&halves[0], &halves[1], &inside));
-        let mean = mean_of(&greys(model, &seas)?);
+        let mean = mean_of(&greys(view, model, &seas)?);
         generated.push(correlated(&mean, &mean_of(&simulated), &inside));
         step();
     }
@@ -66,12 +67,13 @@ pub(super) fn wake_correlation(
     })
 }
 
-fn greys(source: &dyn ImageSource, scenes: &[Scene]) -> Result<Vec<Field>> {
-    let images = drawn(source, scenes, Told::Both)?;
-    Ok(images.iter().map(grey).collect())
+fn greys(view: &View, source: &dyn ImageSource, scenes: &[Scene]) -> Result<Vec<Field>> {
+    let images = view.draw(source, scenes, Told::Both)?;
+    Ok(images.iter().map(|image| view.grey(image)).collect())
 }
 
-fn wedge(scene: &Scene) -> Result<Vec<bool>> {
+/// The pixels inside the Kelvin wedge of the first ship.
+pub(super) fn wedge(scene: &Scene) -> Result<Vec<bool>> {
     let ship = scene.ships.first().ok_or_else(|| {
         Error::Value(wake_nn::Error::InvalidOption {
             option: "scene".to_owned(),
@@ -119,16 +121,17 @@ mod tests {
         let keys = ["grid.rows = 64", "grid.columns = 64"];
         let scene = Scene::default().with_assignments(&keys).unwrap();
         let scenes = [scene.clone()];
-        let same = wake_correlation(&scenes, &Baseline::Simulator, || {}).unwrap();
+        let view = View::default();
+        let same = wake_correlation(&scenes, &Baseline::Simulator, &view, || {}).unwrap();
         assert!((same.model[0] - 1.0).abs() < 1e-6, "{same:?}");
         assert!((-1.0..1.0).contains(&same.simulator[0]));
-        let flat = wake_correlation(&scenes, &Baseline::Constant, || {}).unwrap();
+        let flat = wake_correlation(&scenes, &Baseline::Constant, &view, || {}).unwrap();
         assert!(flat.model[0].abs() < 1e-12, "{flat:?}");
         let open = Scene {
             ships: Vec::new(),
             ..scene
         };
-        let refused = wake_correlation(&[open], &Baseline::Constant, || {}).unwrap_err();
+        let refused = wake_correlation(&[open], &Baseline::Constant, &view, || {}).unwrap_err();
         assert!(refused.to_string().contains("without a ship"), "{refused}");
     }
 }

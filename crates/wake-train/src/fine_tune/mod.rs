@@ -327,4 +327,6 @@ fn min_snr_weights(snr: &[f64], gamma: f64, prediction: Prediction) -> Vec<f64> 
 }
 
 #[cfg(all(test, feature = "flex"))]
+mod full_size;
+#[cfg(all(test, feature = "flex"))]
 mod tests;

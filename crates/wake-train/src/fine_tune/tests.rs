@@ -254,7 +254,7 @@ fn goes_on<M: Module>(task: &impl Task<M>, run: impl Fn(u64) -> Run<M>) {
     let folder = tempfile::tempdir().unwrap();
     let mut whole = run(1);
     losses(&mut whole, task, 2);
-    whole.checkpoint(folder.path()).unwrap();
+    whole.checkpoint(folder.path(), 2).unwrap();
     let newest = || Checkpoint::newest(folder.path()).unwrap().unwrap();
     let mut second = run(1);
     second.resume(newest()).unwrap();

@@ -18,6 +18,7 @@ use wake_ldm::lora::LowRank;
 use wake_ldm::pipeline::{Pipeline, PipelineParts};
 use wake_ldm::scheduler::{NoiseSchedule, Prediction};
 use wake_ldm::unet::UNet;
+use wake_nn::weights::files::{Stored, WeightFiles};
 use wake_nn::weights::{Layout, Precision};
 use whole_files::fingerprint;
 
@@ -93,6 +94,7 @@ impl FineTuning<'_> {
             name: STAGE,
             resume: self.options.resume,
             every: self.options.every,
+            keep: self.options.keep,
             steps: self.options.steps(&DEFAULTS),
             results,
         };
@@ -120,6 +122,26 @@ impl FineTuning<'_> {
         }
     }
 
+    /// Bytes on disk of a checkpoint, and of the model that is written beside them.
+    ///
+    /// A checkpoint of a whole U-Net holds its weights, their averages and the two averages of the optimizer in 32 bits; low-rank
+    /// changes are counted as nothing.
+    ///
+    /// # Errors
+    ///
+    /// Those of weight files that cannot be read.
+    pub fn disk(&self) -> Result<[u64; 2]> {
+        let numbers = |part: &str| -> Result<u64> {
+            let files = WeightFiles::open(&self.weights.join(part))?;
+            let tensors = files.tensors()?;
+            let count = |stored: &Stored<'_>| stored.shape().iter().product::<usize>() as u64;
+            Ok(tensors.values().map(count).sum())
+        };
+        let unet = numbers("unet")?;
+        let all = unet + numbers("vae")? + numbers("text_encoder")?;
+        Ok([if self.rank.is_none() { 16 * unet } else { 0 }, 4 * all])
+    }
+
     /// The run, checked before anything is read but the files that it learns from.
     fn constants(&self) -> Result<RunOptions> {
         let mut constants = self.options.run(&DEFAULTS, Value::Null);
@@ -143,7 +165,9 @@ impl FineTuning<'_> {
                     .path();
                 let name = path.file_name().unwrap_or_default();
                 let name = name.to_string_lossy();
-                if path.is_file() && !name.starts_with('.') {
+                // Downloads hold the same weights in other formats, too.
+                let read = name.ends_with(".json") || name.ends_with(".safetensors");
+                if path.is_file() && read && !name.starts_with('.') {
                     files.insert(format!("{part}/{name}"), fingerprint(&path)?);
                 }
             }

@@ -42,7 +42,7 @@ proptest! {
             state: state.clone(),
             tensors: Tensors::from([("a".to_owned(), (vec![4, 4], values))]),
         };
-        checkpoint.write(folder.path()).unwrap();
+        checkpoint.write(folder.path(), 2).unwrap();
         let read = Checkpoint::newest(folder.path()).unwrap().unwrap();
         prop_assert!(read.differs(&state).is_none());
         prop_assert_eq!(read.state.to_string(), state.to_string());

@@ -163,6 +163,7 @@ impl<'a> WakeTraining<'a> {
             name: part.name(),
             resume: options.resume,
             every: options.every,
+            keep: options.keep,
             steps: options.steps(&defaults(part)),
             results: results(part),
         }

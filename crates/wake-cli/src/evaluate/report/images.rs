@@ -12,9 +12,9 @@ pub(super) fn ablation(report: &Report) -> String {
         when the expected image is subtracted; variance on crests of the wake over that in its troughs; squared differences of neighbours across the borders of squares of \
         8 pixels over those elsewhere; share of patches of \
         unseen scenes that the best of up to three small networks tells from simulated ones, 0.5 where it cannot, and the distance of both kinds in the \
-        feature that it tells them by, in standard deviations.\n\n\
-        | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests | seams |\n\
-        | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        feature that it tells them by, in standard deviations; slope of the grey on that of the expected image inside the Kelvin wedge.\n\n\
+        | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests | seams | wake |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
     for r in &report.figures.ablation {
         let told = r.two_sample.map_or("–".to_owned(), |t| {
@@ -22,14 +22,15 @@ pub(super) fn ablation(report: &Report) -> String {
         });
         let [range, azimuth, wind] = r.steepness.map(|s| number(s, 3));
         text += &format!(
-            "| {} | {told} | {} | {} | {} | {range}, {azimuth}, {wind} | {} | {} | {} |\n",
+            "| {} | {told} | {} | {} | {} | {range}, {azimuth}, {wind} | {} | {} | {} | {} |\n",
             r.image,
             number(r.two_sample.map(|t| t.distance), 2),
             number(r.skewness, 3),
             number(r.kurtosis, 3),
             number(r.grouping, 3),
             number(r.crest_variance, 2),
-            number(r.seams, 2)
+            number(r.seams, 2),
+            number(r.wake_contrast, 2)
         );
     }
     text
@@ -37,12 +38,13 @@ pub(super) fn ablation(report: &Report) -> String {
 
 pub(super) fn pixels(report: &Report) -> String {
     let mut text = "## Pixels, against a simulated image of the same scene\n\n\
-        | image | SSIM | PSNR dB | LPIPS | brightness | contrast ratio | spectrum dB |\n\
-        | --- | --- | --- | --- | --- | --- | --- |\n"
+        | image | SSIM | PSNR dB | LPIPS | brightness | contrast ratio | spectrum dB | in thirds |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();
     for r in &report.figures.pixels {
+        let [low, middle, high] = r.bands_db;
         text += &format!(
-            "| {} | {} | {} | {} | {} | {} | {} |\n",
+            "| {} | {} | {} | {} | {} | {} | {} | {low:.1}, {middle:.1}, {high:.1} |\n",
             r.image,
             number(r.ssim, 4),
             number(r.psnr_db, 2),
@@ -52,11 +54,6 @@ pub(super) fn pixels(report: &Report) -> String {
             number(r.spectrum_db, 2)
         );
     }
-    let paper = &report.paper;
-    text += &format!(
-        "| the paper's model | {} | {} | {} | – | – | – |\n",
-        paper.ssim, paper.psnr_db, paper.lpips
-    );
     let (model, simulator) = (&report.figures.pixels[0], &report.figures.pixels[1]);
     text += &format!(
         "\nModel over simulator: SSIM {}, PSNR {}, LPIPS {}. Good is 0.9 to 1.1: as close as another simulated image.\n",
@@ -82,4 +79,27 @@ pub(super) fn wake(report: &Report) -> String {
         number(wake.model_median, 3),
         number(wake.ratio_median, 3)
     )
+}
+
+pub(super) fn schedulers(report: &Report) -> String {
+    if report.schedulers.is_empty() {
+        return String::new();
+    }
+    let mut text = "## Schedulers\n\nError: difference of grey from the reference of many DDIM steps and the same noise, root mean square \
+        over the reference's standard deviation.\n\n| scheduler | steps | error | seconds | SSIM | PSNR dB | spectrum dB |\n\
+        | --- | --- | --- | --- | --- | --- | --- |\n"
+        .to_owned();
+    for r in &report.schedulers {
+        text += &format!(
+            "| {} | {} | {} | {:.3} | {} | {} | {} |\n",
+            r.scheduler,
+            r.steps,
+            number(r.error, 4),
+            r.seconds,
+            number(r.pixels.ssim, 4),
+            number(r.pixels.psnr_db, 2),
+            number(r.pixels.spectrum_db, 2)
+        );
+    }
+    text
 }

@@ -19,7 +19,6 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use wake_text::Tokenizer;
 
 use crate::error::Result;
-#[cfg(feature = "flex")]
 use crate::self_check::check_once;
 use crate::stable_diffusion::autoencoder::AutoencoderKl;
 use crate::stable_diffusion::lora::merge_lora;
@@ -94,7 +93,6 @@ impl Pipeline {
     /// [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
     /// [`self_check`](crate::self_check).
     pub fn new(parts: PipelineParts, device: &Device) -> Result<Self> {
-        #[cfg(feature = "flex")]
         check_once(device)?;
         let PipelineParts {
             tokenizer,

@@ -2,6 +2,7 @@
 
 mod image;
 mod pretrained;
+mod self_check;
 
 use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;
@@ -15,8 +16,6 @@ use wake_physics::{Field, Scene, Ship, labels_of};
 use wake_text::{PartialScene, Reading, Unread, Wording};
 
 use crate::error::{Error, Result};
-#[cfg(feature = "flex")]
-use crate::self_check::check_once;
 use crate::wake_model::conditioning::Vocabulary;
 use crate::wake_model::network::{
     ChannelWindows, ConditioningInputs, Expected, SeaFields, WakeModel, WakeModelConfig,
@@ -24,6 +23,7 @@ use crate::wake_model::network::{
 };
 use crate::wake_model::sea_texture::SeaTexture;
 pub use image::{SampleSeconds, WakeImage, speckled};
+pub use self_check::self_check;
 use wake_nn::noise::NoiseSource;
 use wake_nn::{check_finite, check_range};
 
@@ -68,20 +68,12 @@ pub struct WakeSampler {
 }
 
 impl WakeSampler {
-    /// A sampler of a model that lies in memory.
-    ///
-    /// # Errors
-    ///
-    /// As [`WakeModelConfig::validate`]; [`wake_nn::Error::WrongNumbers`] for a device that is no CPU and fails
-    /// [`self_check`](crate::self_check).
-    pub fn new(model: WakeModel, config: WakeModelConfig) -> Result<Self> {
-        config.validate()?;
+    /// A sampler of a model with a valid configuration, on a device that may be faulty.
+    fn unchecked(model: WakeModel, config: WakeModelConfig) -> Self {
         #[cfg(feature = "autodiff")]
         let model = model.valid();
         let device = model.devices().into_iter().next().unwrap_or_default();
-        #[cfg(feature = "flex")]
-        check_once(&device)?;
-        Ok(Self {
+        Self {
             vocabulary: Vocabulary::new(config.vocabulary.iter().copied()),
             device,
             windows: ChannelWindows::new(&model.patches),
@@ -90,7 +82,7 @@ impl WakeSampler {
             steps: STEPS,
             prompt_mode: PromptMode::default(),
             sea: None,
-        })
+        }
     }
 
     /// The same sampler with another number of steps, 1 to 1000.

@@ -34,18 +34,8 @@ impl WakeSampler {
     ///
     /// None that a build from unchanged files can give.
     pub fn pretrained(device: &Device) -> Result<Self> {
-        let config = include_str!("../../../assets/config.json");
-        let config = WakeModelConfig::from_json(config, Path::new(WakeModelConfig::FILE))?;
-        let model = config.init(device);
-        Self::new(
-            WakeModel {
-                patches: embedded(model.patches, Part::Patches)?,
-                parser: embedded(model.parser, Part::Parser)?,
-                prior: embedded(model.prior, Part::Prior)?,
-                flow: embedded(model.flow, Part::Flow)?,
-            },
-            config,
-        )
+        let (model, config) = shipped(device)?;
+        Self::new(model, config)
     }
 
     /// A model that training wrote into a folder.
@@ -66,6 +56,20 @@ impl WakeSampler {
         };
         Self::new(model, config)
     }
+}
+
+/// The model in this crate.
+pub(super) fn shipped(device: &Device) -> Result<(WakeModel, WakeModelConfig)> {
+    let config = include_str!("../../../assets/config.json");
+    let config = WakeModelConfig::from_json(config, Path::new(WakeModelConfig::FILE))?;
+    let model = config.init(device);
+    let model = WakeModel {
+        patches: embedded(model.patches, Part::Patches)?,
+        parser: embedded(model.parser, Part::Parser)?,
+        prior: embedded(model.prior, Part::Prior)?,
+        flow: embedded(model.flow, Part::Flow)?,
+    };
+    Ok((model, config))
 }
 
 /// A part with the weights in this crate.

@@ -1,6 +1,8 @@
 //! The convolution by the sum that defines it, for any kernel and stride.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
+
+use crate::kernels::arch::arch;
 use rayon::prelude::*;
 
 use super::geometry::Geometry;
@@ -23,7 +25,7 @@ pub(super) fn convolve(
     let layout = Layout::new(geometry);
     let planes = layout.lay_out(x, geometry);
     let mut y = vec![0.0; geometry.batch * geometry.channels[1] * geometry.pixels_out()];
-    let arch = Arch::new();
+    let arch = arch();
     let block = block_width(geometry, arch.dispatch(tile::Width));
     let one = Geometry {
         batch: 1,

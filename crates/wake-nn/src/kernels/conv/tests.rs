@@ -331,7 +331,30 @@ fn bias_is_added_to_every_pixel_and_its_gradient_is_their_sum() {
     }
 }
 
-/// Milliseconds on one core, of `cargo test --release -p wake-nn --features autodiff --lib conv::tests::times -- --ignored --nocapture`.
+/// Root mean square error of a forward convolution at some pixels, in units in the last place of the root mean square of the
+/// exact results.
+fn ulps(y: &[f32], x: &[f32], weight: &[f32], g: &Geometry) -> f64 {
+    let ([channels, out], [rows, columns]) = (g.channels, g.size);
+    let (mut errors, mut squares) = (0.0, 0.0);
+    for i in (0..y.len()).step_by(y.len() / 1009 + 1) {
+        let (column, row) = (i % columns, i / columns % rows);
+        let (o, n) = (i / (rows * columns) % out, i / (rows * columns * out));
+        let term = |k: usize| {
+            let (tap, c) = (k % 9, k / 9);
+            let [r, q] = [row + tap / 3, column + tap % 3].map(|p| p.checked_sub(1));
+            let (r, q) = (r.filter(|r| *r < rows)?, q.filter(|q| *q < columns)?);
+            let pixel = x[((n * channels + c) * rows + r) * columns + q];
+            Some(f64::from(pixel) * f64::from(weight[(o * channels + c) * 9 + tap]))
+        };
+        let exact: f64 = (0..channels * 9).filter_map(term).sum();
+        errors += (f64::from(y[i]) - exact).powi(2);
+        squares += exact.powi(2);
+    }
+    (errors / squares).sqrt() / f64::from(f32::EPSILON)
+}
+
+/// Milliseconds on one core and errors, of `cargo test --release -p wake-nn --features autodiff --lib conv::tests::times -- --ignored
+/// --nocapture`.
 #[test]
 #[ignore = "prints the milliseconds of docs/performance.md, wants an idle machine, and has nothing to check"]
 #[expect(clippy::print_stdout, reason = "what it is for")]
@@ -346,13 +369,18 @@ fn times() {
         (0..15).map(once).fold(f64::MAX, f64::min)
     };
     one.unwrap().install(|| {
-        for [batch, width, side] in [
+        for ([batch, width, side], narrow) in [
             [16, 64, 32],
             [16, 96, 16],
             [16, 128, 16],
             [16, 192, 8],
             [1, 320, 64],
-        ] {
+        ]
+        .into_iter()
+        .flat_map(|shape| [(shape, false), (shape, true)])
+        {
+            #[cfg(target_arch = "x86_64")]
+            crate::kernels::arch::narrow::hold(narrow);
             let g = Geometry {
                 batch,
                 channels: [width; 2],
@@ -363,15 +391,22 @@ fn times() {
             };
             let x = noise(batch * width * side * side, 1);
             let weight = noise(width * g.patch(), 2);
-            let y = [
-                time(&|| direct::convolve(&x, &weight, None, &g)),
-                time(&|| tiles::convolve(&x, &weight, None, &g)),
+            let forward: [&(dyn Fn() -> Vec<f32> + Sync); 2] = [
+                &|| direct::convolve(&x, &weight, None, &g),
+                &|| tiles::convolve(&x, &weight, None, &g),
             ];
+            let (y, error) = (
+                forward.map(time),
+                forward.map(|f| ulps(&f(), &x, &weight, &g)),
+            );
             let dweight = [
                 time(&|| weights::weight_gradient(&x, &x, &g)),
                 time(&|| tiles::weight_gradient(&x, &x, &g)),
             ];
-            println!("{batch} x {width} x {side}²: forward {y:.2?}, weights {dweight:.2?}");
+            let wide = if narrow { "AVX2" } else { "widest" };
+            println!(
+                "{batch} x {width} x {side}², {wide}: forward {y:.2?} ms, {error:.2?} ulp, weights {dweight:.2?} ms"
+            );
         }
     });
 }

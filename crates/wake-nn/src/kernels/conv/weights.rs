@@ -1,6 +1,8 @@
 //! Gradients of a convolution to its weights, by the sum that defines them, and to its bias.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
+
+use crate::kernels::arch::arch;
 use rayon::prelude::*;
 
 use super::geometry::Geometry;
@@ -12,7 +14,7 @@ use crate::kernels::tile::{self, ROWS};
 pub(super) fn weight_gradient(x: &[f32], dy: &[f32], geometry: &Geometry) -> Vec<f32> {
     let layout = Layout::new(geometry);
     let planes = layout.lay_out(x, geometry);
-    let arch = Arch::new();
+    let arch = arch();
     let channels_out = geometry.channels[1];
     let width = arch.dispatch(tile::Width);
     let columns = interleave(dy, channels_out, geometry.size_out(), [0; 4], width);

@@ -1,6 +1,8 @@
 //! The convolution itself by tiles.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
+
+use crate::kernels::arch::arch;
 use rayon::prelude::*;
 
 use super::{LANES, PLACES, differences, tiles_of};
@@ -19,7 +21,7 @@ pub(in crate::kernels::conv) fn convolve(
     bias: Option<&[f32]>,
     geometry: &Geometry,
 ) -> Vec<f32> {
-    let arch = Arch::new();
+    let arch = arch();
     let width = arch.dispatch(tile::Width);
     let tiles = tiles_of(geometry);
     let layout = Layout::new(&tiles);

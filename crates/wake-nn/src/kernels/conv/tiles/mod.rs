@@ -22,7 +22,9 @@
 //! Winograd (1980), "Arithmetic Complexity of Computations"; Lavin & Gray (2016), "Fast Algorithms for Convolutional Neural
 //! Networks", Eq. 5 to 8, F(2 × 2, 3 × 3).
 
-use pulp::{Arch, Simd};
+use pulp::Simd;
+
+use crate::kernels::arch::arch;
 
 use super::geometry::Geometry;
 use crate::kernels::tile;
@@ -58,7 +60,7 @@ const WIDE: usize = 32;
 /// Whether tiles need at most two thirds of the products, transforms of kernels and unfilled vectors counted, and kernels stay
 /// near.
 pub(super) fn win(geometry: &Geometry) -> bool {
-    let width = Arch::new().dispatch(tile::Width);
+    let width = arch().dispatch(tile::Width);
     let [channels_in, channels_out] = geometry.channels;
     let [rows, columns] = geometry.size_out();
     let windows = geometry.batch * rows.div_ceil(2) * columns.div_ceil(2);

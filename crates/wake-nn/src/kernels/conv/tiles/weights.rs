@@ -1,6 +1,8 @@
 //! The gradient to the weights by tiles.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
+
+use crate::kernels::arch::arch;
 use rayon::prelude::*;
 
 use super::{LANES, PLACES, differences, tiles_of};
@@ -20,7 +22,7 @@ pub(in crate::kernels::conv) fn weight_gradient(
     dy: &[f32],
     geometry: &Geometry,
 ) -> Vec<f32> {
-    let arch = Arch::new();
+    let arch = arch();
     let width = arch.dispatch(tile::Width);
     let [channels_in, channels_out] = geometry.channels;
     let [rows, columns] = geometry.size_out();

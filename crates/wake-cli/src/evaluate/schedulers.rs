@@ -1,0 +1,71 @@
+//! Schedulers and their steps: figures, seconds, and the error against many steps.
+
+use super::pipeline::Drawn;
+use crate::exit::Outcome;
+use serde::Serialize;
+use std::time::Instant;
+use wake_physics::{Field, Scene};
+use wake_train::evaluation::{Baseline, Evaluation, ImageSource, PixelRow, Told};
+use wake_train::metrics::Lpips;
+
+/// Scenes that every scheduler draws, as many as there are up to this number.
+const SCENES: usize = 16;
+
+/// A scheduler with a number of steps.
+#[derive(Debug, Serialize)]
+pub(crate) struct SchedulerRow {
+    pub(crate) scheduler: String,
+    pub(crate) steps: usize,
+    /// Seconds an image.
+    pub(crate) seconds: f64,
+    /// Root mean square difference of grey from the reference of the same noise, over the reference's standard deviation.
+    pub(crate) error: Option<f64>,
+    /// Against simulated images.
+    pub(crate) pixels: PixelRow,
+}
+
+/// A row for each way to draw.
+///
+/// - `reference`: DDIM with many steps, whose images the others should have
+pub(super) fn rows(
+    ways: &[Drawn<'_>],
+    reference: Option<&Drawn<'_>>,
+    evaluation: &Evaluation<'_>,
+    lpips: Option<&Lpips>,
+) -> Outcome<Vec<SchedulerRow>> {
+    let scenes = evaluation.held_out.scenes(0, evaluation.scenes.min(SCENES));
+    let view = &evaluation.view;
+    let draw = |source: &dyn ImageSource, scenes: &[Scene]| -> Outcome<Vec<Field>> {
+        let images = view.draw(source, scenes, Told::Text)?;
+        Ok(images.iter().map(|image| view.grey(image)).collect())
+    };
+    let simulated = draw(&Baseline::Simulator, &scenes)?;
+    let exact = reference
+        .map(|way| draw(&way.source, &scenes))
+        .transpose()?;
+    let row = |way: &Drawn<'_>| -> Outcome<SchedulerRow> {
+        let begin = Instant::now();
+        let images = draw(&way.source, &scenes)?;
+        Ok(SchedulerRow {
+            scheduler: way.scheduler.clone(),
+            steps: way.source.steps,
+            seconds: begin.elapsed().as_secs_f64() / scenes.len() as f64,
+            error: exact.as_deref().map(|exact| relative_error(&images, exact)),
+            pixels: PixelRow::of(&way.scheduler, &simulated, &images, lpips),
+        })
+    };
+    ways.iter().map(row).collect()
+}
+
+fn relative_error(images: &[Field], exact: &[Field]) -> f64 {
+    let values = |fields: &[Field]| -> Vec<f64> {
+        let all = fields.iter().flat_map(|field| &field.values);
+        all.map(|&v| f64::from(v)).collect()
+    };
+    let (found, exact) = (values(images), values(exact));
+    let mean = exact.iter().sum::<f64>() / exact.len() as f64;
+    let variance: f64 = exact.iter().map(|v| (v - mean).powi(2)).sum();
+    let pairs = found.iter().zip(&exact);
+    let squares: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+    (squares / variance.max(f64::MIN_POSITIVE)).sqrt()
+}
