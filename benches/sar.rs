@@ -41,7 +41,7 @@ fn imaging(c: &mut Criterion) {
     let radar = Imaging {
         range_to_velocity: 78.0,
         incidence: 32f64.to_radians(),
-        resolution: AzimuthResolution::of_moving_sea(0.0312, 78.0, (3.0, LOOKS), 0.18),
+        resolution: AzimuthResolution::of_moving_sea(0.0312, 78.0, 3.0, LOOKS, 0.18),
     };
     let mut group = c.benchmark_group("image");
     for size in SIZES {

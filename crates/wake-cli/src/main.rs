@@ -9,6 +9,8 @@ mod progress;
 mod locate;
 
 #[cfg(feature = "simulate")]
+mod sheet;
+#[cfg(feature = "simulate")]
 mod simulate;
 
 #[cfg(feature = "prompt")]

@@ -8,7 +8,7 @@
 //! with κ₀ = 2π/L₀ and gusts a times as long along the wind (x') as across. One-dimensional spectra fall as κ^{−5/3}, as
 //! Kolmogorov's. Scale, elongation and strength are chosen. The factor multiplies all of σ⁰; the waves of the sea stay.
 
-use crate::fft::{Synthesis, fast_length, signed_index};
+use crate::fft::{fast_length, lattice_sum, signed_index};
 use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
 use num_complex::Complex32;
@@ -89,15 +89,13 @@ impl Gusts {
                     *value = Complex32::new(re, im) * variance.sqrt() as f32;
                 }
             });
-        let mut field = Field::constant(raster, 0.0);
-        let mut other = vec![0.0; field.values.len()];
-        Synthesis::new(rows, columns).run(
-            &mut spectrum,
-            [raster.rows, raster.columns],
-            (&mut field.values, &mut other),
-            |_, _| (),
-        );
-        field
+        let size = [raster.rows, raster.columns];
+        let [values, _] = lattice_sum(&mut spectrum, [rows, columns], size);
+        Field {
+            rows: raster.rows,
+            columns: raster.columns,
+            values,
+        }
     }
 
     /// g at every few pixels of a raster, and how many: 1/200 of the outer scale, below which lies a twentieth of the
@@ -121,7 +119,7 @@ impl Gusts {
     ) {
         let bias = (0.5 * (exponent * self.strength).powi(2)) as f32;
         let exponent = exponent as f32;
-        sigma0.change_with(gusts, (*step, first), |value, g| {
+        sigma0.change_with(gusts, *step, first, |value, g| {
             *value *= (exponent * g - bias).exp();
         });
     }

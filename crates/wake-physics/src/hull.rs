@@ -10,6 +10,7 @@
 //!
 //! m = b = 0 is Wigley's parabolic hull with block coefficient 4/9.
 
+#[cfg(test)]
 use crate::numeric::GaussLegendre;
 use num_complex::Complex64;
 
@@ -97,22 +98,9 @@ impl Hull {
         self.draft
     }
 
-    /// Froude number U/√(gL) at a speed U [m/s].
-    #[must_use]
-    pub fn froude_number(&self, speed: f64) -> f64 {
-        speed / (crate::constants::GRAVITY * self.length).sqrt()
-    }
-
-    /// Half-breadth f \[m\] at `x` \[m\] forward of midship and depth `z` \[m\]; 0 off the hull.
-    #[must_use]
-    pub fn half_breadth(&self, x: f64, z: f64) -> f64 {
-        let along = profile(2.0 * x.abs() / self.length, self.parallel).0;
-        0.5 * self.beam * along * profile(z / self.draft, self.flat).0
-    }
-
     /// Slopes (∂f/∂x, ∂f/∂z) of the half-breadth \[1\]; 0 off the hull.
-    #[must_use]
-    pub fn slopes(&self, x: f64, z: f64) -> [f64; 2] {
+    #[cfg(test)]
+    pub(crate) fn slopes(&self, x: f64, z: f64) -> [f64; 2] {
         let (along, along_slope) = profile(2.0 * x.abs() / self.length, self.parallel);
         let (down, down_slope) = profile(z / self.draft, self.flat);
         [
@@ -127,19 +115,13 @@ impl Hull {
         (2.0 + self.parallel) * (2.0 + self.flat) / 9.0
     }
 
-    /// Displaced volume ∇ \[m³\].
-    #[must_use]
-    pub fn volume(&self) -> f64 {
-        self.block_coefficient() * self.length * self.beam * self.draft
-    }
-
     /// Wetted surface S \[m²\], both sides.
     ///
     /// ```text
     /// S = 2 ∬ √(1 + f_x² + f_z²) dx dz
     /// ```
-    #[must_use]
-    pub fn wetted_surface(&self) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn wetted_surface(&self) -> f64 {
         let rule = GaussLegendre::new(24);
         let (half, draft) = (0.5 * self.length, self.draft);
         let column = |x: f64| {
@@ -157,6 +139,7 @@ impl Hull {
 }
 
 /// Value and slope of 1 − ((s − start)/(1 − start))² beyond `start`, 1 before it, 0 beyond 1.
+#[cfg(test)]
 fn profile(s: f64, start: f64) -> (f64, f64) {
     if s <= start {
         return (1.0, 0.0);
@@ -266,6 +249,18 @@ fn series(x: Complex64, coefficient: impl Fn(f64) -> f64) -> Complex64 {
 #[allow(clippy::float_cmp, reason = "exact by construction")]
 mod tests {
     use super::*;
+
+    impl Hull {
+        fn volume(&self) -> f64 {
+            self.block_coefficient() * self.length * self.beam * self.draft
+        }
+
+        /// Half-breadth f \[m\] at `x` \[m\] forward of midship and depth `z` \[m\]; 0 off the hull.
+        fn half_breadth(&self, x: f64, z: f64) -> f64 {
+            let along = profile(2.0 * x.abs() / self.length, self.parallel).0;
+            0.5 * self.beam * along * profile(z / self.draft, self.flat).0
+        }
+    }
 
     fn hulls() -> [Hull; 4] {
         [

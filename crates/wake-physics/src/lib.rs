@@ -26,12 +26,12 @@
 //!
 //! | of | modules |
 //! | --- | --- |
-//! | all | [`constants`], [`output`], [`export`], [`correlated`], [`dispersion`], [`window`] |
+//! | all | [`constants`], [`output`], [`export`], [`dispersion`], [`window`] |
 //! | what is asked | [`scene`] |
 //! | the sea | [`spectrum`], [`spreading`], [`waves`], [`wind_sea`], [`swell`], [`surface`] |
 //! | the ship | [`hull`], [`kelvin`], [`turbulent`] |
 //! | the radar | [`permittivity`], [`scattering`], [`sar`], [`gusts`], [`slicks`] |
-//! | the image | [`grey`], [`labels`], [`picture`], [`measure`] |
+//! | the image | [`grey`], [`labels`], [`measure`] |
 //! | tests and benches | [`reference`](mod@reference) |
 //!
 //! # Axes and units
@@ -64,7 +64,6 @@ pub mod output;
 pub mod export;
 mod fft;
 mod random;
-pub mod correlated;
 pub mod dispersion;
 pub mod window;
 pub mod scene;
@@ -90,11 +89,9 @@ mod fields;
 mod models;
 mod linear;
 mod effects;
+mod prepared;
 mod plan;
 pub mod labels;
-#[cfg(feature = "picture")]
-pub mod picture;
-mod prepared;
 mod simulate;
 pub mod measure;
 pub mod reference;

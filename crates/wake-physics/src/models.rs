@@ -194,7 +194,8 @@ impl Models {
         let resolution = AzimuthResolution::of_moving_sea(
             self.wavelength,
             self.range_to_velocity,
-            (self.azimuth_resolution, 1),
+            self.azimuth_resolution,
+            1,
             self.subpixel.velocity,
         );
         AzimuthResolution {

@@ -2,8 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::raster::Field;
-#[cfg(feature = "picture")]
-use image::codecs::png::{CompressionType, FilterType};
 #[cfg(feature = "png")]
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use num_complex::Complex32;
@@ -66,24 +64,6 @@ pub fn encode_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Re
         .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::L8)
         .map_err(|e| file_error("encode", path, &e))?;
     Ok(bytes)
-}
-
-/// Writes a PNG of red, green and blue, 8 bits each: `[rows, columns, 3]`; one without colours as a grey one, which is smaller
-/// and sooner packed.
-///
-/// Mostly grey speckle: without filters the three equal bytes of a pixel compress to little more than one.
-#[cfg(feature = "picture")]
-pub(crate) fn write_rgb_png(path: &Path, pixels: &[u8], rows: usize, columns: usize) -> Result<()> {
-    let colours = pixels.as_chunks::<3>().0;
-    if colours.iter().all(|[r, g, b]| r == g && g == b) {
-        let grey: Vec<u8> = colours.iter().map(|[level, ..]| *level).collect();
-        return write_png(path, &grey, rows, columns);
-    }
-    let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter)
-        .write_image(pixels, columns as u32, rows as u32, ExtendedColorType::Rgb8)
-        .map_err(|e| file_error("encode", path, &e))?;
-    Ok(write_atomically(path, &bytes)?)
 }
 
 /// Writes fields as `f32` tensors `[rows, columns]` of a safetensors file, and a complex image as `[rows, columns, 2]`, row by
@@ -215,25 +195,5 @@ mod tests {
         let picture = image::open(&path).unwrap().into_luma8();
         assert_eq!((picture.width(), picture.height()), (3, 2));
         assert_eq!(picture.get_pixel(1, 1).0, [200]);
-    }
-
-    /// A picture without colours is stored in one byte a pixel, one with a colour in three; both read back as they were.
-    #[cfg(feature = "picture")]
-    #[test]
-    fn pictures_keep_their_colours() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("picture.png");
-        let grey = [0, 0, 0, 90, 90, 90, 255, 255, 255, 7, 7, 7];
-        let mut coloured = grey;
-        coloured[4] = 91;
-        for (pixels, kind) in [
-            (grey, image::ColorType::L8),
-            (coloured, image::ColorType::Rgb8),
-        ] {
-            write_rgb_png(&path, &pixels, 2, 2).unwrap();
-            let picture = image::open(&path).unwrap();
-            assert_eq!(picture.color(), kind);
-            assert_eq!(picture.into_rgb8().into_raw(), pixels);
-        }
     }
 }

@@ -185,7 +185,8 @@ impl Field {
     pub(crate) fn change_with(
         &mut self,
         coarse: &Self,
-        (step, first): (usize, usize),
+        step: usize,
+        first: usize,
         change: impl Fn(&mut f32, f32) + Sync,
     ) {
         let to_the_right: Vec<f32> = (0..step).map(|k| k as f32 / step as f32).collect();
@@ -325,7 +326,7 @@ mod tests {
                 (step * (3 * i + 2 * j)) as f32
             });
             let mut field = Field::constant(&r, 1.0);
-            field.change_with(&coarse, (step, 0), |value, plane| *value += plane);
+            field.change_with(&coarse, step, 0, |value, plane| *value += plane);
             for i in 0..13 {
                 for j in 0..10 {
                     let expected = (3 * i + 2 * j) as f32 + 1.0;

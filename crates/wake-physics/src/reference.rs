@@ -11,11 +11,11 @@
 //! Formulas of the field that no simulation calls: azimuth cutoff and coherence time of a moving sea, slant-range resolution of
 //! a bandwidth, conversions between spectra of wavenumber and frequency.
 
-pub use crate::kelvin::direct::direct_quadrature;
-pub use crate::measure::shape::seams;
+pub use crate::kelvin::quadrature::direct_quadrature;
+pub use crate::measure::seams::seams;
 pub use crate::nufft::synthesize;
 pub use crate::sar::coherence::{azimuth_cutoff, coherence_time, cutoff_transfer};
-pub use crate::sar::direct::DirectImage;
+pub use crate::sar::dense::DirectImage;
 pub use crate::scene::paper::paper_grid;
 pub use crate::scene::sensor::slant_resolution;
 pub use crate::spectrum::{kitaigorodskii_factor, to_frequency, to_wavenumber};

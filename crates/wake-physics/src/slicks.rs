@@ -43,7 +43,7 @@ impl Slicks {
     /// - `seed`: the same field whatever the number of threads
     #[must_use]
     pub fn field(&self, raster: &Raster, wind_speed: f64, seed: u64) -> Field {
-        self.strip(raster, &(0..raster.rows), (wind_speed, seed))
+        self.strip(raster, &(0..raster.rows), wind_speed, seed)
     }
 
     /// Some rows of [`Self::field`].
@@ -51,7 +51,8 @@ impl Slicks {
         &self,
         raster: &Raster,
         rows: &Range<usize>,
-        (wind_speed, seed): (f64, u64),
+        wind_speed: f64,
+        seed: u64,
     ) -> Field {
         let mut field = Field::constant(&raster.strip(rows), 1.0);
         if wind_speed > STRONGEST_WIND {
@@ -76,7 +77,7 @@ impl Slicks {
             (self.damping * (-0.5 * off * off).exp()) as f32
         });
         let first = rows.start - above * step;
-        field.change_with(&damping, (step, first), |left, damping| *left -= damping);
+        field.change_with(&damping, step, first, |left, damping| *left -= damping);
         field
     }
 

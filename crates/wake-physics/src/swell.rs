@@ -87,7 +87,7 @@ impl Swell {
     /// - `depth` \[m\] of the water, `time` \[s\], `band` [rad/m]: largest wavenumber of the pixels
     /// - `seed`: the same seed gives the same waves
     #[must_use]
-    pub fn waves(&self, (seed, time): (u64, f64), depth: f64, band: f64) -> PlaneWaves {
+    pub fn waves(&self, seed: u64, time: f64, depth: f64, band: f64) -> PlaneWaves {
         let mut random = generator(seed, Stream::Swell, 0);
         let cells = self.cells(band, || StandardUniform.sample(&mut random));
         let mut waves = PlaneWaves::default();
@@ -159,7 +159,7 @@ mod tests {
         let peak = TAU / 150.0;
         for (band, share) in [(1.0, 1.0), (peak, 0.5)] {
             let variance = |seed| -> f64 {
-                let waves = swell.waves((seed, 3.0), f64::INFINITY, band);
+                let waves = swell.waves(seed, 3.0, f64::INFINITY, band);
                 waves.amplitude.iter().map(|a| 0.5 * a.norm_sqr()).sum()
             };
             let count = 200;
@@ -167,7 +167,7 @@ mod tests {
             // Some 60 of the waves carry most: 1/√60 a seed, 1 % of the mean of 200; four times it.
             assert!((mean / (share * 0.25) - 1.0).abs() < 0.04, "{mean}");
         }
-        let [one, other] = [0.0, 7.0].map(|time| swell.waves((1, time), 20.0, 1.0));
+        let [one, other] = [0.0, 7.0].map(|time| swell.waves(1, time, 20.0, 1.0));
         for n in 0..one.len() {
             let turned = one.amplitude[n] * Complex64::from_polar(1.0, -7.0 * one.omega[n]);
             assert!((turned - other.amplitude[n]).norm() < 1e-12);

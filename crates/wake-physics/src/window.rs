@@ -82,25 +82,6 @@ impl Window {
         2.0 * root(half, [0.0, self.first_null()], HALVINGS)
     }
 
-    /// Highest sidelobe of h² over its peak \[dB\].
-    #[must_use]
-    pub fn peak_sidelobe(self) -> f64 {
-        let null = self.first_null();
-        let count = 4000;
-        let step = (FARTHEST - null) / f64::from(count);
-        let at = |i| self.response(null + step * f64::from(i)).powi(2);
-        10.0 * (0..=count).map(at).fold(0.0, f64::max).log10()
-    }
-
-    /// Energy of h² outside the main lobe over all of it \[dB\].
-    #[must_use]
-    pub fn integrated_sidelobes(self) -> f64 {
-        let main = 2.0 * RULE.integrate([0.0, self.first_null()], |x| self.response(x).powi(2));
-        // Parseval: ∫h² dx = ∫W² df/(∫W df)².
-        let all = self.moment(2) / self.moment(1).powi(2);
-        10.0 * (1.0 - main / all).log10()
-    }
-
     /// Loss of the peak of a point over that of the matched filter \[dB\]: −10 log₁₀ (∫W df)²/∫W² df.
     #[must_use]
     pub fn loss(self) -> f64 {
@@ -122,14 +103,6 @@ impl Window {
         shared * over_band(pair) / self.moment(2)
     }
 
-    /// Length over which the intensity is correlated, ∫ρ² dx = ∫W⁴ df/(∫W² df)² \[1/B\].
-    ///
-    /// A pixel of a smaller spacing holds less than one independent sample.
-    #[must_use]
-    pub fn correlation_length(self) -> f64 {
-        self.moment(4) / self.moment(2).powi(2)
-    }
-
     /// Largest correlation of two pixels of a row or a column.
     ///
     /// - `pixels`: pixel spacing over resolution, above 0
@@ -143,22 +116,6 @@ impl Window {
         (1..=lags)
             .map(|lag| self.correlation(f64::from(lag) * step))
             .fold(0.0, f64::max)
-    }
-
-    /// Looks that the mean of `count` neighbouring pixels of an axis is worth, of `pixels` spacing over resolution.
-    ///
-    /// ```text
-    /// m/(1 + 2 Σ (1 − l/m) ρ²(l δ)),     l = 1 … m − 1
-    /// ```
-    ///
-    /// with lags up to the distance 20/B, where ρ² is below 3·10⁻⁴.
-    #[must_use]
-    pub fn averaged_looks(self, count: u32, pixels: f64) -> f64 {
-        let step = pixels * self.width();
-        equivalent(count, |lag| match f64::from(lag) * step {
-            x if x < FARTHEST => self.correlation(x),
-            _ => 0.0,
-        })
     }
 
     /// Equivalent number of `count` looks, each of the bandwidth B, that overlap by a share of it.
@@ -249,6 +206,25 @@ mod tests {
         Window::Kaiser(2.5),
     ];
 
+    /// Figures by which windows are known.
+    impl Window {
+        /// Highest sidelobe of h² over its peak \[dB\].
+        fn peak_sidelobe(self) -> f64 {
+            let null = self.first_null();
+            let count = 4000;
+            let step = (FARTHEST - null) / f64::from(count);
+            let at = |i| self.response(null + step * f64::from(i)).powi(2);
+            10.0 * (0..=count).map(at).fold(0.0, f64::max).log10()
+        }
+
+        /// Length over which the intensity is correlated, ∫ρ² dx = ∫W⁴ df/(∫W² df)² \[1/B\].
+        ///
+        /// A pixel of a smaller spacing holds less than one independent sample.
+        fn correlation_length(self) -> f64 {
+            self.moment(4) / self.moment(2).powi(2)
+        }
+    }
+
     /// The figures of the windows, computed elsewhere from the same definitions and printed to the last digit here.
     #[test]
     fn resolution_sidelobes_and_loss() {
@@ -299,34 +275,6 @@ mod tests {
                 );
             }
         }
-    }
-
-    /// The sidelobes summed one by one, far out, against the rest of Parseval's sum.
-    #[test]
-    fn integrated_sidelobes_are_their_sum() {
-        for window in WINDOWS {
-            let null = window.first_null();
-            let (step, farthest) = (1e-3, 400.0);
-            let energy = |from: f64, to: f64| -> f64 {
-                let count = ((to - from) / step).ceil();
-                let at =
-                    |n: u32| window.response(from + (f64::from(n) + 0.5) * (to - from) / count);
-                (0..count as u32).map(|n| at(n).powi(2)).sum::<f64>() * (to - from) / count
-            };
-            let (main, sides) = (energy(0.0, null), energy(null, farthest));
-            // Beyond x the jump W(½) of the window leaves W(½)²/(2π² x (∫W)²) on each side.
-            let jump = window.weight(0.5) / window.moment(1);
-            let tail = jump * jump / (2.0 * PI * PI * farthest);
-            let expected = 10.0 * ((sides + tail) / (main + sides + tail)).log10();
-            // The tail is a mean over its ripple, of 1/x of it.
-            assert!(
-                (window.integrated_sidelobes() - expected).abs() < 1e-3,
-                "{window:?}"
-            );
-        }
-        // Uniform: 1 − (2/π) Si(2π), with Si(2π) = 1.418 151 576.
-        let uniform = 10.0 * (1.0 - 2.0 / PI * 1.418_151_576_132_628).log10();
-        assert!((Window::Uniform.integrated_sidelobes() - uniform).abs() < 1e-9);
     }
 
     #[test]
@@ -421,18 +369,5 @@ mod tests {
         let pixels = |w: Window, rho: f64| w.correlation_length() * rho / (10.0 * w.width());
         assert!((pixels(Window::Hamming(0.70), 20.3) - 2.56).abs() < 6e-3);
         assert!((pixels(Window::Uniform, 18.4) - 2.08).abs() < 6e-3);
-    }
-
-    /// A long mean of correlated pixels is worth its length over the correlation length.
-    #[test]
-    fn averaged_pixels_are_worth_their_independent_samples() {
-        let window = Window::Hamming(0.75);
-        let pixels = 0.5;
-        let count = 2000;
-        let length = window.correlation_length() / (pixels * window.width());
-        // The ends count for 1/count of it, times the sum over lags.
-        let looks = window.averaged_looks(count, pixels) * length / f64::from(count);
-        assert!((looks - 1.0).abs() < 2e-3, "{looks}");
-        assert!((window.averaged_looks(1, pixels) - 1.0).abs() < 1e-15);
     }
 }

@@ -1,7 +1,7 @@
 //! One scene as every kind of image draws it.
 
 use crate::exit::Outcome;
-use wake_physics::picture::Picture;
+use crate::sheet::Picture;
 use wake_physics::{Field, Scene};
 use wake_train::evaluation::{Baseline, Evaluation, ImageSource, Told, grey};
 

@@ -1,8 +1,8 @@
 //! The report over a recipe: text, and a sheet of images.
 
+use crate::sheet::Picture;
 use serde::Serialize;
 use wake_physics::measure::median;
-use wake_physics::picture::Picture;
 use wake_train::TwoSample;
 use wake_train::evaluation::{DomainRow, Views};
 

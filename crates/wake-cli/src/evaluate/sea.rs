@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::sheet::Picture;
 use clap::Args;
 use serde::Serialize;
 use wake_ldm::sea_texture::{SeaTexture, WINDOW};
 use wake_nn::device_named;
 use wake_physics::Field;
-use wake_physics::picture::Picture;
 use wake_train::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
 use wake_train::{TwoSampleOptions, classifier_two_sample_test};
 

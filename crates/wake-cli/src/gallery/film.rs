@@ -2,8 +2,8 @@
 
 use super::stages::signed;
 use crate::exit::Outcome;
+use crate::sheet::Picture;
 use gif::{Encoder, EncodingError, Frame, Repeat};
-use wake_physics::picture::Picture;
 use wake_physics::{Field, Result, Scene, Simulator};
 
 /// Frames, half a second of the sea each.

@@ -3,6 +3,7 @@
 mod film;
 mod stages;
 
+use crate::sheet::Picture;
 use clap::Args;
 use std::path::PathBuf;
 use wake_detector::drawing::Drawing;
@@ -10,7 +11,6 @@ use wake_detector::{Detector, GreyImage};
 use wake_ldm::WakeSampler;
 use wake_nn::device_named;
 use wake_physics::grey::GreyScale;
-use wake_physics::picture::Picture;
 use wake_physics::{Field, Scene, Simulation, simulate};
 
 use crate::exit::{self, Outcome};

@@ -1,7 +1,7 @@
 //! The stages from hull to image, a panel each.
 
 use super::filling;
-use wake_physics::picture::Picture;
+use crate::sheet::Picture;
 use wake_physics::{Field, Result, Scene, simulate};
 
 /// Levels of a field with sign: grey is zero, black and white are three standard deviations.

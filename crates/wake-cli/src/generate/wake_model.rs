@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::time::Instant;
 
+use crate::sheet::Picture;
 use serde_json::json;
 use wake_ldm::WakeSampler;
 use wake_ldm::sampler::WakeImage;
 use wake_ldm::sea_texture::SeaTexture;
 use wake_nn::device_named;
-use wake_physics::picture::Picture;
 use wake_physics::{Scene, output};
 use wake_text::Reading;
 

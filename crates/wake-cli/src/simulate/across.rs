@@ -1,6 +1,7 @@
 //! What lies across the wakes of simulated and real images, as a table.
 
-use wake_physics::measure::{ImageFigures, Streak, WakeFigures, WakeProfile};
+use super::figures::{ImageFigures, WakeFigures};
+use super::profile::{Streak, WakeProfile};
 
 /// The table with its title.
 pub(crate) fn lines(simulated: &[ImageFigures], real: &[ImageFigures]) -> Vec<String> {

@@ -23,6 +23,9 @@ pub(crate) struct Arguments {
     /// What the grey of the picture is linear in: decibels on one scale for all scenes, or amplitude as in quick-looks
     #[arg(long, value_enum, default_value = "decibel")]
     pub(crate) grey: GreyName,
+    /// Write image.png alone: no fields, labels or report
+    #[arg(long, conflicts_with_all = ["overlay", "export", "compare"])]
+    pub(crate) only_image: bool,
     /// Also write the picture with boxes, arms and tips drawn on it
     #[arg(long)]
     pub(crate) overlay: bool,

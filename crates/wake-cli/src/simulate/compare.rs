@@ -1,6 +1,7 @@
 //! Simulated images beside real ones, as a page: the texture of their open sea.
 
-use wake_physics::measure::{ImageFigures, StatedSpeckle, Texture};
+use super::figures::{ImageFigures, StatedSpeckle};
+use wake_physics::measure::Texture;
 
 use super::across;
 

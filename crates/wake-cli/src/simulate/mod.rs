@@ -3,7 +3,9 @@
 mod across;
 mod arguments;
 mod compare;
+mod figures;
 mod product;
+mod profile;
 mod real;
 mod results;
 
@@ -11,10 +13,10 @@ pub(crate) use arguments::Arguments;
 
 use crate::exit::{self, Outcome};
 use crate::progress;
+use crate::sheet::Picture;
 use arguments::MethodName;
+use figures::ImageFigures;
 use serde_json::Value;
-use wake_physics::measure::ImageFigures;
-use wake_physics::picture::Picture;
 use wake_physics::{Method, Plan, Scene, Simulation, simulate_with};
 
 /// Pixels of a quick-look along its longer side, and quick-looks in a row of the sheet.
@@ -22,6 +24,7 @@ const SIDE: usize = 334;
 const ACROSS: usize = 3;
 
 /// Writes `image.png`, `fields.safetensors`, `labels.json` and `report.json`, of several scenes into a folder each; with
+/// `--only-image` the image alone; with
 /// `--overlay` the picture with its labels drawn, `overlay.png`; with `--export` every field as a NumPy array or a TIFF with
 /// the size of its pixels; with `--compare` open sea and wakes beside those of real images, `comparison.md` and
 /// `comparison.json`, and quick-looks of what was simulated, `sheet.png`. With `--product` a Sentinel-1 product of a real place.

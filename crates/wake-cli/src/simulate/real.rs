@@ -1,9 +1,10 @@
 //! Real images of a folder, with the axes of their wakes where somebody labelled them.
 
+use super::figures::ImageFigures;
+use super::profile::WakeAxis;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use wake_physics::measure::{ImageFigures, WakeAxis};
 use wake_physics::{Error, Field, Result};
 
 /// `labels.json` of a folder; more keys are allowed.

@@ -1,12 +1,12 @@
 //! What is written of one simulation, and what is said of it.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::Path;
 use wake_physics::grey::GreyScale;
-use wake_physics::picture::Picture;
 use wake_physics::{Simulation, export};
 
 use super::arguments::{Arguments, Export, GreyName};
+use crate::sheet::Picture;
 
 /// Writes everything but what several scenes share, and gives the report.
 pub(crate) fn write(
@@ -18,6 +18,12 @@ pub(crate) fn write(
         GreyName::Decibel => GreyScale::default(),
         GreyName::Amplitude => simulation.quick_look(),
     };
+    if arguments.only_image {
+        let path = out.join("image.png");
+        whole_files::make_folder(out)?;
+        simulation.write_png(&path, &grey)?;
+        return Ok(json!({ "files": [path.display().to_string()] }));
+    }
     let report = simulation.write_in(out, &grey)?;
     if arguments.overlay {
         let levels: Vec<u8> = simulation.levels(&grey);

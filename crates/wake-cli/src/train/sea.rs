@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::sheet::Picture;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use wake_ldm::sea_texture::SeaTexture;
-use wake_physics::picture::Picture;
 use wake_train::{SeaPatches, SeaTraining};
 use whole_files::fingerprint;
 

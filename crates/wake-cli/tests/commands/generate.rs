@@ -163,7 +163,7 @@ fn two_images_have_a_sheet_labels_and_a_report() {
         .expect("a picture")
         .into_rgb8();
     assert!(
-        overlay.pixels().any(|p| p.0 == wake_physics::picture::WAKE),
+        overlay.pixels().any(|p| p.0 == [255, 176, 0]),
         "no box is drawn"
     );
 }

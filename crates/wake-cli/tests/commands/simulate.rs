@@ -125,6 +125,19 @@ fn a_drawn_picture_and_fields_for_other_tools_are_written_where_asked_for() {
     assert_eq!((overlay.width(), overlay.height()), (31, 24));
 }
 
+/// The image alone is the same as among all results, and nothing is written beside it.
+#[test]
+fn only_the_image_is_written_where_only_that_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [all, image] = ["all", "image"].map(|name| folder.path().join(name));
+    let size = ["--set", "grid.rows=24", "--set", "grid.columns=31"];
+    done("simulate", &size, &all);
+    done("simulate", &[&size[..], &["--only-image"]].concat(), &image);
+    assert_eq!(names(&image), ["image.png"]);
+    let [all, image] = [all, image].map(|folder| std::fs::read(folder.join("image.png")));
+    assert!(all.expect("a file") == image.expect("a file"));
+}
+
 /// Each has a folder of its own; the table has a line of each, and of every image that is no mask.
 #[test]
 fn several_scenes_are_compared_with_real_images_in_one_table() {

@@ -45,8 +45,8 @@ impl Effect for SlickBands {
     }
 
     fn damp(&self, site: &Site<'_>, _: &mut Workspace, remaining: &mut Option<Field>) {
-        let wind_and_seed = (site.scene.sea.wind_speed, site.scene.seed);
-        let mut bands = self.slicks.strip(&site.whole, &site.rows(), wind_and_seed);
+        let (wind, seed) = (site.scene.sea.wind_speed, site.scene.seed);
+        let mut bands = self.slicks.strip(&site.whole, &site.rows(), wind, seed);
         if let Some(before) = remaining.take() {
             for (value, before) in bands.values.iter_mut().zip(&before.values) {
                 *value *= before;

@@ -37,9 +37,9 @@ impl Effect for SwellWaves {
     }
 
     fn waves(&self, site: &Site<'_>) -> Option<PlaneWaves> {
-        let seed_and_time = (site.scene.seed, site.scene.sea.time);
+        let (seed, time) = (site.scene.seed, site.scene.sea.time);
         let band = site.raster.nyquist_wavenumber();
-        let waves = |swell: Swell| swell.waves(seed_and_time, site.models.transfer.depth, band);
+        let waves = |swell: Swell| swell.waves(seed, time, site.models.transfer.depth, band);
         self.swell.map(waves)
     }
 }

@@ -19,7 +19,7 @@ mod low_pass;
 pub(crate) use low_pass::{Band, LowPass, Point, Window};
 
 use crate::workspace::{Shelf, Workspace};
-use num_complex::Complex;
+use num_complex::{Complex, Complex32};
 use rayon::prelude::*;
 use rustfft::{Fft, FftNum, FftPlanner};
 use std::ops::Range;
@@ -342,9 +342,32 @@ fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
     }
 }
 
+/// Real and imaginary parts of a sum of the plane waves of a periodic lattice, in single precision.
+///
+/// ```text
+/// f[i, j] = Σ_b Σ_a S[b, a] · exp(2πi (b·j/columns − a·i/rows))
+/// ```
+///
+/// # Shapes
+///
+/// - `waves` S: `[columns, rows]` of the period; overwritten
+/// - `period`, `size`: rows and columns; `size` is at most the period
+/// - returns `[rows, columns]` of the size, row after row
+///
+/// # Panics
+///
+/// If there are not rows × columns waves, or the size is larger than the period.
+#[must_use]
+pub fn lattice_sum(waves: &mut [Complex32], period: [usize; 2], size: [usize; 2]) -> [Vec<f32>; 2] {
+    let [mut re, mut im] = [(); 2].map(|()| vec![0.0; size[0] * size[1]]);
+    let synthesis = Synthesis::new(period[0], period[1]);
+    synthesis.run(waves, size, (&mut re, &mut im), |_, _| {});
+    [re, im]
+}
+
 /// The smallest length of at least `n` whose only prime factors are 2, 3 and 5: the FFT is fast there.
 #[must_use]
-pub(crate) fn fast_length(n: usize) -> usize {
+pub fn fast_length(n: usize) -> usize {
     let mut m = n.max(1);
     loop {
         let mut rest = m;

@@ -8,12 +8,13 @@
 //! integral is a sum of plane waves as soon as its nodes are chosen ([`KelvinWake::plan`]); any field of
 //! them follows from [`synthesize`](crate::reference::synthesize). Files: `steady` the curve, `rays` where each wave is seen and how far the arms open, `zones` which part
 //! of it reaches a raster, `panels` the nodes, `turning` those of a ship that turns, `fade` where the waves are shown, `subpixel` what pixels do
-//! not carry, `resistance` the work the ship does for them, `direct` the slow integral that everything is checked against.
+//! not carry, `quadrature` the slow integral that everything is checked against.
 
-pub(crate) mod direct;
+pub(crate) mod quadrature;
 mod fade;
 mod panels;
 mod rays;
+#[cfg(test)]
 mod resistance;
 mod steady;
 mod turning;

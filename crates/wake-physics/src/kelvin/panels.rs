@@ -293,10 +293,12 @@ impl<'a> Builder<'a> {
 }
 
 /// Nodes and weights over a range of the curve with sharp ends.
+#[cfg(test)]
 pub(super) fn unwindowed(
     reach: &Reach,
     [from, to]: [f64; 2],
-    (first, grading): (f64, i32),
+    first: f64,
+    grading: i32,
     error: f64,
 ) -> Vec<(f64, f64)> {
     let mut builder = Builder::new(reach, error, 1.0);

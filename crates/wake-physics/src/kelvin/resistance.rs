@@ -1,4 +1,4 @@
-//! Wave resistance: the work a ship does to keep its waves going.
+//! Wave resistance, which tests compare with published curves: the work a ship does to keep its waves going.
 
 use super::KelvinWake;
 use super::panels::unwindowed;
@@ -25,8 +25,7 @@ impl KelvinWake {
     /// # References
     ///
     /// Michell (1898); Tuck, Scullen and Lazauskas (2002), Eq. 9; Sretensky (1936) for finite depth.
-    #[must_use]
-    pub fn wave_resistance(&self) -> f64 {
+    pub(super) fn wave_resistance(&self) -> f64 {
         if self.speed == 0.0 {
             return 0.0;
         }
@@ -40,7 +39,7 @@ impl KelvinWake {
             2.0 * self.hull.draft(),
         );
         let range = [first, first + LAST_LAMBDA.acosh()];
-        let integral: f64 = unwindowed(&reach, range, (first, self.grading()), ERROR)
+        let integral: f64 = unwindowed(&reach, range, first, self.grading(), ERROR)
             .into_iter()
             .map(|(u, du)| {
                 let wave = steady.at(u);
@@ -54,8 +53,7 @@ impl KelvinWake {
     }
 
     /// Coefficient of wave resistance `R_w`/(½ ρ U² S) \[1\], S the wetted surface; 0 at rest.
-    #[must_use]
-    pub fn wave_resistance_coefficient(&self) -> f64 {
+    pub(super) fn wave_resistance_coefficient(&self) -> f64 {
         if self.speed == 0.0 {
             return 0.0;
         }

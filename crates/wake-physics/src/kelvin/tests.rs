@@ -1,5 +1,5 @@
 use super::*;
-use crate::kelvin::direct::direct_quadrature;
+use crate::kelvin::quadrature::direct_quadrature;
 use crate::nufft::synthesize;
 use crate::raster::Raster;
 use crate::waves::{Quantity, Transfer, harmonic_sum};
@@ -212,7 +212,7 @@ fn assert_plan_is_right(wake: &KelvinWake, raster: &Raster, tolerances: &[f64]) 
         ..DEEP
     };
     let pixels = some_pixels(raster, 9);
-    let exact = direct_quadrature(wake, &transfer, &ALL, (raster, &pixels), 1e-9);
+    let exact = direct_quadrature(wake, &transfer, &ALL, raster, &pixels, 1e-9);
     for &tolerance in tolerances {
         let waves = wake.waves(&wake.plan(raster, tolerance));
         let fast = harmonic_sum(&waves, &transfer, &ALL, raster, &pixels);

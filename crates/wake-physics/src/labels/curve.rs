@@ -67,21 +67,10 @@ impl Frame<'_> {
         pieces.extend(self.band(track, bow, extent.half_width, extent.dark_line));
         let end = pieces.iter().map(|piece| piece.1).fold(0.0, f64::max);
         let seen: Vec<Polygon> = pieces.into_iter().map(|piece| piece.0).collect();
-        let box_px = self.upright_box(&seen);
         WakeLabel {
-            tip_px: self.pixel_inside(self.offset(self.position, bow, 0.0)),
-            axis_deg: Some((self.heading + 180.0).rem_euclid(360.0)),
-            half_angle_deg: Some(opening.to_degrees()),
             arms_px: self.arm_lines(track, bow, arms, extent.waves),
-            centreline_px: self.track_line(
-                track,
-                bow,
-                [length, extent.waves.max(extent.dark_line)],
-            ),
-            length_px: box_px.map_or(0.0, |_| end / self.raster.spacing),
-            visibility: extent.visibility,
-            box_px,
-            oriented_box_px: box_px.map(|_| self.track_box(&seen)),
+            centreline_px: self.track_line(track, bow, [length, extent.longest()]),
+            ..self.outlined(self.offset(self.position, bow, 0.0), opening, &seen, end)
         }
     }
 

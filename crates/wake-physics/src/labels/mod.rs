@@ -11,10 +11,8 @@ mod empty_list;
 mod short_waves;
 mod visibility;
 
-use crate::effects::Effects;
 use crate::kelvin::half_angle;
-use crate::linear::OpenSea;
-use crate::models::Models;
+use crate::prepared::Prepared;
 use crate::raster::Raster;
 use crate::sar::geometry::{azimuth_displacement, direction, ship_radial_velocity};
 use crate::scene::{Scene, Ship};
@@ -174,25 +172,17 @@ pub struct WakeLabel {
 /// displacement over a wave is zero in linear theory.
 #[must_use]
 pub fn labels_of(scene: &Scene) -> Labels {
-    let models = Models::new(scene);
-    let effects = Effects::new(scene, &models);
-    labels_with(scene, &models, &effects, &OpenSea::new(&models))
+    labels(&Prepared::new(scene))
 }
 
-/// Labels of a valid scene whose models are already built; see [`labels_of`].
-pub(crate) fn labels_with(
-    scene: &Scene,
-    models: &Models,
-    effects: &Effects,
-    open: &OpenSea,
-) -> Labels {
-    let grid = &scene.grid;
-    let raster = Raster::image(grid.rows, grid.columns, grid.spacing);
-    let sea = Background::new(scene, models, effects, open);
+/// Labels of a prepared scene; see [`labels_of`].
+pub(crate) fn labels(prepared: &Prepared<'_>) -> Labels {
+    let (scene, models) = (prepared.scene, &prepared.models);
+    let sea = Background::new(prepared);
     let ships = scene.ships.iter().enumerate().map(|(n, ship)| {
         let wake = &models.wakes[n];
         let heading = ship.heading_at(scene.sea.time);
-        let frame = Frame::new(wake.track.position, heading, &raster);
+        let frame = Frame::new(wake.track.position, heading, &models.pixels.image);
         let opening = half_angle(ship.speed, scene.sea.depth);
         let extent = match &sea {
             Some(sea) if ship.speed > 0.0 => sea.extent(n, opening),
@@ -200,9 +190,12 @@ pub(crate) fn labels_with(
         };
         LabelledShip {
             ship: frame.ship(ship, echo_displacement(scene, ship)),
-            wake: match wake.track.turn() {
-                None => frame.wake(ship, opening, &extent),
-                Some(_) => frame.curved_wake(wake, opening, &extent),
+            wake: WakeLabel {
+                visibility: extent.visibility,
+                ..match wake.track.turn() {
+                    None => frame.wake(ship, opening, &extent),
+                    Some(_) => frame.curved_wake(wake, opening, &extent),
+                }
             },
         }
     });
@@ -351,27 +344,37 @@ impl<'a> Frame<'a> {
                 .right_of(starboard, self.ahead.map(|v| -v))
         });
         let seen: Vec<Polygon> = [wedge, line].into_iter().flatten().collect();
-        let longest = extent.waves.max(extent.dark_line);
-        let box_px = self.upright_box(&seen);
-        let length = |seen: &[Polygon]| {
-            let along = |at: [f64; 2]| at[0] * self.ahead[0] + at[1] * self.ahead[1];
-            (along(bow) - extent_of(seen, self.ahead)[0]) / self.raster.spacing
-        };
+        let along = |at: [f64; 2]| at[0] * self.ahead[0] + at[1] * self.ahead[1];
+        let arms = arms.into_iter();
+        let arms = arms.filter_map(|arm| self.ray(bow, arm, extent.waves / opening.cos()));
+        let astern = self.ahead.map(|v| -v);
+        let centreline = self.ray(stern, astern, extent.longest() - ship.length);
+        WakeLabel {
+            arms_px: arms.collect(),
+            centreline_px: centreline.unwrap_or_default(),
+            ..self.outlined(
+                bow,
+                opening,
+                &seen,
+                along(bow) - extent_of(&seen, self.ahead)[0],
+            )
+        }
+    }
+
+    /// The label of a wake without its lines and its visibility.
+    ///
+    /// - `bow` (x, y) \[m\]; `opening` half-angle of the wedge \[rad\]
+    /// - `seen`: what is seen of it; `length` of that along the axis \[m\], where it has an area
+    fn outlined(&self, bow: [f64; 2], opening: f64, seen: &[Polygon], length: f64) -> WakeLabel {
+        let box_px = self.upright_box(seen);
         WakeLabel {
             tip_px: self.pixel_inside(bow),
             axis_deg: Some((self.heading + 180.0).rem_euclid(360.0)),
             half_angle_deg: Some(opening.to_degrees()),
-            arms_px: arms
-                .into_iter()
-                .filter_map(|arm| self.ray(bow, arm, extent.waves / opening.cos()))
-                .collect(),
-            centreline_px: self
-                .ray(stern, self.ahead.map(|v| -v), longest - ship.length)
-                .unwrap_or_default(),
-            length_px: box_px.map_or(0.0, |_| length(&seen)),
-            visibility: extent.visibility,
+            length_px: box_px.map_or(0.0, |_| length / self.raster.spacing),
             box_px,
-            oriented_box_px: box_px.map(|_| self.track_box(&seen)),
+            oriented_box_px: box_px.map(|_| self.track_box(seen)),
+            ..WakeLabel::default()
         }
     }
 

@@ -4,11 +4,12 @@ use super::dark_line::DarkLine;
 use super::short_waves::{Profile, ShortWaves};
 use crate::effects::Effects;
 use crate::kelvin::{KelvinWake, Ray};
-use crate::linear::{OpenSea, over_mean};
+use crate::linear::over_mean;
 use crate::models::Models;
+use crate::prepared::Prepared;
 use crate::raster::Raster;
 use crate::scattering::modulation::{ModulationTransfer, smear};
-use crate::scene::{Scene, Term};
+use crate::scene::Term;
 use crate::track::Track;
 use crate::turbulent::TurbulentWake;
 use crate::turbulent::current::WakeEdge;
@@ -66,6 +67,11 @@ impl Extent {
         half_width: 0.0,
         visibility: None,
     };
+
+    /// Distance astern of the bow up to which anything is seen \[m\].
+    pub(super) fn longest(&self) -> f64 {
+        self.waves.max(self.dark_line)
+    }
 }
 
 /// The waves of one ray as they are imaged.
@@ -111,12 +117,13 @@ pub(super) struct Background<'a> {
 
 impl<'a> Background<'a> {
     /// The open sea of a scene, `None` if the image is dark.
-    pub(super) fn new(
-        scene: &Scene,
-        models: &'a Models,
-        effects: &'a Effects,
-        open: &OpenSea,
-    ) -> Option<Self> {
+    pub(super) fn new(prepared: &'a Prepared<'_>) -> Option<Self> {
+        let Prepared {
+            scene,
+            models,
+            effects,
+            open,
+        } = prepared;
         let drawn = |term| scene.model.terms.allow(term);
         let mean = open.mean();
         if mean[0] + mean[1] <= 0.0 {
@@ -212,24 +219,15 @@ impl<'a> Background<'a> {
             let profile = short
                 .as_ref()
                 .map(|short| short.profile(wake, distance + half_length));
-            let row = if turns {
-                // Waves and dark line lie there as beside a straight track along the tangent.
-                let there = wake.track.at(-distance - half_length).straight();
-                let rays = self.rays(&KelvinWake {
-                    track: there,
-                    ..*wake
-                });
-                let band = self.dark_line(
-                    TurbulentWake {
-                        track: there,
-                        ..band.wake
-                    },
-                    band.edge,
-                );
-                self.row(wake, distance, windows, &rays, (&band, profile.as_ref()))
-            } else {
-                self.row(wake, distance, windows, &rays, (&band, profile.as_ref()))
-            };
+            // Behind a ship that turns waves and dark line lie as beside a straight track along the tangent.
+            let tangent = turns.then(|| {
+                let track = wake.track.at(-distance - half_length).straight();
+                let band = TurbulentWake { track, ..band.wake };
+                let rays = self.rays(&KelvinWake { track, ..*wake });
+                (rays, self.dark_line(band, edge))
+            });
+            let (rays, local) = tangent.as_ref().map_or((&rays, &band), |(r, b)| (r, b));
+            let row = self.row(wake, distance, windows, rays, (local, profile.as_ref()));
             let end = distance + 0.5 * step + 2.0 * half_length;
             let seen = |square: f64| WINDOW as f64 * square.sqrt() >= THRESHOLD * self.noise;
             if seen(row.largest[0]) {
@@ -241,7 +239,7 @@ impl<'a> Background<'a> {
             }
             rows.push((end, row));
         }
-        let seen = extent.waves.max(extent.dark_line);
+        let seen = extent.longest();
         let counted = rows.iter().filter(|(end, _)| seen == 0.0 || *end <= seen);
         let (sum, count) = counted.fold((0.0, 0.0), |(sum, count), (_, row)| {
             // Where no wave is seen the box holds the dark line alone.

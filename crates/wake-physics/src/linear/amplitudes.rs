@@ -28,7 +28,7 @@ impl AsRef<WaveSample> for Weighed<'_> {
 
 /// The waves of a scene, weighed once for all terms.
 pub(crate) struct Amplitudes<'a> {
-    pub(crate) first: &'a FirstOrder,
+    pub(crate) first: &'a FirstOrder<'a>,
     /// Relative root mean square change of σ⁰ without tilt average, and without specular return.
     pub(crate) backscatter: [f64; 2],
     pub(crate) sea: Vec<Weighed<'a>>,
@@ -39,7 +39,7 @@ pub(crate) struct Amplitudes<'a> {
 }
 
 impl<'a> Amplitudes<'a> {
-    pub(crate) fn new(first: &'a FirstOrder) -> Self {
+    pub(crate) fn new(first: &'a FirstOrder<'a>) -> Self {
         let Sensitivity {
             tilt_average,
             specular,
@@ -49,7 +49,7 @@ impl<'a> Amplitudes<'a> {
     }
 
     /// - `backscatter`: relative root mean square change of σ⁰ without tilt average, and without specular return
-    pub(crate) fn with(first: &'a FirstOrder, backscatter: [f64; 2]) -> Self {
+    pub(crate) fn with(first: &'a FirstOrder<'a>, backscatter: [f64; 2]) -> Self {
         let at_rest = first.resolution.at(0.0);
         let weighed = |waves: &'a [WaveSample]| -> Vec<Weighed<'a>> {
             let one = |wave: &'a WaveSample| Weighed {

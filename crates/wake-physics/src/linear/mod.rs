@@ -31,9 +31,9 @@ const WEDGE: f64 = 4.0;
 
 /// First-order theory of a scene: its open sea and the waves of its ships.
 #[derive(Debug)]
-pub(crate) struct FirstOrder {
+pub(crate) struct FirstOrder<'a> {
     /// The sea without ships.
-    pub(crate) open: OpenSea,
+    pub(crate) open: &'a OpenSea,
     /// Resolved waves of the wakes.
     pub(crate) wake: Vec<WaveSample>,
     /// Modulation of the image by waves.
@@ -50,8 +50,8 @@ pub(crate) struct FirstOrder {
     pub(crate) spacing: f64,
 }
 
-impl FirstOrder {
-    pub(crate) fn new(models: &Models, open: OpenSea) -> Self {
+impl<'a> FirstOrder<'a> {
+    pub(crate) fn new(models: &Models, open: &'a OpenSea) -> Self {
         let (mut wake, mut wake_slopes) = (Vec::new(), [SlopeCovariance::NONE; 2]);
         for one in &models.wakes {
             let (waves, crowding) = wake::sampled(one, &models.pixels.computed);

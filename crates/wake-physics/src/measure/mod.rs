@@ -14,13 +14,11 @@
 //! band, R/V 78 s) that are not among those of the `evaluate` example, which reports how good the result is.
 
 mod arms;
-mod figures;
 mod inversion;
 mod median;
 mod open_sea;
-mod profile;
 mod radial;
-pub(crate) mod shape;
+pub(crate) mod seams;
 mod smooth;
 mod spectrum;
 mod stationary;
@@ -30,13 +28,11 @@ mod wake;
 #[cfg(test)]
 mod tests;
 
-pub use figures::{ImageFigures, StatedSpeckle, WakeFigures};
 pub use inversion::{incidence, mean_sigma0, wind_axis, wind_speed};
 pub use median::median;
 pub use open_sea::{OpenSea, open_sea};
-pub use profile::{Streak, WakeAxis, WakeProfile, wake_arms, wake_profile};
 pub use radial::{Binning, RadialSpectrum, radial_spectrum};
-pub use shape::{SeaShape, crest_variance, sea_shape};
+pub use smooth::smooth;
 pub use texture::{Texture, amplitude_correlation, texture};
 pub use wake::{WakeMeasurement, kelvin_wedge, measure_wake};
 

@@ -9,7 +9,8 @@ const PASSES: usize = 3;
 /// Smooths with a bell of standard deviation `std` \[pixels\]; beyond the border the outermost pixel repeats.
 ///
 /// A running mean over 2h + 1 pixels has variance h(h + 1)/3; three of them come within a few per cent of a Gaussian.
-pub(super) fn smooth(field: &Field, std: f64) -> Field {
+#[must_use]
+pub fn smooth(field: &Field, std: f64) -> Field {
     let half = half_width(std);
     let mut field = field.clone();
     for _ in 0..2 {

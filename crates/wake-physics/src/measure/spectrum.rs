@@ -1,7 +1,7 @@
 //! Power spectrum of the part of an image that a window shows.
 
 use super::smooth::smooth;
-use crate::fft::Synthesis;
+use crate::fft::lattice_sum;
 use crate::raster::{Field, Raster};
 use num_complex::Complex32;
 use std::f64::consts::TAU;
@@ -57,14 +57,8 @@ impl PowerSpectrum {
         for (n, (&v, &w)) in pairs().enumerate() {
             lines[(n % columns) * rows + n / columns].re = w * (v - mean as f32);
         }
-        let (mut re, mut im) = (vec![0.0f32; rows * columns], vec![0.0f32; rows * columns]);
         // The sum over pixels with exp(i(kx x + ky y)) is a synthesis with the roles of place and wave exchanged.
-        Synthesis::<f32>::new(rows, columns).run(
-            &mut lines,
-            [rows, columns],
-            (&mut re, &mut im),
-            |_, _| (),
-        );
+        let [re, im] = lattice_sum(&mut lines, [rows, columns], [rows, columns]);
         let scale = 1.0 / energy as f32;
         let power = re.iter().zip(&im).map(|(a, b)| scale * (a * a + b * b));
         Some(Self {

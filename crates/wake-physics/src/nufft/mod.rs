@@ -61,13 +61,24 @@ pub fn synthesize(
     let mut fields = vec![Field::constant(raster, 0.0); quantities.len()];
     let mut workspace = Workspace::default();
     let take = |q: usize, field: &mut Field| std::mem::swap(&mut fields[q], field);
-    let sum = (waves, transfer, quantities, raster);
-    synthesize_each(&mut workspace, sum, tolerance, take);
+    let summands = Summands {
+        waves,
+        transfer,
+        quantities,
+        raster,
+    };
+    synthesize_each(&mut workspace, summands, tolerance, take);
     fields
 }
 
-/// What a sum of waves takes: the waves, their transfer, the quantities, the raster.
-pub(crate) type Summands<'a> = (&'a PlaneWaves, &'a Transfer, &'a [Quantity], &'a Raster);
+/// Waves, and the quantities of them that are summed on a raster.
+#[derive(Clone, Copy)]
+pub(crate) struct Summands<'a> {
+    pub(crate) waves: &'a PlaneWaves,
+    pub(crate) transfer: &'a Transfer,
+    pub(crate) quantities: &'a [Quantity],
+    pub(crate) raster: &'a Raster,
+}
 
 /// [`synthesize`], one field at a time: `take` gets the number of a quantity and its field, once each and in any
 /// order; what it leaves of the field is overwritten. Fields that are 0 everywhere are not computed.
@@ -76,13 +87,14 @@ pub(crate) type Summands<'a> = (&'a PlaneWaves, &'a Transfer, &'a [Quantity], &'
 /// kernel is that exact; 0 where nothing is computed.
 pub(crate) fn synthesize_each(
     workspace: &mut Workspace,
-    (waves, transfer, quantities, raster): Summands<'_>,
+    summands: Summands<'_>,
     tolerance: f64,
     mut take: impl FnMut(usize, &mut Field),
 ) -> f64 {
-    let sums = CentredSums::new((waves, transfer, quantities, raster), WAVES_AT_ONCE);
+    let Summands { waves, raster, .. } = summands;
+    let sums = CentredSums::new(summands, WAVES_AT_ONCE);
     let mut rms: Vec<f64> = sums.sizes.iter().map(|s| s.expected_rms()).collect();
-    let mut todo: Vec<usize> = (0..quantities.len()).filter(|&q| rms[q] > 0.0).collect();
+    let mut todo: Vec<usize> = (0..rms.len()).filter(|&q| rms[q] > 0.0).collect();
     let mut reached = 0.0f64;
     for attempt in 1..=ATTEMPTS {
         if todo.is_empty() || raster.is_empty() {
@@ -138,7 +150,13 @@ struct Part {
 }
 
 impl Part {
-    fn new((waves, transfer, quantities, raster): Summands<'_>) -> Self {
+    fn new(summands: Summands<'_>) -> Self {
+        let Summands {
+            waves,
+            transfer,
+            quantities,
+            raster,
+        } = summands;
         let (x, y) = (raster.x(raster.columns / 2), raster.y(raster.rows / 2));
         let phases: Vec<Complex64> = (0..waves.len())
             .into_par_iter()
@@ -188,7 +206,9 @@ impl Part {
 impl<'a> CentredSums<'a> {
     /// - `at_once`: waves that are spread at once
     fn new(summands: Summands<'a>, at_once: usize) -> Self {
-        let (waves, _, quantities, _) = summands;
+        let Summands {
+            waves, quantities, ..
+        } = summands;
         let mut sums = Self {
             summands,
             sizes: Vec::new(),
@@ -217,10 +237,13 @@ impl<'a> CentredSums<'a> {
         if let Some(part) = &self.whole {
             return look(part);
         }
-        let (waves, transfer, quantities, raster) = self.summands;
+        let waves = self.summands.waves;
         for start in (0..waves.len()).step_by(self.at_once) {
             let some = waves.part(start..(start + self.at_once).min(waves.len()));
-            look(&Part::new((&some, transfer, quantities, raster)));
+            look(&Part::new(Summands {
+                waves: &some,
+                ..self.summands
+            }));
         }
     }
 
@@ -232,7 +255,7 @@ impl<'a> CentredSums<'a> {
         todo: &[usize],
         mut done: impl FnMut(usize, &mut Field),
     ) {
-        let raster = self.summands.3;
+        let raster = self.summands.raster;
         let [rows, columns] = gridding.lattice;
         let mut fields = [(); 2].map(|()| workspace.field(raster));
         let (blocks, planner) = T::of(workspace);

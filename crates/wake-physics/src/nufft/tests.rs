@@ -19,6 +19,15 @@ const TRANSFER: Transfer = Transfer {
     action_slope: 4.5,
 };
 
+fn summands<'a>(waves: &'a PlaneWaves, raster: &'a Raster) -> Summands<'a> {
+    Summands {
+        waves,
+        transfer: &TRANSFER,
+        quantities: &ALL,
+        raster,
+    }
+}
+
 /// Waves all over the band with deterministic, unrelated phases.
 fn scattered(raster: &Raster, count: usize) -> PlaneWaves {
     let mut waves = PlaneWaves::default();
@@ -103,7 +112,7 @@ fn tolerance_is_met_at_every_level() {
 fn work_follows_the_tolerance() {
     let raster = Raster::image(128, 128, 2.5);
     let waves = scattered(&raster, 500);
-    let sums = CentredSums::new((&waves, &TRANSFER, &ALL, &raster), WAVES_AT_ONCE);
+    let sums = CentredSums::new(summands(&waves, &raster), WAVES_AT_ONCE);
     let plan = |tolerance| {
         let sizes = sums.sizes.iter().map(|&s| (s, s.expected_rms()));
         let demand = Demand::strictest(sizes, tolerance);
@@ -144,7 +153,7 @@ fn rounding_is_bounded() {
     for (rows, columns) in [(64, 64), (300, 250), (45, 700)] {
         let raster = Raster::image(rows, columns, 2.5);
         let waves = scattered(&raster, 400);
-        let sums = CentredSums::new((&waves, &TRANSFER, &ALL, &raster), WAVES_AT_ONCE);
+        let sums = CentredSums::new(summands(&waves, &raster), WAVES_AT_ONCE);
         for oversampling in [1.25, 1.5, 2.0] {
             for error in [1e-3, 1e-5, 1e-7] {
                 let single = Gridding::new(error, oversampling, &raster, false);
@@ -179,7 +188,7 @@ fn rounding_is_bounded() {
 fn parts_of_the_waves_make_the_same_fields() {
     let raster = Raster::image(40, 56, 2.0);
     let waves = scattered(&raster, 300);
-    let summands = (&waves, &TRANSFER, &ALL[..], &raster);
+    let summands = summands(&waves, &raster);
     let fields = |at_once: usize| {
         let sums = CentredSums::new(summands, at_once);
         assert_eq!(sums.whole.is_some(), at_once >= waves.len());

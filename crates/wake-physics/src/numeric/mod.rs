@@ -4,6 +4,6 @@ mod quadrature;
 mod search;
 pub(crate) mod vector;
 
-pub(crate) use quadrature::{GaussLegendre, largest_phase};
+pub(crate) use quadrature::{GaussLegendre, gauss_hermite, largest_phase};
 pub(crate) use search::{largest, root, smallest_at};
 pub(crate) use vector::vectorized;

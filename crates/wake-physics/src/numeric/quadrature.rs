@@ -1,5 +1,6 @@
-//! Gauss–Legendre quadrature: nodes of any count, and how many an oscillating integrand needs.
+//! Gauss–Legendre and Gauss–Hermite quadrature, and how many nodes an oscillating integrand needs.
 
+use super::search::root;
 use std::f64::consts::PI;
 
 /// Nodes and weights of Gauss–Legendre quadrature on [−1, 1].
@@ -83,6 +84,36 @@ pub(crate) fn largest_phase(count: usize, error: f64) -> f64 {
         - (2.0 * n + 1.0).ln()
         - 3.0 * ln_factorial(2 * count);
     2.0 * ((error.ln() - ln_bound) / (2.0 * n)).exp()
+}
+
+/// For each count nodes and weights of the mean over a unit Gaussian, exact to the power 2·count − 1.
+///
+/// The nodes are the zeros of the Hermite polynomial, which lie between those of the one before.
+pub(crate) fn gauss_hermite(counts: &[usize]) -> Vec<Vec<[f64; 2]>> {
+    let largest = counts.iter().copied().max().unwrap_or(0);
+    let (mut zeros, mut rules) = (Vec::new(), Vec::new());
+    for n in 1..=largest {
+        let bound = 2.0 * (n as f64).sqrt() + 1.0;
+        let ends = [&[-bound], &zeros[..], &[bound]].concat();
+        let of = |pair: &[f64]| root(|x| hermite(n, x)[0], [pair[0], pair[1]], 56);
+        zeros = ends.windows(2).map(of).collect::<Vec<f64>>();
+        if counts.contains(&n) {
+            let nodes = zeros.iter().map(|&z| [z, 1.0 / hermite(n, z)[1]]);
+            rules.push(nodes.collect());
+        }
+    }
+    rules
+}
+
+/// The Hermite polynomial of degree `n` at x, of mean square 1 over a unit Gaussian, and the sum of the squares of those before.
+fn hermite(n: usize, x: f64) -> [f64; 2] {
+    let (mut before, mut p, mut squares) = (0.0, 1.0, 0.0);
+    for k in 0..n {
+        let k = k as f64;
+        squares += p * p;
+        (before, p) = (p, (x * p - k.sqrt() * before) / (k + 1.0).sqrt());
+    }
+    [p, squares]
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! What leaving each term out would change: estimates by the modulation transfer functions.
 
 use super::terms::Weighed;
-use crate::effects::{Effects, Weight};
+use crate::effects::Weight;
 use crate::linear::Amplitudes;
 use crate::models::Models;
+use crate::prepared::Prepared;
 use crate::scattering::SlopeCovariance;
 use crate::scene::{Scene, Term};
 
@@ -15,18 +16,14 @@ const SAFETY: f64 = 3.0;
 const ROUNDING: f64 = 1e-6;
 
 /// Every term with what it changes, in the order of the data flow.
-pub(super) fn weighed(
-    scene: &Scene,
-    models: &Models,
-    effects: &Effects,
-    amplitudes: &Amplitudes<'_>,
-) -> Vec<Weighed> {
+pub(super) fn weighed(prepared: &Prepared<'_>, amplitudes: &Amplitudes<'_>) -> Vec<Weighed> {
+    let (scene, models) = (prepared.scene, &prepared.models);
     let linear = |weight: Weight| Weight {
         estimate: SAFETY * weight.estimate + ROUNDING,
         ..weight
     };
     let one = |&term: &Term| {
-        let effect = effects.each().find(|effect| effect.term() == term);
+        let effect = prepared.effects.each().find(|effect| effect.term() == term);
         let weight = match (effect, term) {
             (Some(effect), _) => linear(effect.weigh(models, amplitudes)),
             (None, Term::ImpulseResponse) => response(scene, models, amplitudes.contrast),
@@ -35,7 +32,8 @@ pub(super) fn weighed(
                 absent: absent(term, models, amplitudes),
                 estimate: match term {
                     Term::Specular => {
-                        let rough = effects.subpixel_wake.specular(models, amplitudes);
+                        let wake = &prepared.effects.subpixel_wake;
+                        let rough = wake.specular(models, amplitudes);
                         estimate(term, amplitudes).max(rough)
                     }
                     _ => estimate(term, amplitudes),
@@ -131,14 +129,25 @@ mod tests {
 
     const BACKSCATTER: [f64; 2] = [0.21, 0.3];
 
-    /// One wave of the sea along range and one of the wake along azimuth, both of ω = 1/s, tan θ = 3/4, and numbers of
-    /// their own for all else.
-    fn first() -> FirstOrder {
-        let wave = |k, variance| WaveSample {
+    fn wave(k: [f64; 2], variance: f64) -> WaveSample {
+        WaveSample {
             k,
             omega: 1.0,
             variance,
-        };
+        }
+    }
+
+    fn open() -> OpenSea {
+        let mut open = OpenSea::new(&Models::new(&Scene::default()));
+        open.waves = vec![wave([0.1, 0.0], 0.04)];
+        open.swell = vec![wave([0.1, 0.0], 0.01)];
+        open.curvature = [3.0, 7.0];
+        open
+    }
+
+    /// One wave of the sea along range and one of the wake along azimuth, both of ω = 1/s, tan θ = 3/4, and numbers of
+    /// their own for all else.
+    fn first(open: &OpenSea) -> FirstOrder<'_> {
         let modulation = ModulationTransfer {
             transfer: Transfer {
                 depth: f64::INFINITY,
@@ -150,10 +159,6 @@ mod tests {
             bragg_share: 0.5,
             range_to_velocity: 50.0,
         };
-        let mut open = OpenSea::new(&Models::new(&Scene::default()));
-        open.waves = vec![wave([0.1, 0.0], 0.04)];
-        open.swell = vec![wave([0.1, 0.0], 0.01)];
-        open.curvature = [3.0, 7.0];
         FirstOrder {
             open,
             wake: vec![wave([0.0, 0.2], 1e-4)],
@@ -173,8 +178,9 @@ mod tests {
     /// What is left of an estimate without its safety and rounding.
     fn of_effect(scene: &[&str], term: Term, amplitudes: &Amplitudes<'_>) -> f64 {
         let scene = Scene::default().with_assignments(scene).unwrap();
-        let models = Models::new(&scene);
-        let effects = Effects::new(&scene, &models);
+        let Prepared {
+            models, effects, ..
+        } = Prepared::new(&scene);
         let effect = effects.each().find(|effect| effect.term() == term);
         let weight = effect.unwrap().weigh(&models, amplitudes);
         assert_eq!(weight.absent, None, "{term:?}");
@@ -206,7 +212,8 @@ mod tests {
         // Half as high: a quarter of the second order.
         let of_swell =
             (0.5 * sea + 3.0 * 0.01 * 0.01) * product + 0.5 * sea_shift[0].hypot(sea_shift[1]) * c;
-        let first = first();
+        let open = open();
+        let first = first(&open);
         let a = &Amplitudes::with(&first, BACKSCATTER);
         // Noise of 10 log 0.36 dB over a mean of 2.
         let noise = format!("radar.nesz={}", 10.0 * 0.36f64.log10());
@@ -272,12 +279,11 @@ mod tests {
         }
         let breaking = ["sea.breaking=true", "sea.wind_speed=10"];
         let scene = Scene::default().with_assignments(&breaking).unwrap();
-        let models = Models::new(&scene);
-        let effects = Effects::new(&scene, &models);
+        let prepared = Prepared::new(&scene);
         let found = optional(&breaking, Term::Breaking);
-        assert!((found / (effects.breaking.sigma0 / 2.0) - 1.0).abs() < 1e-12);
+        assert!((found / (prepared.effects.breaking.sigma0 / 2.0) - 1.0).abs() < 1e-12);
         // Together they are three times as much, and what rounding changes; response and speckle stand alone.
-        for Weighed { term, weight } in weighed(&scene, &models, &effects, a) {
+        for Weighed { term, weight } in weighed(&prepared, a) {
             let expected = match term {
                 Term::Sea => 3.0 * of_sea + 1e-6,
                 Term::Specular => 3.0 * 0.3 + 1e-6,
@@ -317,16 +323,14 @@ mod tests {
             "sea.wind_speed=3",
         ];
         let scene = Scene::default().with_assignments(&keys).unwrap();
-        let models = Models::new(&scene);
-        let effects = Effects::new(&scene, &models);
-        let first = FirstOrder::new(&models, OpenSea::new(&models));
-        let rough = effects
-            .subpixel_wake
-            .specular(&models, &Amplitudes::new(&first));
+        let prepared = Prepared::new(&scene);
+        let first = FirstOrder::new(&prepared.models, &prepared.open);
+        let wakes = &prepared.effects.subpixel_wake;
+        let rough = wakes.specular(&prepared.models, &Amplitudes::new(&first));
         assert!(rough > 0.0);
         for sea in [0.0, 0.5 * rough, 2.0 * rough] {
             let amplitudes = Amplitudes::with(&first, [0.0, sea]);
-            let all = weighed(&scene, &models, &effects, &amplitudes);
+            let all = weighed(&prepared, &amplitudes);
             let specular = all.iter().find(|one| one.term == Term::Specular).unwrap();
             let expected = SAFETY * sea.max(rough) + ROUNDING;
             assert!((specular.weight.estimate - expected).abs() < 1e-15 * expected.max(1.0));
@@ -337,10 +341,9 @@ mod tests {
     #[test]
     fn what_is_absent_is_told_of_its_own_term() {
         let scene = Scene::default();
-        let models = Models::new(&scene);
-        let effects = Effects::new(&scene, &models);
-        let first = FirstOrder::new(&models, OpenSea::new(&models));
-        let all = weighed(&scene, &models, &effects, &Amplitudes::new(&first));
+        let prepared = Prepared::new(&scene);
+        let first = FirstOrder::new(&prepared.models, &prepared.open);
+        let all = weighed(&prepared, &Amplitudes::new(&first));
         let terms: Vec<Term> = all.iter().map(|one| one.term).collect();
         assert_eq!(terms, Term::ALL);
         for Weighed { term, weight } in all {

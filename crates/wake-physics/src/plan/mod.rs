@@ -15,12 +15,12 @@ pub use sizes::Sizes;
 pub use terms::PlannedTerm;
 pub(crate) use terms::SHARES;
 
-use crate::effects::Effects;
 use crate::error::Result;
 use crate::kelvin::WakePlan;
-use crate::linear::{Amplitudes, FirstOrder, OpenSea};
+use crate::linear::{Amplitudes, FirstOrder};
 use crate::memory;
-use crate::models::Models;
+use crate::prepared::Prepared;
+use crate::raster::Raster;
 use crate::scene::{Scene, Term};
 use crate::surface::lattice_size;
 use sizes::strips;
@@ -74,20 +74,15 @@ impl Plan {
     /// [`Error::TooLarge`](crate::Error::TooLarge) if the fields do not fit in memory.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        let models = Models::new(scene);
-        let effects = Effects::new(scene, &models);
-        let first = FirstOrder::new(&models, OpenSea::new(&models));
-        Self::of(scene, &models, &effects, &first)
+        Self::of(&Prepared::new(scene))
     }
 
-    pub(crate) fn of(
-        scene: &Scene,
-        models: &Models,
-        effects: &Effects,
-        first: &FirstOrder,
-    ) -> Result<Self> {
+    /// Plans a prepared scene.
+    pub(crate) fn of(prepared: &Prepared<'_>) -> Result<Self> {
+        let (scene, models) = (prepared.scene, &prepared.models);
         let tolerance = scene.model.tolerance;
-        let weighed = estimates::weighed(scene, models, effects, &Amplitudes::new(first));
+        let first = &FirstOrder::new(models, &prepared.open);
+        let weighed = estimates::weighed(prepared, &Amplitudes::new(first));
         let terms = terms::choose(&weighed, &scene.model.terms, tolerance);
         let uses = |term| terms.iter().any(|t| t.term == term && t.used);
         let margin = first.margin(models);
@@ -107,9 +102,7 @@ impl Plan {
         };
         let measured = |wakes: &[WakePlan]| -> Result<Work> {
             let counts = Counts {
-                scene,
-                models,
-                effects,
+                prepared,
                 first,
                 sizes: &sizes,
                 wakes,
@@ -140,11 +133,17 @@ impl Plan {
             sizes,
             terms,
             work,
-            notes: notes::notes(scene, models),
+            notes: notes::notes(prepared),
             wakes,
             mean_sigma0: first.mean_sigma0(),
             modulation_variance: first.modulation_variance,
         })
+    }
+
+    /// The computed pixels with their margin.
+    pub(crate) fn with_margin(&self, computed: &Raster) -> Raster {
+        let [rows, columns] = self.sizes.margin;
+        computed.with_margin(rows, columns)
     }
 
     /// The same for the mean over all seas: no sea is drawn, and what its waves do is averaged over.
@@ -388,9 +387,8 @@ mod tests {
         let scene = Scene::default()
             .with_assignments(&["radar.incidence=15"])
             .unwrap();
-        let models = Models::new(&scene);
-        let first = FirstOrder::new(&models, OpenSea::new(&models));
-        let [bragg, specular] = first.mean;
+        let prepared = Prepared::new(&scene);
+        let [bragg, specular] = FirstOrder::new(&prepared.models, &prepared.open).mean;
         assert!(bragg > 0.0 && specular > 0.1 * bragg);
         let plan = Plan::new(&scene).unwrap();
         assert!((plan.mean_sigma0 / (bragg + specular) - 1.0).abs() < 1e-15);

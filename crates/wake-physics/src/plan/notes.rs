@@ -1,13 +1,14 @@
 //! What a user should know about a scene, in words.
 
-use crate::models::Models;
+use crate::prepared::Prepared;
 use crate::scene::Scene;
 
 /// Computed pixels along a side of one of the image above which an impulse response costs more than it shows: chosen.
 const COARSE_PIXEL: f64 = 8.0;
 
 /// What a user should know.
-pub(super) fn notes(scene: &Scene, models: &Models) -> Vec<String> {
+pub(super) fn notes(prepared: &Prepared<'_>) -> Vec<String> {
+    let (scene, models) = (prepared.scene, &prepared.models);
     let mut notes = Vec::new();
     if models.short_waves_vanish() {
         notes.push(format!(

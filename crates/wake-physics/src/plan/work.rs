@@ -2,11 +2,11 @@
 
 use super::sizes::Sizes;
 use super::terms::SHARES;
-use crate::effects::Effects;
 use crate::kelvin::{LARGEST_SLOPE_VARIANCE, RingWork, WakePlan};
 use crate::linear::FirstOrder;
 use crate::models::Models;
 use crate::nufft::WAVES_AT_ONCE;
+use crate::prepared::Prepared;
 use crate::sar::Imaging;
 use crate::scattering::{BackscatterTable, SlopeCovariance};
 use crate::scene::{Scene, Term};
@@ -142,10 +142,8 @@ mod bytes {
 
 /// What work is counted from.
 pub(super) struct Counts<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) models: &'a Models,
-    pub(super) effects: &'a Effects,
-    pub(super) first: &'a FirstOrder,
+    pub(super) prepared: &'a Prepared<'a>,
+    pub(super) first: &'a FirstOrder<'a>,
     pub(super) sizes: &'a Sizes,
     /// The waves of the ships, once they are planned.
     pub(super) wakes: &'a [WakePlan],
@@ -155,13 +153,17 @@ impl Work {
     /// Counts the work of a scene by its plan.
     pub(super) fn of(counts: &Counts<'_>, uses: impl Fn(Term) -> bool) -> Self {
         let Counts {
-            scene,
-            models,
-            effects,
+            prepared,
             first,
             sizes,
             wakes,
         } = *counts;
+        let Prepared {
+            scene,
+            models,
+            effects,
+            ..
+        } = prepared;
         let when = |is: bool| f64::from(u8::from(is));
         let ([computed_rows, columns], [margin, _]) = (sizes.computed, sizes.margin);
         let pixels = computed_rows * columns;
@@ -226,8 +228,10 @@ impl Work {
             taps,
             table: BackscatterTable::foreseen(
                 &backscatter,
-                (&slopes, short_waves),
-                (SHARES.table * tolerance * first.mean_sigma0(), pixels),
+                &slopes,
+                short_waves,
+                SHARES.table * tolerance * first.mean_sigma0(),
+                pixels,
             ),
             steep: all * backscatter.steep_share(&first.open.slopes) * when(moves),
             summed: (taps / leans * FARTHEST_MOVED)

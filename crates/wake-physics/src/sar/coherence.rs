@@ -120,7 +120,8 @@ impl AzimuthResolution {
     pub fn of_moving_sea(
         wavelength: f64,
         range_to_velocity: f64,
-        (resolution, looks): (f64, u32),
+        resolution: f64,
+        looks: u32,
         velocity_deviation: f64,
     ) -> Self {
         let time = integration_time(wavelength, range_to_velocity, resolution);
@@ -178,8 +179,7 @@ mod tests {
     #[test]
     fn resolution_is_that_of_the_focused_aperture() {
         let (ratio, single, acceleration, deviation) = (78.0, 3.0, 0.12, 0.01);
-        let resolution =
-            AzimuthResolution::of_moving_sea(WAVELENGTH, ratio, (single, 1), deviation);
+        let resolution = AzimuthResolution::of_moving_sea(WAVELENGTH, ratio, single, 1, deviation);
         let span = integration_time(WAVELENGTH, ratio, single);
         let tau = coherence_time(WAVELENGTH, deviation);
         for (a, tau, expected) in [
@@ -217,7 +217,7 @@ mod tests {
         for looks in [1, 4, 16] {
             let n = f64::from(looks);
             let ours =
-                AzimuthResolution::of_moving_sea(WAVELENGTH, ratio, (single, looks), deviation);
+                AzimuthResolution::of_moving_sea(WAVELENGTH, ratio, single, looks, deviation);
             let theirs = n * single * (1.0 + (time / (n * tau)).powi(2)).sqrt();
             assert!((ours.at(0.0) / theirs - 1.0).abs() < 1e-12);
         }
@@ -226,9 +226,9 @@ mod tests {
     #[test]
     #[allow(clippy::float_cmp, reason = "terms that are exactly zero")]
     fn a_sea_at_rest_and_no_synthetic_aperture_keep_the_nominal_resolution() {
-        let still = AzimuthResolution::of_moving_sea(WAVELENGTH, 78.0, (3.0, 2), 0.0);
+        let still = AzimuthResolution::of_moving_sea(WAVELENGTH, 78.0, 3.0, 2, 0.0);
         assert_eq!(still.at(0.0), 6.0);
-        let none = AzimuthResolution::of_moving_sea(WAVELENGTH, 0.0, (3.0, 2), 0.3);
+        let none = AzimuthResolution::of_moving_sea(WAVELENGTH, 0.0, 3.0, 2, 0.3);
         assert_eq!(none.at(5.0), 6.0);
         assert_eq!(coherence_time(WAVELENGTH, 0.0), f64::INFINITY);
     }
@@ -239,7 +239,7 @@ mod tests {
         let left = cutoff_transfer(2.0 * PI / cutoff, 78.0, 0.4);
         assert!((left - (-1f64).exp()).abs() < 1e-14);
         // The smear of unresolved waves is bunching by them: same standard deviation (R/V)σ_u.
-        let coherence = AzimuthResolution::of_moving_sea(WAVELENGTH, 78.0, (3.0, 1), 0.4).coherence;
+        let coherence = AzimuthResolution::of_moving_sea(WAVELENGTH, 78.0, 3.0, 1, 0.4).coherence;
         assert!((coherence / (SQRT_2 * PI) - 78.0 * 0.4).abs() < 1e-12);
         let tau = coherence_time(WAVELENGTH, 0.4);
         assert!((coherence * 2.0 * tau / (WAVELENGTH * 78.0) - 1.0).abs() < 1e-12);

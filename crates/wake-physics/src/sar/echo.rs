@@ -1,7 +1,7 @@
 //! The echo of a ship on pixels with speckle of their own, where no impulse response images it.
 
 use crate::raster::{Field, Raster};
-use crate::sar::direct::weight_sum;
+use crate::sar::dense::weight_sum;
 use crate::sar::impulse::PointTarget;
 use std::f64::consts::PI;
 

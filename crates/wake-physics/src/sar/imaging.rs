@@ -2,7 +2,7 @@
 
 use crate::raster::{Field, Raster};
 use crate::sar::AzimuthResolution;
-use crate::sar::spread::Steps;
+use crate::sar::taps::Steps;
 use std::f64::consts::PI;
 
 /// The radar's part of velocity bunching.

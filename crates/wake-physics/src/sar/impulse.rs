@@ -243,7 +243,7 @@ impl ImpulseResponse {
                 })
                 .collect();
             let fill = |i: usize, row: &mut [Complex32]| {
-                rough_row(view.row(sources, i), (seed, first + i as u64), row);
+                rough_row(view.row(sources, i), seed, first + i as u64, row);
             };
             filter.run(raster.rows, fill, &points, &view.window, (out, take(look)));
         }
@@ -363,7 +363,7 @@ fn power_band(band: &fft::Band) -> fft::Band {
 }
 
 /// One row of the reflectivity √(I/2)(g₁ + i g₂): modulus √(−I ln u), phase uniform (Box and Muller 1958).
-fn rough_row(intensity: &[f32], (seed, line): (u64, u64), row: &mut [Complex32]) {
+fn rough_row(intensity: &[f32], seed: u64, line: u64, row: &mut [Complex32]) {
     let mut random = generator(seed, Stream::Reflectivity, line);
     let bits: Vec<u64> = intensity.iter().map(|_| random.next_u64()).collect();
     vectorized(

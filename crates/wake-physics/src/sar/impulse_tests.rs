@@ -108,7 +108,7 @@ fn single_look_is_the_sum_over_its_scatterers() {
         .map(|i| {
             let mut row = vec![Complex32::ZERO; raster.columns];
             let values = &intensity.values[i * raster.columns..][..raster.columns];
-            rough_row(values, (seed, i as u64), &mut row);
+            rough_row(values, seed, i as u64, &mut row);
             row
         })
         .collect();

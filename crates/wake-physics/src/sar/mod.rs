@@ -9,7 +9,7 @@
 
 pub(crate) mod bunching;
 pub mod coherence;
-pub(crate) mod direct;
+pub(crate) mod dense;
 pub(crate) mod echo;
 pub mod geometry;
 pub mod impulse;
@@ -17,7 +17,7 @@ pub mod scatterers;
 pub mod speckle;
 
 mod imaging;
-mod spread;
+mod taps;
 
 pub use coherence::AzimuthResolution;
 pub use imaging::{Imaging, Sources};

@@ -87,13 +87,9 @@ impl ShipEcho {
     /// 0.85 of all. Each is displaced in azimuth by its velocity and toward the radar by its height (0.4 of the beam,
     /// chosen). Together they have the median cross section times a log-normal factor of 3 dB.
     ///
-    /// - `seed`, and the ship's number in its scene: the same pair gives the same echo
+    /// - `number` of the ship in its scene: the same seed and number give the same echo
     #[must_use]
-    pub(crate) fn scatterers(
-        &self,
-        view: &Viewing,
-        (seed, number): (u64, usize),
-    ) -> Vec<PointTarget> {
+    pub(crate) fn scatterers(&self, view: &Viewing, seed: u64, number: usize) -> Vec<PointTarget> {
         let mut random = generator(seed, Stream::Scatterers, number as u64);
         let normal = |random: &mut _| -> f64 { StandardNormal.sample(random) };
         let spread = 10f64.powf(0.1 * SPREAD_DB * normal(&mut random));
@@ -196,7 +192,7 @@ mod tests {
         let mut decibels = Vec::new();
         let (mut x, mut y) = ([0.0; 2], [0.0; 2]);
         for seed in 0..count {
-            let points = ship().scatterers(&VIEW, (seed, 0));
+            let points = ship().scatterers(&VIEW, seed, 0);
             let total: f64 = points.iter().map(|p| p.cross_section).sum();
             decibels.push(10.0 * (total / median_cross_section(180.0)).log10());
             for p in &points {
@@ -243,8 +239,8 @@ mod tests {
         let (mut sum, mut n) = (0.0, 0.0);
         for seed in 0..2000 {
             let (still, rolled) = (
-                ship().scatterers(&VIEW, (seed, 0)),
-                rolling.scatterers(&VIEW, (seed, 0)),
+                ship().scatterers(&VIEW, seed, 0),
+                rolling.scatterers(&VIEW, seed, 0),
             );
             for (a, b) in still.iter().zip(&rolled) {
                 assert!((a.position[0] - b.position[0]).abs() < 1e-12);
@@ -261,7 +257,7 @@ mod tests {
 
     #[test]
     fn ghosts_lie_on_both_sides() {
-        let points = ship().scatterers(&VIEW, (1, 0));
+        let points = ship().scatterers(&VIEW, 1, 0);
         let ghosts = ambiguities(&points, 5000.0, 0.003);
         assert_eq!(ghosts.len(), 2 * points.len());
         let sum = |points: &[PointTarget]| -> f64 { points.iter().map(|p| p.cross_section).sum() };

@@ -1,5 +1,6 @@
 //! Means of σ⁰ over slopes that pixels do not carry, on as many nodes as an error asks for.
 
+use crate::numeric::gauss_hermite;
 use crate::scattering::slopes::SlopeCovariance;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, SQRT_2};
@@ -14,7 +15,13 @@ const USED: usize = COUNTS.len() - 1;
 const LEAST_WEIGHT: f64 = 1e-7;
 
 /// The rules: nodes, rising, and weights.
-static RULES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| gauss_hermite(&COUNTS));
+static RULES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| {
+    let mut rules = gauss_hermite(&COUNTS);
+    for rule in &mut rules {
+        rule.retain(|[_, weight]| *weight > LEAST_WEIGHT);
+    }
+    rules
+});
 
 /// Deviations at which the errors of the rules are looked at: each a factor of √2 below the one before.
 const DEVIATIONS: usize = 14;
@@ -56,7 +63,8 @@ impl SlopeMeans {
     pub(crate) fn new(
         function: impl Fn([f64; 2]) -> f64 + Sync,
         facets: [[f64; 2]; 2],
-        (largest, error): (f64, f64),
+        largest: f64,
+        error: f64,
     ) -> Self {
         let errors: Vec<Vec<[f64; USED]>> = (0..PLACES * PLACES)
             .into_par_iter()
@@ -174,50 +182,6 @@ fn errors_at(function: impl Fn([f64; 2]) -> f64, place: [f64; 2], deviation: f64
     worst
 }
 
-/// For each count nodes and weights of the mean over a unit Gaussian, exact to the power 2·count − 1, less nodes without weight.
-///
-/// The nodes are the zeros of the Hermite polynomial, which lie between those of the one before.
-fn gauss_hermite(counts: &[usize]) -> Vec<Vec<[f64; 2]>> {
-    let largest = counts.iter().copied().max().unwrap_or(0);
-    let (mut zeros, mut rules) = (Vec::new(), Vec::new());
-    for n in 1..=largest {
-        let bound = 2.0 * (n as f64).sqrt() + 1.0;
-        let ends = [&[-bound], &zeros[..], &[bound]].concat();
-        let of = |pair: &[f64]| zero_between([pair[0], pair[1]], |x| hermite(n, x)[0]);
-        zeros = ends.windows(2).map(of).collect::<Vec<f64>>();
-        if counts.contains(&n) {
-            let nodes = zeros.iter().map(|&z| [z, 1.0 / hermite(n, z)[1]]);
-            rules.push(nodes.filter(|[_, weight]| *weight > LEAST_WEIGHT).collect());
-        }
-    }
-    rules
-}
-
-/// The Hermite polynomial of degree `n` at x, of mean square 1 over a unit Gaussian, and the sum of the squares of those before.
-fn hermite(n: usize, x: f64) -> [f64; 2] {
-    let (mut before, mut p, mut squares) = (0.0, 1.0, 0.0);
-    for k in 0..n {
-        let k = k as f64;
-        squares += p * p;
-        (before, p) = (p, (x * p - k.sqrt() * before) / (k + 1.0).sqrt());
-    }
-    [p, squares]
-}
-
-/// The zero of a function that changes sign once in an interval, by halving it to rounding.
-fn zero_between([mut low, mut high]: [f64; 2], function: impl Fn(f64) -> f64) -> f64 {
-    let positive = function(low) > 0.0;
-    for _ in 0..56 {
-        let middle = 0.5 * (low + high);
-        if (function(middle) > 0.0) == positive {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,7 +218,7 @@ mod tests {
         let largest = 0.02;
         let mut before = None;
         for error in [1e-1, 1e-2, 1e-3] {
-            let means = SlopeMeans::new(function, facets, (largest, error));
+            let means = SlopeMeans::new(function, facets, largest, error);
             assert!(means.error() <= error);
             for variance in [0.02, 0.01, 1e-3, 1e-5] {
                 for degrees in [0.0f64, 30.0, 77.0, 140.0] {

@@ -138,7 +138,8 @@ impl BackscatterTable {
         let means = SlopeMeans::new(
             |point| table.bragg_around(point),
             made_for.facets,
-            (made_for.variance, left),
+            made_for.variance,
+            left,
         );
         table.error += means.error();
         table.means = Some(means);
@@ -161,25 +162,15 @@ impl BackscatterTable {
                     .error
                     .max(error_between_nodes(&average.lattice, facet));
             }
-            if average.error <= error || (exhausted && !plane) {
+            let kept = average.error <= error || (exhausted && !plane);
+            if kept || exhausted {
                 return Self {
                     backscatter,
                     axes,
-                    error: average.error,
+                    error: if kept { average.error } else { 0.0 },
                     made_for,
                     range: made_for.range(),
-                    interpolation: Some(Bicubic::through(average.lattice)),
-                    means: None,
-                };
-            }
-            if exhausted {
-                return Self {
-                    backscatter,
-                    axes,
-                    error: 0.0,
-                    made_for,
-                    range: made_for.range(),
-                    interpolation: None,
+                    interpolation: kept.then(|| Bicubic::through(average.lattice)),
                     means: None,
                 };
             }
@@ -193,8 +184,10 @@ impl BackscatterTable {
     /// - `error` as in [`Self::covering`]; `pixels`: how many there are
     pub(crate) fn foreseen(
         backscatter: &Backscatter,
-        (slopes, variance): (&SlopeCovariance, f64),
-        (error, pixels): (f64, usize),
+        slopes: &SlopeCovariance,
+        variance: f64,
+        error: f64,
+        pixels: usize,
     ) -> f64 {
         // What fields of `f32` do not hold has no table.
         if error < f64::from(f32::MIN_POSITIVE) {

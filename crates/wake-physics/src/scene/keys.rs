@@ -1,7 +1,6 @@
 //! The keys of a scene file: what is absent comes from the sensor, and where there is none from the defaults.
 
 use super::forms;
-use super::sensor::SensorMode;
 use super::{Grid, Model, Polarization, Radar, Scene, Sea, Sensor, Ship, default_seed};
 use crate::window::Window;
 use serde::Deserialize;
@@ -43,28 +42,48 @@ struct GridKeys {
     oversampling: Option<u32>,
 }
 
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default, rename = "Radar")]
-struct RadarKeys {
-    sensor: Option<Sensor>,
-    frequency: Option<f64>,
-    polarization: Option<Polarization>,
-    incidence: Option<f64>,
-    range_to_velocity: Option<f64>,
+/// The keys of the radar, each with how an absent one is taken from another radar.
+macro_rules! radar_keys {
+    ($($(#[$alias:meta])? $key:ident: $type:ty, $or:ident;)*) => {
+        #[derive(Debug, Default, Deserialize)]
+        #[serde(deny_unknown_fields, default, rename = "Radar")]
+        struct RadarKeys {
+            sensor: Option<Sensor>,
+            relaxation_rate: Option<f64>,
+            $($(#[$alias])? $key: Option<$type>,)*
+        }
+
+        impl RadarKeys {
+            /// A radar with these keys, and all others of `base`.
+            fn over(self, base: Radar) -> Radar {
+                Radar {
+                    sensor: self.sensor,
+                    relaxation_rate: self.relaxation_rate,
+                    $($key: self.$key.$or(base.$key),)*
+                }
+            }
+        }
+    };
+}
+
+radar_keys! {
+    frequency: f64, unwrap_or;
+    polarization: Polarization, unwrap_or;
+    incidence: f64, unwrap_or;
+    range_to_velocity: f64, unwrap_or;
     #[serde(alias = "resolution")]
-    azimuth_resolution: Option<f64>,
-    range_resolution: Option<f64>,
-    window: Option<Window>,
-    azimuth_window: Option<Window>,
-    looks: Option<u32>,
-    look_overlap: Option<f64>,
+    azimuth_resolution: f64, unwrap_or;
+    range_resolution: f64, or;
+    window: Window, or;
+    azimuth_window: Window, or;
+    looks: u32, unwrap_or;
+    look_overlap: f64, or;
     #[serde(alias = "noise_floor")]
-    nesz: Option<f64>,
+    nesz: f64, or;
     #[serde(alias = "ambiguity")]
-    azimuth_ambiguity: Option<f64>,
+    azimuth_ambiguity: f64, or;
     #[serde(alias = "pulse_rate")]
-    prf: Option<f64>,
-    relaxation_rate: Option<f64>,
+    prf: f64, or;
 }
 
 /// Keys of the radar in a scene file, and the names under which serialized scenes have them.
@@ -102,45 +121,21 @@ impl From<SceneKeys> for Scene {
             },
             sea: keys.sea,
             ships: keys.ships,
-            radar: keys.radar.with(),
+            radar: match keys.radar.sensor {
+                Some(sensor) => {
+                    let incidence = keys.radar.incidence;
+                    keys.radar.over(of_sensor(sensor, incidence))
+                }
+                None => keys.radar.over(Radar::default()),
+            },
             model: keys.model,
-        }
-    }
-}
-
-impl RadarKeys {
-    /// The radar these keys describe.
-    fn with(self) -> Radar {
-        let incidence = self
-            .incidence
-            .or_else(|| self.sensor.map(|s| s.mode().incidence));
-        let base = match self.sensor {
-            Some(sensor) => of_sensor(sensor, incidence),
-            None => Radar::default(),
-        };
-        Radar {
-            sensor: self.sensor,
-            frequency: self.frequency.unwrap_or(base.frequency),
-            polarization: self.polarization.unwrap_or(base.polarization),
-            incidence: incidence.unwrap_or(base.incidence),
-            range_to_velocity: self.range_to_velocity.unwrap_or(base.range_to_velocity),
-            azimuth_resolution: self.azimuth_resolution.unwrap_or(base.azimuth_resolution),
-            range_resolution: self.range_resolution.or(base.range_resolution),
-            window: self.window.or(base.window),
-            azimuth_window: self.azimuth_window.or(base.azimuth_window),
-            looks: self.looks.unwrap_or(base.looks),
-            look_overlap: self.look_overlap.or(base.look_overlap),
-            nesz: self.nesz.or(base.nesz),
-            azimuth_ambiguity: self.azimuth_ambiguity.or(base.azimuth_ambiguity),
-            prf: self.prf.or(base.prf),
-            relaxation_rate: self.relaxation_rate,
         }
     }
 }
 
 /// The radar of a sensor at an incidence \[deg\].
 fn of_sensor(sensor: Sensor, incidence: Option<f64>) -> Radar {
-    let mode: SensorMode = sensor.mode();
+    let mode = sensor.mode();
     let incidence = incidence.unwrap_or(mode.incidence);
     Radar {
         sensor: Some(sensor),

@@ -6,11 +6,14 @@ mod forms;
 mod keys;
 mod model;
 pub(crate) mod paper;
+mod polarization;
 pub mod sensor;
 
 use crate::window::Window;
 pub use keys::stored_key;
 pub use model::{Model, Term, TermRule, Terms};
+pub use polarization::Polarization;
+pub use sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// A ship, a sea and a radar over a grid of pixels.
@@ -348,43 +351,4 @@ impl Default for Radar {
             relaxation_rate: None,
         }
     }
-}
-
-/// A satellite and one of its modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[expect(missing_docs, reason = "the names of the satellites and their modes")]
-#[non_exhaustive]
-pub enum Sensor {
-    #[serde(rename = "sentinel-1-iw")]
-    Sentinel1Iw,
-    #[serde(rename = "sentinel-1-ew")]
-    Sentinel1Ew,
-    #[serde(rename = "terrasar-x-sm")]
-    TerraSarXSm,
-    #[serde(rename = "cosmo-skymed-hi")]
-    CosmoSkyMedHi,
-    #[serde(rename = "iceye-strip")]
-    IceyeStrip,
-    #[serde(rename = "alos-2-sm3")]
-    Alos2Sm3,
-    #[serde(rename = "alos-2-sm6")]
-    Alos2Sm6,
-    #[serde(rename = "alos-2-sm10")]
-    Alos2Sm10,
-    #[serde(rename = "radarsat-2-s")]
-    Radarsat2S,
-    #[serde(rename = "novasar-1")]
-    NovaSar1,
-    #[serde(rename = "ers-2-pri")]
-    Ers2Pri,
-}
-
-/// Polarization, sent and received.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Polarization {
-    /// Vertical both ways.
-    VV,
-    /// Horizontal both ways.
-    HH,
 }

@@ -1,8 +1,9 @@
 //! Imaging satellites: what each sets of a radar, with where every number is from.
 
-use super::{Polarization, Sensor};
+use super::polarization::Polarization;
 use crate::constants::SPEED_OF_LIGHT;
 use crate::window::Window;
+use serde::{Deserialize, Serialize};
 
 /// Mean radius of the Earth \[m\] (IUGG, rounded).
 const EARTH_RADIUS: f64 = 6.371e6;
@@ -52,42 +53,45 @@ pub struct SensorMode {
     pub prf: f64,
 }
 
-impl Sensor {
-    /// Every sensor.
-    pub const ALL: [Self; 11] = [
-        Self::Sentinel1Iw,
-        Self::Sentinel1Ew,
-        Self::TerraSarXSm,
-        Self::CosmoSkyMedHi,
-        Self::IceyeStrip,
-        Self::Alos2Sm3,
-        Self::Alos2Sm6,
-        Self::Alos2Sm10,
-        Self::Radarsat2S,
-        Self::NovaSar1,
-        Self::Ers2Pri,
-    ];
-
-    /// The numbers of the mode.
-    ///
-    /// Numbers marked "chosen" are of the right size, not from a document.
-    #[must_use]
-    pub fn mode(self) -> SensorMode {
-        match self {
-            Self::Sentinel1Iw => sentinel_1_iw(),
-            Self::Sentinel1Ew => sentinel_1_ew(),
-            Self::TerraSarXSm => terrasar_x_sm(),
-            Self::CosmoSkyMedHi => cosmo_skymed_hi(),
-            Self::IceyeStrip => iceye_strip(),
-            // Spacing 2.5, 3.1, 6.25 m and resolution: distributor's table. Noise, windows: chosen.
-            Self::Alos2Sm3 => alos_2(2.5, [3.0, 3.0], 1, -24.0),
-            Self::Alos2Sm6 => alos_2(3.125, [6.0, 4.3], 1, -28.0),
-            Self::Alos2Sm10 => alos_2(6.25, [9.1, 5.3], 2, -26.0),
-            Self::Radarsat2S => radarsat_2_s(),
-            Self::NovaSar1 => novasar_1(),
-            Self::Ers2Pri => ers_2_pri(),
+/// The sensors, each with its name in scene files and the numbers of its mode.
+macro_rules! sensors {
+    ($($sensor:ident = $name:literal => $mode:expr,)*) => {
+        /// A satellite and one of its modes.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[expect(missing_docs, reason = "the names of the satellites and their modes")]
+        #[non_exhaustive]
+        pub enum Sensor {
+            $(#[serde(rename = $name)] $sensor,)*
         }
-    }
+
+        impl Sensor {
+            /// Every sensor.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$sensor),*];
+
+            /// Numbers of the mode. Those marked "chosen" in the source are of the right size, not from a document.
+            #[must_use]
+            pub fn mode(self) -> SensorMode {
+                match self {
+                    $(Self::$sensor => $mode,)*
+                }
+            }
+        }
+    };
+}
+
+sensors! {
+    Sentinel1Iw = "sentinel-1-iw" => sentinel_1_iw(),
+    Sentinel1Ew = "sentinel-1-ew" => sentinel_1_ew(),
+    TerraSarXSm = "terrasar-x-sm" => terrasar_x_sm(),
+    CosmoSkyMedHi = "cosmo-skymed-hi" => cosmo_skymed_hi(),
+    IceyeStrip = "iceye-strip" => iceye_strip(),
+    // Spacing 2.5, 3.1, 6.25 m and resolution: distributor's table. Noise, windows: chosen.
+    Alos2Sm3 = "alos-2-sm3" => alos_2(2.5, [3.0, 3.0], 1, -24.0),
+    Alos2Sm6 = "alos-2-sm6" => alos_2(3.125, [6.0, 4.3], 1, -28.0),
+    Alos2Sm10 = "alos-2-sm10" => alos_2(6.25, [9.1, 5.3], 2, -26.0),
+    Radarsat2S = "radarsat-2-s" => radarsat_2_s(),
+    NovaSar1 = "novasar-1" => novasar_1(),
+    Ers2Pri = "ers-2-pri" => ers_2_pri(),
 }
 
 /// Interferometric wide swath, ground range detected, high resolution.

@@ -2,15 +2,16 @@
 
 use super::record::{Clock, Seconds};
 use super::simulation::Method;
-use super::stages::{Stages, sea_of};
+use super::stages::{Run, Stages, sea_of};
 use super::strips::Strip;
 use crate::error::{Error, Result};
 use crate::fields::{Fields, Wanted};
 use crate::kelvin::fade_at;
 use crate::pixels::Parts;
+use crate::plan::Plan;
 use crate::prepared::Prepared;
 use crate::raster::Field;
-use crate::sar::direct::{DirectImage, reaching};
+use crate::sar::dense::{DirectImage, reaching};
 use crate::scene::{Scene, Term};
 use crate::surface::Surface;
 use crate::waves::{PlaneWaves, harmonic_sum};
@@ -55,7 +56,7 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
             }
         }
     }
-    let prepared = Prepared::new(scene)?;
+    let prepared = Prepared::new(scene);
     let models = &prepared.models;
     if models.response.is_some() {
         return Err(Error::Conflict {
@@ -64,8 +65,14 @@ pub fn direct_intensity(scene: &Scene, pixels: &[[usize; 2]]) -> Result<DirectPi
             requirement: "so that no pixel can be had alone; simulate the whole scene with Method::Direct, or take the response away".to_owned(),
         });
     }
-    let strip = Strip::whole(&prepared);
-    let stages = Stages::new(&prepared, Method::Fast, Wanted::Image, &strip);
+    let plan = Plan::of(&prepared)?;
+    let run = Run {
+        prepared: &prepared,
+        plan: &plan,
+        method: Method::Fast,
+        wanted: Wanted::Image,
+    };
+    let stages = Stages::new(run, &Strip::whole(&models.pixels, &plan.sizes));
     if !models.pixels.are_refined() {
         return Ok(stages.direct_intensity(pixels));
     }
@@ -124,7 +131,7 @@ impl Stages<'_> {
 
     /// The source pixels that reach the pixels, by the fast fields.
     fn reaching(&self, workspace: &mut Workspace, pixels: &[[usize; 2]]) -> Vec<[usize; 2]> {
-        let mut sea = sea_of(self.prepared, workspace);
+        let mut sea = sea_of(&self.run, workspace);
         let mut fields = self.sea(workspace, &mut sea);
         self.add_waves_of_effects(workspace, &mut fields);
         self.add_wakes(workspace, &mut fields);
@@ -167,7 +174,7 @@ impl Stages<'_> {
         }
         clock.lap(|seconds| &mut seconds.sea);
         let drawn = self.uses(Term::Kelvin);
-        let pairs = models.wakes.iter().zip(&self.prepared.plan.wakes);
+        let pairs = models.wakes.iter().zip(&self.run.plan.wakes);
         for (wake, plan) in pairs.filter(|_| drawn) {
             let faded = |&[i, j]: &[usize; 2]| {
                 let place = [raster.x(j), raster.y(i)];

@@ -1,13 +1,10 @@
 //! The open sea as a radar sees it to first order: a Gaussian field with the spectrum of the image.
 
-use crate::correlated::real_sum;
 use crate::dispersion::angular_frequency;
-use crate::effects::Effects;
 use crate::error::Result;
-use crate::fft::{fast_length, signed_index};
-use crate::linear::OpenSea;
+use crate::fft::{fast_length, lattice_sum, signed_index};
 use crate::memory;
-use crate::models::Models;
+use crate::prepared::Prepared;
 use crate::raster::Field;
 use crate::sar::ImpulseResponse;
 use crate::sar::impulse::Axis;
@@ -72,10 +69,13 @@ impl LinearSea {
         let needed = 24 * (period * period) as u64;
         let advice = "lower grid.rows or grid.columns";
         memory::check([rows, columns], [0, 0], needed, advice)?;
-        let models = Models::new(&scene);
-        let open = OpenSea::new(&models);
-        let modulated = open.modulated_share(&Effects::new(&scene, &models).added());
-        let models = open.averaged(&models);
+        let Prepared {
+            models,
+            effects,
+            open,
+            ..
+        } = Prepared::new(&scene).over_all_seas();
+        let modulated = open.modulated_share(&effects.added());
         let transfer = open.modulation_of(&models);
         let spacing = scene.grid.spacing;
         let step = TAU / (period as f64 * spacing);
@@ -146,12 +146,17 @@ impl LinearSea {
     }
 
     /// The real part of a sum of waves with kx ≥ 0.
-    fn sum(&self, half: impl Iterator<Item = Complex32>, size: [usize; 2]) -> Field {
+    fn sum(&self, half: impl Iterator<Item = Complex32>, [rows, columns]: [usize; 2]) -> Field {
         let mut waves = Vec::with_capacity(self.period * self.period);
         waves.extend(half);
         // The FFT passes over lines of nothing.
         waves.resize(self.period * self.period, Complex32::default());
-        real_sum(waves, [self.period; 2], size)
+        let [values, _] = lattice_sum(&mut waves, [self.period; 2], [rows, columns]);
+        Field {
+            rows,
+            columns,
+            values,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! From a scene to a SAR image: `stages` alone knows the order of the stages.
 //!
 //! ```text
-//! Scene ─► Prepared { models, effects, first-order theory, plan } ─► Stages ─► Simulation
+//! Scene ─► Prepared { models, effects, open sea } ─► Plan ─► Stages ─► Simulation
 //! ```
 
 mod direct;
@@ -21,12 +21,14 @@ pub use speckling::unit_speckle;
 
 use crate::error::Result;
 use crate::fields::Wanted;
+use crate::labels::labels;
+use crate::plan::Plan;
 use crate::prepared::Prepared;
 use crate::raster::Field;
 use crate::scene::{Scene, Term};
 use record::Clock;
 use speckling::Speckling;
-use stages::{Drawn, Memory, draw};
+use stages::{Drawn, Memory, Run, draw};
 
 /// Simulates scene after scene with the memory, the FFT plans and the table of σ⁰ of the last.
 ///
@@ -70,16 +72,24 @@ impl Simulator {
     /// As [`Self::simulate`].
     pub fn simulate_with(&mut self, scene: &Scene, method: Method) -> Result<Simulation> {
         let mut clock = Clock::start();
-        let prepared = Prepared::new(scene)?;
+        scene.validate()?;
+        let prepared = Prepared::new(scene);
         let models = &prepared.models;
+        let plan = Plan::of(&prepared)?;
         clock.lap(|seconds| &mut seconds.plan);
         let memory = &mut self.memory;
-        let drawn = draw(&prepared, memory, method, Wanted::Fields, &mut clock);
+        let run = Run {
+            prepared: &prepared,
+            plan: &plan,
+            method,
+            wanted: Wanted::Fields,
+        };
+        let drawn = draw(run, memory, &mut clock);
         let fields = drawn.fields;
         let mut speckled = memory.workspace.field(&models.pixels.image);
         speckled.values.copy_from_slice(&fields.intensity.values);
         let speckling = Speckling::of(scene, models, drawn.exposure);
-        let slc = match prepared.plan.uses(Term::Speckle) {
+        let slc = match plan.uses(Term::Speckle) {
             true => speckling.apply(&mut speckled),
             false => None,
         };
@@ -87,7 +97,7 @@ impl Simulator {
             memory.workspace.give(sources);
         }
         clock.lap(|seconds| &mut seconds.speckle);
-        let labels = prepared.labels();
+        let labels = labels(&prepared);
         clock.lap(|seconds| &mut seconds.labels);
         Ok(Simulation {
             raster: models.pixels.image,
@@ -104,7 +114,7 @@ impl Simulator {
             slc,
             labels,
             accuracy: drawn.accuracy,
-            plan: prepared.plan,
+            plan,
             seconds: clock.stop(),
             method,
             scene: scene.clone(),
@@ -117,16 +127,18 @@ impl Simulator {
     ///
     /// As [`Self::simulate`].
     pub fn image(&mut self, scene: &Scene) -> Result<SarImage> {
-        let prepared = Prepared::new(scene)?;
-        let drawn = self.image_of(&prepared);
-        let speckling = match prepared.plan.uses(Term::Speckle) {
+        scene.validate()?;
+        let prepared = Prepared::new(scene);
+        let plan = Plan::of(&prepared)?;
+        let drawn = self.image_of(&prepared, &plan);
+        let speckling = match plan.uses(Term::Speckle) {
             true => Speckling::of(scene, &prepared.models, drawn.exposure),
             false => Speckling::Without,
         };
         Ok(SarImage {
             intensity: drawn.fields.intensity,
-            labels: prepared.labels(),
-            plan: prepared.plan,
+            labels: labels(&prepared),
+            plan,
             accuracy: drawn.accuracy,
             speckling,
         })
@@ -138,15 +150,25 @@ impl Simulator {
     ///
     /// As [`Self::simulate`].
     pub fn expected_intensity(&mut self, scene: &Scene) -> Result<Field> {
-        let mean = Prepared::new(scene)?.over_all_seas();
-        Ok(self.image_of(&mean).fields.intensity)
+        scene.validate()?;
+        let mut prepared = Prepared::new(scene);
+        let mut plan = Plan::of(&prepared)?;
+        if plan.uses(Term::Sea) || plan.uses(Term::Swell) {
+            prepared = prepared.over_all_seas();
+            plan = plan.over_all_seas();
+        }
+        Ok(self.image_of(&prepared, &plan).fields.intensity)
     }
 
     /// The intensity before speckle, and no other field but what the impulse response looks at.
-    fn image_of(&mut self, prepared: &Prepared<'_>) -> Drawn {
-        let (method, wanted) = (Method::Fast, Wanted::Image);
-        let clock = &mut Clock::start();
-        draw(prepared, &mut self.memory, method, wanted, clock)
+    fn image_of(&mut self, prepared: &Prepared<'_>, plan: &Plan) -> Drawn {
+        let run = Run {
+            prepared,
+            plan,
+            method: Method::Fast,
+            wanted: Wanted::Image,
+        };
+        draw(run, &mut self.memory, &mut Clock::start())
     }
 
     /// Takes the blocks of a simulation back that is no longer needed: the next one of this size asks the system for

@@ -7,7 +7,7 @@ use super::stages::{Memory, Roughening, Stages};
 use crate::fields::Fields;
 use crate::plan::SHARES;
 use crate::raster::Field;
-use crate::sar::direct::DirectImage;
+use crate::sar::dense::DirectImage;
 use crate::sar::echo::add_points;
 use crate::sar::{Imaging, Sources};
 use crate::scattering::{Backscatter, BackscatterTable, FacetFields};
@@ -48,7 +48,7 @@ impl Stages<'_> {
         accuracy: &mut Accuracy,
     ) {
         let facets = self.facets(fields, roughening);
-        let mut sigma0 = match self.method {
+        let mut sigma0 = match self.run.method {
             Method::Fast => self.tabulated(memory, &facets, accuracy),
             Method::Direct => self.backscatter().sigma0_field(&facets),
         };
@@ -76,7 +76,7 @@ impl Stages<'_> {
             BackscatterTable::covering_or(last, backscatter.clone(), facets, asked * mean)
         };
         let mut sigma0 = memory.workspace.field(&self.site.raster);
-        let expected = LOWEST_MEAN * self.prepared.plan.mean_sigma0;
+        let expected = LOWEST_MEAN * self.run.plan.mean_sigma0;
         let mut table = table_for(memory.table.take(), expected);
         table.fill_sigma0(&mut sigma0, facets);
         // The mean is known now; without a sea near nadir it is far from the one that was expected.
@@ -125,7 +125,7 @@ impl Stages<'_> {
     pub(super) fn image(&self, workspace: &mut Workspace, fields: &mut Fields) {
         let (imaging, sources) = (self.imaging(), self.sources(fields));
         let tolerance = SHARES.kernels * self.site.scene.model.tolerance;
-        let mut intensity = match self.method {
+        let mut intensity = match self.run.method {
             Method::Fast => imaging.image_in(workspace, &sources, &self.computed, tolerance),
             Method::Direct => DirectImage::new(&imaging, &sources, &self.computed).image(),
         };

@@ -76,7 +76,7 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
             radial_velocity: ship_radial_velocity(ship.speed, heading, models.incidence),
             roll_velocity: ship.roll,
         };
-        echo.scatterers(&view, (scene.seed, n))
+        echo.scatterers(&view, scene.seed, n)
     };
     let mut points: Vec<PointTarget> = drawn.flat_map(of_ship).collect();
     let radar = &scene.radar;

@@ -8,8 +8,8 @@ use super::strips::{Strip, means, put};
 use crate::effects::{Effect, Site};
 use crate::fields::{Fields, Wanted, quantities};
 use crate::kelvin::{self, KelvinWake, WakePlan};
-use crate::nufft;
-use crate::plan::SHARES;
+use crate::nufft::{Summands, synthesize_each};
+use crate::plan::{Plan, SHARES};
 use crate::prepared::Prepared;
 use crate::raster::{Field, Raster};
 use crate::scattering::BackscatterTable;
@@ -20,10 +20,18 @@ use crate::waves::{PlaneWaves, Quantity, harmonic_fields};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
+/// One simulation: a prepared scene, its plan, the method, and the fields asked for.
+#[derive(Clone, Copy)]
+pub(super) struct Run<'a> {
+    pub(super) prepared: &'a Prepared<'a>,
+    pub(super) plan: &'a Plan,
+    pub(super) method: Method,
+    pub(super) wanted: Wanted,
+}
+
 /// A scene being drawn: what its stages have in common.
 pub(super) struct Stages<'a> {
-    pub(super) prepared: &'a Prepared<'a>,
-    pub(super) method: Method,
+    pub(super) run: Run<'a>,
     /// The rows that are drawn at once.
     pub(super) site: Site<'a>,
     /// Whether no strip comes after this one.
@@ -56,14 +64,13 @@ pub(super) struct Memory {
 pub(super) type Sea = Option<Surface>;
 
 /// Draws the waves of a sea.
-pub(super) fn sea_of(prepared: &Prepared<'_>, workspace: &mut Workspace) -> Sea {
-    let scene = prepared.scene;
+pub(super) fn sea_of(run: &Run<'_>, workspace: &mut Workspace) -> Sea {
+    let (scene, models) = (run.prepared.scene, &run.prepared.models);
     let draw = || {
-        let seed_and_time = (scene.seed, scene.sea.time);
-        let sea = &prepared.models.sea;
-        Surface::new_in(workspace, sea, seed_and_time, &prepared.with_margin())
+        let raster = run.plan.with_margin(&models.pixels.computed);
+        Surface::new_in(workspace, &models.sea, scene.seed, scene.sea.time, &raster)
     };
-    prepared.plan.uses(Term::Sea).then(draw)
+    run.plan.uses(Term::Sea).then(draw)
 }
 
 /// A scene before speckle, at the pixels of the image.
@@ -76,20 +83,13 @@ pub(super) struct Drawn {
     pub(super) exposure: Option<Exposure>,
 }
 
-/// All stages up to the intensity before speckle. The clock runs since the plan was made; without `Wanted::Fields` there is only
-/// the image.
-pub(super) fn draw(
-    prepared: &Prepared<'_>,
-    memory: &mut Memory,
-    method: Method,
-    wanted: Wanted,
-    clock: &mut Clock,
-) -> Drawn {
-    let models = &prepared.models;
-    let mut sea = sea_of(prepared, &mut memory.workspace);
+/// All stages up to the intensity before speckle. The clock runs since the plan was made.
+pub(super) fn draw(run: Run<'_>, memory: &mut Memory, clock: &mut Clock) -> Drawn {
+    let models = &run.prepared.models;
+    let mut sea = sea_of(&run, &mut memory.workspace);
     let mut out = Drawn::default();
-    for strip in &Strip::all(prepared) {
-        let stages = Stages::new(prepared, method, wanted, strip);
+    for strip in &Strip::all(&models.pixels, &run.plan.sizes) {
+        let stages = Stages::new(run, strip);
         let (mut fields, accuracy) = stages.draw(memory, &mut sea, clock);
         let workspace = &mut memory.workspace;
         out.accuracy = out.accuracy.and(&accuracy);
@@ -103,7 +103,7 @@ pub(super) fn draw(
             let intensity = means(workspace, intensity, &stages.computed, &pixels);
             put(workspace, &mut out.fields.intensity, rows, intensity);
         }
-        if wanted == Wanted::Fields {
+        if run.wanted == Wanted::Fields {
             let pairs = out.fields.each().into_iter().zip(fields.each());
             for (to, from) in pairs.take(Fields::RESULTS) {
                 let rows = [strip.image.clone(), 0..models.pixels.image.rows];
@@ -116,7 +116,7 @@ pub(super) fn draw(
     }
     if let Some(response) = models.response {
         let sources = std::mem::take(&mut out.fields.intensity);
-        let exposure = Exposure::of(prepared.scene, models, response, sources);
+        let exposure = Exposure::of(run.prepared.scene, models, response, sources);
         out.fields.intensity = exposure.mean();
         out.exposure = Some(exposure);
         clock.lap(|seconds| &mut seconds.imaging);
@@ -125,19 +125,13 @@ pub(super) fn draw(
 }
 
 impl<'a> Stages<'a> {
-    pub(super) fn new(
-        prepared: &'a Prepared<'a>,
-        method: Method,
-        wanted: Wanted,
-        strip: &Strip,
-    ) -> Self {
-        let models = &prepared.models;
-        let whole = prepared.with_margin();
+    pub(super) fn new(run: Run<'a>, strip: &Strip) -> Self {
+        let models = &run.prepared.models;
+        let whole = run.plan.with_margin(&models.pixels.computed);
         Self {
-            prepared,
-            method,
+            run,
             site: Site {
-                scene: prepared.scene,
+                scene: run.prepared.scene,
                 models,
                 raster: whole.strip(&strip.raster),
                 whole,
@@ -145,17 +139,17 @@ impl<'a> Stages<'a> {
             },
             last: strip.image.end == models.pixels.image.rows,
             computed: models.pixels.computed.strip(&strip.computed),
-            quantities: quantities(|term| prepared.plan.uses(term), wanted),
+            quantities: quantities(|term| run.plan.uses(term), run.wanted),
         }
     }
 
     pub(super) fn uses(&self, term: Term) -> bool {
-        self.prepared.plan.uses(term)
+        self.run.plan.uses(term)
     }
 
     /// The optional effects that are drawn.
     pub(super) fn effects(&self) -> impl Iterator<Item = &dyn Effect> {
-        let all = self.prepared.effects.each();
+        let all = self.run.prepared.effects.each();
         all.filter(|effect| self.uses(effect.term()))
     }
 
@@ -200,7 +194,7 @@ impl<'a> Stages<'a> {
         }
         if self.uses(Term::Hydrodynamic) {
             let variance = match self.uses(Term::Sea) {
-                true => self.prepared.plan.modulation_variance,
+                true => self.run.plan.modulation_variance,
                 false => 0.0,
             };
             to_bragg_factors(&mut fields.modulation, variance);
@@ -210,7 +204,7 @@ impl<'a> Stages<'a> {
         }
         if self.uses(Term::SubpixelWake) {
             let smears = self.uses(Term::AzimuthSmear);
-            let wakes = &self.prepared.effects.subpixel_wake;
+            let wakes = &self.run.prepared.effects.subpixel_wake;
             let variances = wakes.variances(site, workspace, fields, smears);
             roughening.subpixel_variances = Some(variances);
         }
@@ -243,12 +237,12 @@ impl<'a> Stages<'a> {
                 *fields.of(quantity) = field;
             }
         };
-        match self.method {
+        match self.run.method {
             Method::Fast => {
                 for group in &self.quantities {
-                    let tolerance = self.field_tolerance();
-                    let sum = (transfer, &group[..], tolerance);
-                    put(group, surface.strip_in(workspace, &self.site.rows(), sum));
+                    let (rows, tolerance) = (self.site.rows(), self.field_tolerance());
+                    let made = surface.strip_in(workspace, &rows, transfer, group, tolerance);
+                    put(group, made);
                 }
             }
             Method::Direct => {
@@ -289,7 +283,7 @@ impl<'a> Stages<'a> {
         if !self.uses(Term::Kelvin) {
             return None;
         }
-        let pairs = self.site.models.wakes.iter().zip(&self.prepared.plan.wakes);
+        let pairs = self.site.models.wakes.iter().zip(&self.run.plan.wakes);
         let reached = pairs.filter_map(|(wake, plan)| self.add_wake(workspace, fields, wake, plan));
         reached.reduce(|a, b| Reached {
             reached: a.reached.max(b.reached),
@@ -329,13 +323,18 @@ impl<'a> Stages<'a> {
         mut add: impl FnMut(Quantity, &mut Field),
     ) -> Option<f64> {
         let (raster, transfer) = (&self.site.raster, &self.site.models.transfer);
-        match self.method {
+        match self.run.method {
             Method::Fast => {
                 let mut reached = 0.0f64;
                 for group in &self.quantities {
-                    let sum = (waves, transfer, &group[..], raster);
+                    let summands = Summands {
+                        waves,
+                        transfer,
+                        quantities: group,
+                        raster,
+                    };
                     let take = |q: usize, made: &mut Field| add(group[q], made);
-                    let error = nufft::synthesize_each(workspace, sum, tolerance, take);
+                    let error = synthesize_each(workspace, summands, tolerance, take);
                     reached = reached.max(error);
                 }
                 Some(reached)

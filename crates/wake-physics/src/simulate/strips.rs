@@ -5,8 +5,8 @@
 //! σ⁰), which stays within the shares of the tolerance that these have. Rows are computed beyond a strip as far as echoes are
 //! displaced, twice the margin of the image.
 
-use crate::pixels::{Parts, means_over};
-use crate::prepared::Prepared;
+use crate::pixels::{Parts, Pixels, means_over};
+use crate::plan::Sizes;
 use crate::raster::{Field, Raster};
 use crate::workspace::Workspace;
 use std::ops::Range;
@@ -29,23 +29,21 @@ pub(super) struct Strip {
 
 impl Strip {
     /// All rows.
-    pub(super) fn whole(prepared: &Prepared<'_>) -> Self {
-        let models = &prepared.models;
+    pub(super) fn whole(pixels: &Pixels, sizes: &Sizes) -> Self {
         Self {
-            image: 0..models.pixels.image.rows,
-            computed: 0..models.pixels.computed.rows,
-            own: 0..models.pixels.computed.rows,
-            raster: 0..models.pixels.computed.rows + 2 * prepared.plan.sizes.margin[0],
+            image: 0..pixels.image.rows,
+            computed: 0..pixels.computed.rows,
+            own: 0..pixels.computed.rows,
+            raster: 0..pixels.computed.rows + 2 * sizes.margin[0],
         }
     }
 
     /// The strips of a plan, from the first row to the last.
-    pub(super) fn all(prepared: &Prepared<'_>) -> Vec<Self> {
-        let (models, plan) = (&prepared.models, &prepared.plan);
-        let count = plan.sizes.strips;
-        let whole = Self::whole(prepared);
-        let parts = Parts::new(&models.pixels.computed, &models.pixels.image);
-        let margin = plan.sizes.margin[0];
+    pub(super) fn all(pixels: &Pixels, sizes: &Sizes) -> Vec<Self> {
+        let count = sizes.strips;
+        let whole = Self::whole(pixels, sizes);
+        let parts = Parts::new(&pixels.computed, &pixels.image);
+        let margin = sizes.margin[0];
         let one = |n: usize| {
             let [start, end] = [n, n + 1].map(|n| n * whole.image.end / count);
             let mut own = parts.rows(&(start..end)).start..parts.rows(&(end..end + 1)).start;
@@ -122,11 +120,12 @@ pub(super) fn put(
 mod tests {
     use super::*;
     use crate::fields::Wanted;
-    use crate::plan::SHARES;
+    use crate::plan::{Plan, SHARES};
+    use crate::prepared::Prepared;
     use crate::scene::Scene;
     use crate::simulate::record::Clock;
     use crate::simulate::simulation::Method;
-    use crate::simulate::stages::{Drawn, Memory, draw};
+    use crate::simulate::stages::{Drawn, Memory, Run, draw};
 
     /// Small margins: what lies beyond a strip is little.
     fn scene(keys: &[&str]) -> Scene {
@@ -142,12 +141,17 @@ mod tests {
     }
 
     fn drawn(scene: &Scene, strips: usize) -> (Drawn, Vec<Strip>) {
-        let mut prepared = Prepared::new(scene).unwrap();
-        prepared.plan.sizes.strips = strips;
-        let (mut memory, mut clock) = (Memory::default(), Clock::start());
-        let (method, wanted) = (Method::Fast, Wanted::Fields);
-        let out = draw(&prepared, &mut memory, method, wanted, &mut clock);
-        (out, Strip::all(&prepared))
+        let prepared = Prepared::new(scene);
+        let mut plan = Plan::of(&prepared).unwrap();
+        plan.sizes.strips = strips;
+        let run = Run {
+            prepared: &prepared,
+            plan: &plan,
+            method: Method::Fast,
+            wanted: Wanted::Fields,
+        };
+        let out = draw(run, &mut Memory::default(), &mut Clock::start());
+        (out, Strip::all(&prepared.models.pixels, &plan.sizes))
     }
 
     const SCENES: [&[&str]; 4] = [
@@ -229,11 +233,12 @@ mod tests {
     fn strips_cover_all_rows_once() {
         for keys in SCENES {
             let scene = scene(keys);
-            let mut prepared = Prepared::new(&scene).unwrap();
-            let margin = prepared.plan.sizes.margin[0];
+            let pixels = Prepared::new(&scene).models.pixels;
+            let mut sizes = Plan::new(&scene).unwrap().sizes;
+            let margin = sizes.margin[0];
             for count in [1, 2, 7, 170] {
-                prepared.plan.sizes.strips = count;
-                let strips = Strip::all(&prepared);
+                sizes.strips = count;
+                let strips = Strip::all(&pixels, &sizes);
                 let mut next = [0; 2];
                 for strip in &strips {
                     assert_eq!([strip.image.start, strip.own.start], next, "{keys:?}");
@@ -247,7 +252,7 @@ mod tests {
                     let below = strip.raster.end - (strip.computed.end + margin);
                     assert!(above >= margin && below >= margin);
                 }
-                assert_eq!(next, [170, prepared.models.pixels.computed.rows]);
+                assert_eq!(next, [170, pixels.computed.rows]);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The even spreading of Elfouhaily et al. (1997).
 
-use super::spread::Spread;
+use super::cos2s::Spread;
 use crate::spectrum::Elfouhaily;
 
 /// Even spreading: more waves along the wind than across it, as many against it as with it.

@@ -2,11 +2,10 @@
 
 mod cos2s;
 mod elfouhaily;
-mod spread;
 
 pub use cos2s::Cos2s;
+pub(crate) use cos2s::Spread;
 pub use elfouhaily::EvenSpreading;
-pub(crate) use spread::Spread;
 
 use crate::scene::SpreadingModel;
 use crate::spectrum::Elfouhaily;

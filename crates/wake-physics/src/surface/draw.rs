@@ -54,7 +54,8 @@ impl<'a> Draw<'a> {
         spectrum: &'a DirectionalSpectrum,
         lattice: WaveLattice,
         raster: &Raster,
-        (seed, time): (u64, f64),
+        seed: u64,
+        time: f64,
         scatter: Scatter,
     ) -> Self {
         Self {

@@ -106,34 +106,24 @@ impl Surface {
     #[must_use]
     pub fn new(spectrum: &DirectionalSpectrum, seed: u64, time: f64, raster: &Raster) -> Self {
         let mut workspace = Workspace::default();
-        Self::draw(
-            spectrum,
-            (seed, time),
-            raster,
-            Scatter::Gaussian,
-            &mut workspace,
-        )
+        Self::new_in(&mut workspace, spectrum, seed, time, raster)
     }
 
     /// [`Self::new`] in blocks of a workspace; [`Self::give_back`] returns them.
     pub(crate) fn new_in(
         workspace: &mut Workspace,
         spectrum: &DirectionalSpectrum,
-        seed_and_time: (u64, f64),
+        seed: u64,
+        time: f64,
         raster: &Raster,
     ) -> Self {
-        Self::draw(
-            spectrum,
-            seed_and_time,
-            raster,
-            Scatter::Gaussian,
-            workspace,
-        )
+        Self::draw(spectrum, seed, time, raster, Scatter::Gaussian, workspace)
     }
 
     fn draw(
         spectrum: &DirectionalSpectrum,
-        seed_and_time: (u64, f64),
+        seed: u64,
+        time: f64,
         raster: &Raster,
         scatter: Scatter,
         workspace: &mut Workspace,
@@ -143,7 +133,7 @@ impl Surface {
         let ([even, odd], carried) = if band > 0.0 {
             let len = lattice.lines() * lattice.rows;
             let parts = [(); 2].map(|()| workspace.spectra.0.take(len));
-            Draw::new(spectrum, lattice, raster, seed_and_time, scatter).run(parts)
+            Draw::new(spectrum, lattice, raster, seed, time, scatter).run(parts)
         } else {
             ([Vec::new(), Vec::new()], 0.0)
         };
@@ -277,9 +267,8 @@ impl Surface {
         quantities: &[Quantity],
         tolerance: f64,
     ) -> Vec<Field> {
-        let rows = 0..self.raster.rows;
-        let sum = (transfer, quantities, tolerance);
-        self.strip_in(&mut Workspace::default(), &rows, sum)
+        let (workspace, rows) = (&mut Workspace::default(), 0..self.raster.rows);
+        self.strip_in(workspace, &rows, transfer, quantities, tolerance)
     }
 
     /// Some rows of [`Self::fields`], in blocks of a workspace.
@@ -287,18 +276,19 @@ impl Surface {
         &self,
         workspace: &mut Workspace,
         rows: &Range<usize>,
-        (transfer, quantities, tolerance): (&Transfer, &[Quantity], f64),
+        transfer: &Transfer,
+        quantities: &[Quantity],
+        tolerance: f64,
     ) -> Vec<Field> {
         let strip = self.raster.strip(rows);
         let field = |_: &Quantity| workspace.field(&strip);
         let mut fields: Vec<Field> = quantities.iter().map(field).collect();
-        let sum = (transfer, quantities);
         if self.is_flat() || strip.is_empty() {
             fields.iter_mut().for_each(|field| field.values.fill(0.0));
         } else if tolerance >= SINGLE_PRECISION_TOLERANCE {
-            self.synthesize::<f32>(workspace, rows, sum, &mut fields);
+            self.synthesize::<f32>(workspace, rows, transfer, quantities, &mut fields);
         } else {
-            self.synthesize::<f64>(workspace, rows, sum, &mut fields);
+            self.synthesize::<f64>(workspace, rows, transfer, quantities, &mut fields);
         }
         fields
     }
@@ -308,7 +298,8 @@ impl Surface {
         &self,
         workspace: &mut Workspace,
         rows: &Range<usize>,
-        (transfer, quantities): (&Transfer, &[Quantity]),
+        transfer: &Transfer,
+        quantities: &[Quantity],
         fields: &mut [Field],
     ) {
         let columns = self.raster.columns;

@@ -41,7 +41,8 @@ fn surface(sea: &WindSea, raster: &Raster) -> Surface {
 fn steady(sea: &WindSea, raster: &Raster) -> Surface {
     Surface::draw(
         &DirectionalSpectrum::new(sea),
-        (7, 0.0),
+        7,
+        0.0,
         raster,
         Scatter::Phase,
         &mut Workspace::default(),

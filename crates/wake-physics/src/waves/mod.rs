@@ -2,6 +2,8 @@
 
 pub(crate) mod matrix_product;
 
+pub use crate::fft::{fast_length, lattice_sum};
+
 use crate::raster::{Field, Raster};
 use num_complex::Complex64;
 use rayon::prelude::*;

@@ -2,7 +2,7 @@
 
 use crate::small;
 use wake_physics::scene::{Term, Terms};
-use wake_physics::{Scene, Simulation, Simulator, expected_intensity, simulate};
+use wake_physics::{Scene, Simulation, Simulator, expected_intensity, labels_of, simulate};
 
 /// Scenes that ask for blocks of other sizes, other precisions and other tables, in an order that mixes them.
 fn scenes() -> Vec<Scene> {
@@ -43,6 +43,23 @@ fn results_do_not_depend_on_what_was_drawn_before() {
                 simulator.reclaim(again);
             }
         }
+    }
+}
+
+/// Labels of a run are those of its scene alone, bit for bit: what a run computes changes none of what labels come from.
+#[test]
+fn labels_of_a_run_are_those_of_its_scene() {
+    let mut simulator = Simulator::default();
+    for keys in [
+        &[][..],
+        &["ship.turn_rate=0.3", "ship.echo=true"],
+        &["radar.sensor=sentinel-1-iw", "ship.edge=true"],
+        &["grid.spacing=10", "ship.speed=6.5"],
+        &["sea.wind_speed=0"],
+    ] {
+        let scene = small(96, 80, keys);
+        let run = simulator.simulate(&scene).unwrap();
+        assert_eq!(run.labels, labels_of(&scene), "{keys:?}");
     }
 }
 

@@ -2,13 +2,13 @@
 
 use burn::tensor::Device;
 use serde::Serialize;
-use wake_physics::measure::{SeaShape, crest_variance, sea_shape};
 use wake_physics::reference::seams;
 use wake_physics::{Field, Scene};
 
 use super::baseline::Baseline;
 use super::judge::told_apart;
 use super::pixels::grey;
+use super::shape::{SeaShape, crest_variance, sea_shape};
 use super::source::{ImageSource, Told, draw_all, other_sea};
 use super::statistics::mean;
 use crate::TwoSample;

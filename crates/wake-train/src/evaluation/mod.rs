@@ -33,6 +33,7 @@ mod source;
 mod judge;
 mod pixels;
 mod reading;
+mod shape;
 mod statistics;
 
 // Figures of sources, over scenes.

@@ -40,7 +40,7 @@ pub(crate) fn bunching(raster: &Raster, tolerance: f64) -> Row {
     let imaging = Imaging {
         range_to_velocity: 78.0,
         incidence: INCIDENCE,
-        resolution: AzimuthResolution::of_moving_sea(0.0312, 78.0, (3.0, 1), 0.2),
+        resolution: AzimuthResolution::of_moving_sea(0.0312, 78.0, 3.0, 1, 0.2),
     };
     let (fast_seconds, image) = median_seconds(RUNS, || imaging.image(&sources, raster, tolerance));
     let (pixels, scale) = pixels(raster);

@@ -38,13 +38,7 @@ pub(crate) fn swell(raster: &Raster, tolerance: f64) -> Row {
         wavelength: 200.0,
         toward: 1.0,
     };
-    let draw = || {
-        swell.waves(
-            (7, 0.0),
-            f64::INFINITY,
-            std::f64::consts::PI / raster.spacing,
-        )
-    };
+    let draw = || swell.waves(7, 0.0, f64::INFINITY, std::f64::consts::PI / raster.spacing);
     let fast = || reference::synthesize(&draw(), &TRANSFER, &QUANTITIES, raster, tolerance);
     sum("swell", raster, tolerance, &draw(), fast)
 }

@@ -5,6 +5,7 @@
 //!                                                 scene ─► contrast of its wakes ─► times the sea, and echoes on it
 //! ```
 
+mod correlated;
 mod flow;
 mod image;
 mod style;

@@ -1,9 +1,9 @@
 //! What seas differ in: a few statistics of a patch, and the correlation of its pixels.
 
 use wake_physics::Field;
-use wake_physics::correlated::{CorrelatedNoise, Correlation};
 use wake_physics::measure::{Texture, median, texture};
 
+use super::correlated::{CorrelatedNoise, Correlation};
 use crate::error::{Error, Result};
 use crate::streams::SEA_TEXTURE_STREAM;
 use wake_nn::check_range;

@@ -20,7 +20,7 @@
 use crate::numeric::vectorized;
 use crate::raster::{Field, Raster};
 use crate::sar::imaging::{Imaging, Response, SMALLEST_VARIANCE, Sources, largest};
-use crate::sar::spread::{LANES, Steps, gaussian};
+use crate::sar::taps::{LANES, Steps, gaussian};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 use std::f64::consts::LOG2_E;
@@ -163,9 +163,9 @@ impl<'a> Sum<'a> {
             columns,
             shares,
         } = places;
-        split(steps, fractions, fraction, (per_velocity, row.velocity));
+        split(steps, fractions, fraction, per_velocity, row.velocity);
         steps.iter_mut().for_each(|step| *step += start);
-        split(columns, shares, 0.0, (per_elevation, row.elevation));
+        split(columns, shares, 0.0, per_elevation, row.elevation);
     }
 
     /// Adds the sources of one row; `first` is the column of the first in the block.
@@ -250,7 +250,7 @@ impl Places {
 
 /// Takes positions `start + factor·value` apart: largest integers not above them, and the rest.
 #[inline(always)]
-fn split(whole: &mut [i32], rest: &mut [f32], start: f32, (factor, values): (f32, Option<&[f32]>)) {
+fn split(whole: &mut [i32], rest: &mut [f32], start: f32, factor: f32, values: Option<&[f32]>) {
     let apart = |at: f32| (floor(at), at - floor(at) as f32);
     match values {
         None => {

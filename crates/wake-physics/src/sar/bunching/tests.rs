@@ -1,7 +1,7 @@
 use super::*;
 use crate::sar::AzimuthResolution;
 use crate::sar::coherence::cutoff_transfer;
-use crate::sar::direct::DirectImage;
+use crate::sar::dense::DirectImage;
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -212,7 +212,7 @@ fn without_a_synthetic_aperture_nothing_moves() {
     let scene = Scene::random(image.with_margin(6, 0), [0.5, 1.0, 0.0]);
     let imaging = Imaging {
         range_to_velocity: 0.0,
-        resolution: AzimuthResolution::of_moving_sea(0.0312, 0.0, (1.0, 1), 0.3),
+        resolution: AzimuthResolution::of_moving_sea(0.0312, 0.0, 1.0, 1, 0.3),
         ..DEFAULT
     };
     let moving = imaging.image(&scene.sources(), &image, 1e-5);
@@ -348,7 +348,7 @@ fn coherence_is_bunching_by_unresolved_waves() {
         ..DEFAULT
     };
     let unresolved = Imaging {
-        resolution: AzimuthResolution::of_moving_sea(0.0312, 78.0, (3.0, 4), deviation),
+        resolution: AzimuthResolution::of_moving_sea(0.0312, 78.0, 3.0, 4, deviation),
         ..DEFAULT
     };
     let bunched = spread(&at_rest.image(&resolved, &raster, 1e-5));
@@ -365,9 +365,9 @@ fn coherence_is_bunching_by_unresolved_waves() {
 fn positions_are_a_floor_and_a_rest() {
     let values = [0.0, 0.25, -0.25, 3.0, -3.0, -2.75];
     let (mut whole, mut rest) = ([0; 6], [0.0; 6]);
-    split(&mut whole, &mut rest, 0.5, (1.0, Some(&values)));
+    split(&mut whole, &mut rest, 0.5, 1.0, Some(&values));
     assert_eq!(whole, [0, 0, 0, 3, -3, -3]);
     assert_eq!(rest, [0.5, 0.75, 0.25, 0.5, 0.5, 0.75]);
-    split(&mut whole, &mut rest, -0.25, (1.0, None));
+    split(&mut whole, &mut rest, -0.25, 1.0, None);
     assert_eq!((whole, rest), ([-1; 6], [0.75; 6]));
 }

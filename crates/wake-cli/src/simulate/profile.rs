@@ -1,8 +1,8 @@
 //! Profiles across a wake: the dark line, the streak beside it, and the arms.
 
-use crate::labels::Pixel;
-use crate::raster::Field;
 use serde::Serialize;
+use wake_physics::Field;
+use wake_physics::labels::Pixel;
 
 /// A pixel this many standard deviations over the sea is a ship and does not count: chosen, as for textures.
 const SHIP: f64 = 8.0;
@@ -25,33 +25,33 @@ const FEWEST: usize = 12;
 
 /// The axis of a wake in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WakeAxis {
+pub(crate) struct WakeAxis {
     /// Where the wake starts, (column, row).
-    pub tip: Pixel,
+    pub(crate) tip: Pixel,
     /// From the tip along the wake [deg clockwise from the image's up].
-    pub direction: f64,
+    pub(crate) direction: f64,
 }
 
 /// A line of an image that is darker or brighter than the sea around it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Streak {
+pub(crate) struct Streak {
     /// Distance of its middle from the axis, positive clockwise of it \[pixels\]; of an arm the angle \[deg\].
-    pub offset: f64,
+    pub(crate) offset: f64,
     /// Amplitude over that of the sea, less 1.
-    pub contrast: f64,
+    pub(crate) contrast: f64,
     /// Difference from the sea over the standard deviation of one pixel of the sea, which no linear grey changes.
-    pub strength: f64,
+    pub(crate) strength: f64,
     /// Width at half of the difference \[pixels\].
-    pub width: f64,
+    pub(crate) width: f64,
 }
 
 /// What lies across a stretch of a wake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct WakeProfile {
+pub(crate) struct WakeProfile {
     /// The darkest line within 10° of the axis, if one shows.
-    pub dark: Option<Streak>,
+    pub(crate) dark: Option<Streak>,
     /// The brightest line within 10° of the dark one, or of the axis.
-    pub bright: Option<Streak>,
+    pub(crate) bright: Option<Streak>,
 }
 
 /// Profile across a wake, averaged over a stretch along its axis; `None` where the image has too little sea beside it.
@@ -60,8 +60,7 @@ pub struct WakeProfile {
 /// - `astern`: distances from the tip along the axis \[pixels\], above 0
 ///
 /// Streaks narrower than three pixels look as wide as that.
-#[must_use]
-pub fn wake_profile(
+pub(super) fn wake_profile(
     amplitude: &Field,
     axis: &WakeAxis,
     [from, to]: [f64; 2],
@@ -81,8 +80,11 @@ pub fn wake_profile(
 /// in pixels half-way along the stretch.
 ///
 /// - `amplitude`, `astern` as in [`wake_profile`]
-#[must_use]
-pub fn wake_arms(amplitude: &Field, axis: &WakeAxis, [from, to]: [f64; 2]) -> [Option<Streak>; 2] {
+pub(super) fn wake_arms(
+    amplitude: &Field,
+    axis: &WakeAxis,
+    [from, to]: [f64; 2],
+) -> [Option<Streak>; 2] {
     // Arcs half-way along the stretch, in pixels.
     let radius = 0.5 * (from + to);
     let arc = |degrees: f64| radius * degrees.to_radians();
@@ -278,8 +280,8 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::Raster;
-    use crate::sar::speckle::speckle;
+    use wake_physics::Raster;
+    use wake_physics::sar::speckle::speckle;
 
     const SIZE: usize = 500;
     const AXIS: WakeAxis = WakeAxis {

@@ -1,8 +1,7 @@
 //! What tells a sea from a Gaussian field of the same spectrum: skewed values, steep fronts, groups.
 
-use super::smooth::smooth;
-use crate::raster::Field;
-use serde::Serialize;
+use wake_physics::Field;
+use wake_physics::measure::smooth;
 
 /// Standard deviation of the bell over which local energy is taken \[pixels\]: chosen, some wavelengths of an image of 4 m
 /// pixels.
@@ -15,25 +14,24 @@ const QUARTER: usize = 4;
 ///
 /// Of a Gaussian field all but [`grouping`](Self::grouping) are 0 up to chance, and that depends on the spectrum alone: set
 /// it beside a Gaussian field of the same spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SeaShape {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SeaShape {
     /// Skewness of the values \[1\].
-    pub skewness: f64,
+    pub(super) skewness: f64,
     /// Excess kurtosis of the values, ⟨v⁴⟩/⟨v²⟩² − 3 \[1\].
-    pub kurtosis: f64,
+    pub(super) kurtosis: f64,
     /// Skewness of the derivative along range, along azimuth, and along the wind \[1\]: above 0 where values rise more
     /// steeply than they fall.
-    pub derivative_skewness: [f64; 3],
+    pub(super) derivative_skewness: [f64; 3],
     /// Standard deviation over mean of the local energy \[1\]: large where waves come in groups.
-    pub grouping: f64,
+    pub(super) grouping: f64,
 }
 
 /// The shape of a field; `None` for less than 3 × 3 pixels, or a constant.
 ///
 /// - `field`: grey, or what is left of it after an expected image is subtracted
 /// - `wind_toward` where the wind blows to \[rad clockwise from azimuth\]
-#[must_use]
-pub fn sea_shape(field: &Field, wind_toward: f64) -> Option<SeaShape> {
+pub(super) fn sea_shape(field: &Field, wind_toward: f64) -> Option<SeaShape> {
     if field.rows < 3 || field.columns < 3 {
         return None;
     }
@@ -79,8 +77,7 @@ pub fn sea_shape(field: &Field, wind_toward: f64) -> Option<SeaShape> {
 /// expected image's pixels.
 ///
 /// - `image`, `expected`: of one size
-#[must_use]
-pub fn crest_variance(image: &Field, expected: &Field) -> Option<f64> {
+pub(super) fn crest_variance(image: &Field, expected: &Field) -> Option<f64> {
     let mut order: Vec<usize> = (0..expected.values.len().min(image.values.len())).collect();
     order.sort_unstable_by(|&a, &b| expected.values[a].total_cmp(&expected.values[b]));
     let quarter = order.len() / QUARTER;
@@ -97,40 +94,6 @@ pub fn crest_variance(image: &Field, expected: &Field) -> Option<f64> {
     };
     let [troughs, crests] = [&order[..quarter], &order[order.len() - quarter..]].map(variance);
     (troughs > 0.0).then(|| crests / troughs)
-}
-
-/// Mean squared difference of neighbours across the borders of squares, over that elsewhere \[1\], along rows or columns,
-/// whichever is the larger; `None` where nothing differs or there is no border.
-///
-/// 1 for an image that knows of no squares, more for one that was put together from them.
-///
-/// - `side`: of a square, at least 2 \[pixels\]; the first begins at the first pixel
-#[must_use]
-pub fn seams(field: &Field, side: usize) -> Option<f64> {
-    let ratio = |down: bool| {
-        let [mut across, mut inside] = [(0.0, 0usize); 2];
-        for i in 0..field.rows - usize::from(down) {
-            for j in 0..field.columns - usize::from(!down) {
-                let next = match down {
-                    true => field.at(i + 1, j),
-                    false => field.at(i, j + 1),
-                };
-                let place = if down { i } else { j };
-                let sum = match (place + 1).is_multiple_of(side) {
-                    true => &mut across,
-                    false => &mut inside,
-                };
-                sum.0 += (f64::from(next) - f64::from(field.at(i, j))).powi(2);
-                sum.1 += 1;
-            }
-        }
-        let mean = |(sum, count): (f64, usize)| sum / count as f64;
-        (across.1 > 0 && inside.0 > 0.0).then(|| mean(across) / mean(inside))
-    };
-    if field.values.is_empty() {
-        return None;
-    }
-    Some(ratio(true)?.max(ratio(false)?))
 }
 
 /// Central differences along a direction (range, azimuth), without the edges.
@@ -166,8 +129,8 @@ fn skewness(values: &[f32]) -> f64 {
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
-    use crate::random::{Stream, generator};
-    use rand::RngExt;
+    use rand::rngs::StdRng;
+    use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
     use std::f64::consts::{PI, TAU};
 
@@ -184,7 +147,7 @@ mod tests {
     }
 
     fn white(seed: u64) -> Vec<f64> {
-        let mut random = generator(seed, Stream::Sea, 0);
+        let mut random = StdRng::seed_from_u64(seed);
         (0..SIDE * SIDE)
             .map(|_| random.sample(StandardNormal))
             .collect()
@@ -280,25 +243,6 @@ mod tests {
         let ridden = field(|i, j| crest(j) + stronger(j) * noise[i * SIDE + j]);
         assert!((crest_variance(&ridden, &expected).unwrap() / 4.0 - 1.0).abs() < error);
         assert_eq!(crest_variance(&added, &field(|_, _| 1.0)), None);
-    }
-
-    /// Squares that differ by noise of variance b under noise of variance 1: neighbours differ by 2 within them, by 2 + 2b
-    /// across their borders.
-    #[test]
-    fn borders_of_squares_are_seen() {
-        let (noise, steps) = (white(5), white(6));
-        let even = field(|i, j| noise[i * SIDE + j]);
-        // Some 8,000 pairs across borders: four standard errors of their mean square.
-        let error = 4.0 * (2.0 / 8000.0f64).sqrt();
-        assert!((seams(&even, 8).unwrap() - 1.0).abs() < error);
-        let step = |i: usize, j: usize| 3.0 * steps[(i / 8) * SIDE + j / 8];
-        let squares = field(|i, j| noise[i * SIDE + j] + step(i, j));
-        // 992 pairs of squares; borders that follow on each other share one, which is half as much again.
-        let error = 4.0 * (3.0 / 992.0f64).sqrt();
-        assert!((seams(&squares, 8).unwrap() / 10.0 - 1.0).abs() < error);
-        // Borders of other squares: as many steps as elsewhere.
-        assert!((seams(&squares, 7).unwrap() - 1.0).abs() < 0.5);
-        assert_eq!(seams(&field(|_, _| 2.0), 8), None);
     }
 
     #[test]

@@ -1,20 +1,21 @@
 //! Pictures for people: an image with its labels drawn on it, captions, and sheets of several.
 
-use crate::error::Result;
-use crate::labels::{Labels, Line, Pixel};
-use crate::output::write_rgb_png;
 use font8x8::{BASIC_FONTS, GREEK_FONTS, LATIN_FONTS, UnicodeFonts};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
 use std::path::Path;
+use wake_physics::labels::{Labels, Line, Pixel};
+use wake_physics::{Error, output};
 
 /// Red, green, blue.
-pub type Colour = [u8; 3];
+pub(crate) type Colour = [u8; 3];
 
 /// Boxes of wakes.
-pub const WAKE: Colour = [255, 176, 0];
+const WAKE: Colour = [255, 176, 0];
 /// Arms of wakes, and their tips.
-pub(crate) const ARMS: Colour = [64, 224, 128];
+const ARMS: Colour = [64, 224, 128];
 /// Boxes of ships.
-pub const SHIP: Colour = [255, 96, 176];
+const SHIP: Colour = [255, 96, 176];
 /// Behind captions and between the pictures of a sheet.
 const PAPER: Colour = [24, 24, 24];
 /// Letters.
@@ -30,16 +31,8 @@ const GAP: usize = 4;
 const DASH: usize = 5;
 
 /// A picture in colour.
-///
-/// ```
-/// use wake_physics::picture::Picture;
-///
-/// let image = Picture::from_levels(&[90; 64 * 48], 64);
-/// let sheet = Picture::sheet(&[image.clone().captioned("left"), image.captioned("right")], 2);
-/// assert_eq!(sheet.size(), [48 + 11, 64 + 4 + 64]); // rows, columns
-/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Picture {
+pub(crate) struct Picture {
     rows: usize,
     columns: usize,
     pixels: Vec<Colour>,
@@ -54,8 +47,7 @@ impl Picture {
     /// # Panics
     ///
     /// If the levels are not whole rows.
-    #[must_use]
-    pub fn reduced(levels: &[u8], columns: usize, side: usize) -> Self {
+    pub(crate) fn reduced(levels: &[u8], columns: usize, side: usize) -> Self {
         let rows = levels.len() / columns.max(1);
         assert!(rows * columns == levels.len(), "levels of whole rows");
         let block = rows.max(columns).div_ceil(side.max(1)).max(1);
@@ -75,8 +67,7 @@ impl Picture {
     /// # Panics
     ///
     /// If the levels are not whole rows.
-    #[must_use]
-    pub fn from_levels(levels: &[u8], columns: usize) -> Self {
+    pub(crate) fn from_levels(levels: &[u8], columns: usize) -> Self {
         let rows = levels.len() / columns.max(1);
         assert!(rows * columns == levels.len(), "levels of whole rows");
         Self {
@@ -91,8 +82,8 @@ impl Picture {
     /// # Panics
     ///
     /// If they are not whole rows.
-    #[must_use]
-    pub fn from_rgb(bytes: &[u8], columns: usize) -> Self {
+    #[cfg(any(feature = "bench", test))]
+    pub(crate) fn from_rgb(bytes: &[u8], columns: usize) -> Self {
         let (pixels, rest) = bytes.as_chunks::<3>();
         let rows = pixels.len() / columns.max(1);
         assert!(
@@ -107,8 +98,8 @@ impl Picture {
     }
 
     /// Rows and columns.
-    #[must_use]
-    pub fn size(&self) -> [usize; 2] {
+    #[cfg(any(feature = "bench", test))]
+    pub(crate) fn size(&self) -> [usize; 2] {
         [self.rows, self.columns]
     }
 
@@ -117,31 +108,17 @@ impl Picture {
     /// # Panics
     ///
     /// If the pixel lies outside the picture.
-    #[must_use]
-    pub fn at(&self, row: usize, column: usize) -> Colour {
+    #[cfg(any(feature = "bench", test))]
+    pub(crate) fn at(&self, row: usize, column: usize) -> Colour {
         assert!(column < self.columns, "a column of the picture");
         self.pixels[row * self.columns + column]
-    }
-
-    /// The middle of the picture, no larger than that many rows and columns.
-    #[must_use]
-    pub fn middle(&self, rows: usize, columns: usize) -> Self {
-        let (rows, columns) = (rows.min(self.rows), columns.min(self.columns));
-        let (top, left) = ((self.rows - rows) / 2, (self.columns - columns) / 2);
-        let lines =
-            (top..top + rows).map(|row| &self.pixels[row * self.columns + left..][..columns]);
-        Self {
-            rows,
-            columns,
-            pixels: lines.flatten().copied().collect(),
-        }
     }
 
     /// Draws what labels say: the boxes of wakes and ships, the arms of wakes, their centrelines, and a cross at their
     /// tips. What is drawn is cut to the picture.
     ///
     /// Pixels of labels are those of the picture: draw before a caption is set above it.
-    pub fn draw_labels(&mut self, labels: &Labels) {
+    pub(crate) fn draw_labels(&mut self, labels: &Labels) {
         for labelled in &labels.ships {
             let wake = &labelled.wake;
             if let Some(frame) = wake.box_px {
@@ -214,8 +191,7 @@ impl Picture {
     }
 
     /// The picture with lines of text above it, broken where they are too long; letters that the font lacks are blank.
-    #[must_use]
-    pub fn captioned(mut self, text: &str) -> Self {
+    pub(crate) fn captioned(mut self, text: &str) -> Self {
         let lines = broken(text, self.columns / LETTER);
         let above = lines.len() * LINE;
         let mut pixels = vec![PAPER; above * self.columns];
@@ -245,8 +221,7 @@ impl Picture {
     }
 
     /// Pictures beside each other, `across` in a row; each begins at the upper left of its place.
-    #[must_use]
-    pub fn sheet(pictures: &[Self], across: usize) -> Self {
+    pub(crate) fn sheet(pictures: &[Self], across: usize) -> Self {
         let across = across.clamp(1, pictures.len().max(1));
         let largest = |side: fn(&Self) -> usize| pictures.iter().map(side).max().unwrap_or(0);
         let (high, wide) = (largest(|p| p.rows), largest(|p| p.columns));
@@ -267,13 +242,28 @@ impl Picture {
         }
     }
 
-    /// Writes the picture as a PNG.
+    /// Writes the picture as a PNG; one without colours as a grey one, which is smaller and sooner packed.
+    ///
+    /// Mostly grey speckle: without filters the three equal bytes of a pixel compress to little more than one.
     ///
     /// # Errors
     ///
-    /// [`Error::File`](crate::Error::File).
-    pub fn write(&self, path: &Path) -> Result<()> {
-        write_rgb_png(path, self.pixels.as_flattened(), self.rows, self.columns)
+    /// [`Error::File`].
+    pub(crate) fn write(&self, path: &Path) -> wake_physics::Result<()> {
+        if self.pixels.iter().all(|[r, g, b]| r == g && g == b) {
+            let grey: Vec<u8> = self.pixels.iter().map(|[level, ..]| *level).collect();
+            return output::write_png(path, &grey, self.rows, self.columns);
+        }
+        let (pixels, mut bytes) = (self.pixels.as_flattened(), Vec::new());
+        let [width, height] = [self.columns, self.rows].map(|n| n as u32);
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::NoFilter)
+            .write_image(pixels, width, height, ExtendedColorType::Rgb8)
+            .map_err(|e| Error::File {
+                action: "encode",
+                path: path.to_owned(),
+                message: e.to_string(),
+            })?;
+        Ok(whole_files::write_atomically(path, &bytes)?)
     }
 }
 
@@ -298,7 +288,8 @@ fn broken(text: &str, letters: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
+    use image::ColorType;
+    use wake_physics::{Scene, labels_of};
 
     fn grey(rows: usize, columns: usize) -> Picture {
         Picture::from_levels(&vec![9; rows * columns], columns)
@@ -357,7 +348,7 @@ mod tests {
         let scene = Scene::default()
             .with_assignments(&["sea.wind_speed=3", "ship.heading=90", "ship.echo=true"])
             .unwrap();
-        let labels = crate::labels_of(&scene);
+        let labels = labels_of(&scene);
         let mut picture = grey(512, 512);
         picture.draw_labels(&labels);
         let wake = &labels.ships[0].wake;
@@ -409,8 +400,6 @@ mod tests {
         assert_eq!(sheet.at(0, 3 + GAP), [200; 3]);
         assert_eq!(sheet.at(2 + GAP, 2), [9; 3]);
         assert_eq!(Picture::sheet(&[], 3).size(), [0, 0]);
-        assert_eq!(sheet.middle(2, 3).size(), [2, 3]);
-        assert_eq!(grey(4, 4).middle(9, 2).size(), [4, 2]);
     }
 
     #[test]
@@ -421,6 +410,11 @@ mod tests {
         picture.draw_cross([3.0, 2.0], WAKE);
         picture.write(&path).unwrap();
         let read = image::open(&path).unwrap().into_rgb8();
+        let kinds = [(&picture, ColorType::Rgb8), (&grey(6, 7), ColorType::L8)];
+        for (picture, kind) in kinds {
+            picture.write(&path).unwrap();
+            assert_eq!(image::open(&path).unwrap().color(), kind);
+        }
         assert_eq!(read.dimensions(), (7, 6));
         assert_eq!(read.get_pixel(3, 2).0, WAKE);
         assert_eq!(read.get_pixel(0, 5).0, [9; 3]);

@@ -4,11 +4,9 @@
 use serde::Serialize;
 
 use super::profile::{Streak, WakeAxis, WakeProfile, wake_arms, wake_profile};
-use super::texture::{Texture, amplitude_correlation, texture};
-use crate::raster::Field;
-use crate::scene::Scene;
-use crate::simulate::Simulation;
-use crate::window::Window;
+use wake_physics::measure::{Texture, amplitude_correlation, texture};
+use wake_physics::window::Window;
+use wake_physics::{Field, Scene, Simulation};
 
 /// Side of the windows of open sea \[pixels\].
 const SIDE: usize = 256;
@@ -17,43 +15,42 @@ const STRETCHES: [[f64; 2]; 3] = [[25.0, 85.0], [85.0, 170.0], [170.0, 300.0]];
 
 /// What is measured in one image of amplitude.
 #[derive(Debug, Clone, Serialize)]
-pub struct ImageFigures {
+pub(crate) struct ImageFigures {
     /// Name of the image.
-    pub name: String,
+    pub(crate) name: String,
     /// What window, resolution and looks say of the speckle of a simulated image.
-    pub stated: Option<StatedSpeckle>,
+    pub(crate) stated: Option<StatedSpeckle>,
     /// The texture of its open sea, in windows of 256 pixels a side; `None` where no window holds sea alone.
-    pub texture: Option<Texture>,
+    pub(crate) texture: Option<Texture>,
     /// What lies across its wakes.
-    pub wakes: Vec<WakeFigures>,
+    pub(crate) wakes: Vec<WakeFigures>,
 }
 
 /// Speckle in closed form, see [`amplitude_correlation`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct StatedSpeckle {
+pub(crate) struct StatedSpeckle {
     /// Independent looks that overlapping ones are worth.
-    pub looks: f64,
+    pub(crate) looks: f64,
     /// Correlation of amplitudes one, two and three pixels apart in a row.
-    pub along_rows: [f64; 3],
+    pub(crate) along_rows: [f64; 3],
     /// The same in a column.
-    pub along_columns: [f64; 3],
+    pub(crate) along_columns: [f64; 3],
 }
 
 /// What lies across one wake, 25 to 85, 85 to 170 and 170 to 300 pixels from its tip.
 #[derive(Debug, Clone, Serialize)]
-pub struct WakeFigures {
+pub(crate) struct WakeFigures {
     /// Names of the image and of the wake in it.
-    pub name: String,
+    pub(crate) name: String,
     /// Dark line and bright streak of each stretch.
-    pub stretches: [Option<WakeProfile>; 3],
+    pub(crate) stretches: [Option<WakeProfile>; 3],
     /// Arms of each stretch, on either side of the axis.
-    pub arms: [[Option<Streak>; 2]; 3],
+    pub(crate) arms: [[Option<Streak>; 2]; 3],
 }
 
 impl ImageFigures {
     /// Those of a simulated image with speckle; its wakes are called by letters.
-    #[must_use]
-    pub fn of_simulation(name: &str, simulation: &Simulation) -> Self {
+    pub(crate) fn of_simulation(name: &str, simulation: &Simulation) -> Self {
         let mut amplitude = simulation.speckled.clone();
         amplitude.values.iter_mut().for_each(|v| *v = v.sqrt());
         let wakes = simulation.labels.ships.iter().map(|ship| &ship.wake);
@@ -76,8 +73,7 @@ impl ImageFigures {
     /// Those of an image that is linear in amplitude.
     ///
     /// - `wakes`: the axes of its wakes by their names
-    #[must_use]
-    pub fn of_amplitude(
+    pub(crate) fn of_amplitude(
         name: &str,
         amplitude: &Field,
         wakes: impl IntoIterator<Item = (String, WakeAxis)>,
@@ -100,8 +96,7 @@ impl StatedSpeckle {
     /// That of a scene's radar.
     ///
     /// - `spacing`: of the pixels \[m\]
-    #[must_use]
-    pub fn of(scene: &Scene, spacing: f64) -> Self {
+    pub(crate) fn of(scene: &Scene, spacing: f64) -> Self {
         let radar = &scene.radar;
         let window = radar.window.unwrap_or(Window::Uniform);
         let overlap = radar.look_overlap.unwrap_or(0.0);

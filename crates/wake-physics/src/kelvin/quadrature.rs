@@ -27,7 +27,8 @@ pub fn direct_quadrature(
     wake: &KelvinWake,
     transfer: &Transfer,
     quantities: &[Quantity],
-    (raster, pixels): (&Raster, &[[usize; 2]]),
+    raster: &Raster,
+    pixels: &[[usize; 2]],
     error: f64,
 ) -> Vec<Vec<f64>> {
     let steady = wake.steady_waves();
@@ -39,7 +40,7 @@ pub fn direct_quadrature(
         .par_iter()
         .map(|&[row, column]| {
             let seen = wake.track.seen_from_ship([raster.x(column), raster.y(row)]);
-            let integrand = |v: f64| integrand(wake, (transfer, quantities), seen, range, v);
+            let integrand = |v: f64| integrand(wake, transfer, quantities, seen, range, v);
             romberg(integrand, quantities.len(), error)
         })
         .collect();
@@ -52,7 +53,8 @@ pub fn direct_quadrature(
 /// then magnitudes.
 fn integrand(
     wake: &KelvinWake,
-    (transfer, quantities): (&Transfer, &[Quantity]),
+    transfer: &Transfer,
+    quantities: &[Quantity],
     [ahead, port]: [f64; 2],
     [from, to]: [f64; 2],
     v: f64,

@@ -1,12 +1,12 @@
 //! The correlation of a field's pixels, and Gaussian fields that have it.
 
-use crate::fft::{Synthesis, fast_length};
-use crate::raster::Field;
 use num_complex::Complex32;
+use wake_physics::Field;
+use wake_physics::waves::{fast_length, lattice_sum};
 
 /// Correlation of two pixels by their distance, up to some rows and columns apart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Correlation {
+pub(super) struct Correlation {
     lags: usize,
     /// `[lags + 1, 2 lags + 1]`: 0 to `lags` rows down, −`lags` to `lags` columns to the right.
     values: Vec<f32>,
@@ -15,8 +15,7 @@ pub struct Correlation {
 impl Correlation {
     /// The correlation of the pixels of a field, each distance by the mean over all pairs that far apart; `None` for a
     /// field of one value, or no larger than the lags.
-    #[must_use]
-    pub fn of(field: &Field, lags: usize) -> Option<Self> {
+    pub(super) fn of(field: &Field, lags: usize) -> Option<Self> {
         if field.rows <= lags || field.columns <= lags {
             return None;
         }
@@ -28,17 +27,16 @@ impl Correlation {
         }
         // With so many zeros around the field no pixel meets another around the edge.
         let [rows, columns] = [field.rows, field.columns].map(|n| fast_length(n + lags));
-        let synthesis = Synthesis::new(rows, columns);
         let mut waves = vec![Complex32::default(); rows * columns];
         for (i, line) in field.values.chunks_exact(field.columns).enumerate() {
             for (j, &value) in line.iter().enumerate() {
                 waves[j * rows + i].re = value - mean;
             }
         }
-        let [re, im] = sums(&synthesis, &mut waves, [rows, columns]);
+        let [re, im] = lattice_sum(&mut waves, [rows, columns], [rows, columns]);
         let power = re.iter().zip(&im).map(|(re, im)| re * re + im * im);
         let power: Vec<f32> = power.collect();
-        let sum = transposed_sum(&synthesis, &power, [rows, columns]);
+        let sum = transposed_sum(&power, [rows, columns]);
         let scale = 1.0 / (variance * (rows * columns) as f64);
         let value = |down: usize, right: isize| {
             let column = right.rem_euclid(columns as isize) as usize;
@@ -56,29 +54,20 @@ impl Correlation {
 
     /// A correlation of given values, `[lags + 1, 2 lags + 1]`: 0 to `lags` rows down, −`lags` to `lags` columns to the
     /// right; `None` for another number of them, for one outside −1 to 1, or one that is not 1 of a pixel with itself.
-    #[must_use]
-    pub fn new(lags: usize, values: Vec<f32>) -> Option<Self> {
+    pub(super) fn new(lags: usize, values: Vec<f32>) -> Option<Self> {
         let sound = values.len() == (lags + 1) * (2 * lags + 1)
             && values.iter().all(|v| (-1.0..=1.0).contains(v))
             && (values[lags] - 1.0).abs() < 1e-3;
         sound.then_some(Self { lags, values })
     }
 
-    /// Largest distance in rows, and in columns.
-    #[must_use]
-    pub fn lags(&self) -> usize {
-        self.lags
-    }
-
     /// All values, in the order of [`Self::new`].
-    #[must_use]
-    pub fn values(&self) -> &[f32] {
+    pub(super) fn values(&self) -> &[f32] {
         &self.values
     }
 
     /// Correlation of pixels so many rows and columns apart; 0 beyond the lags.
-    #[must_use]
-    pub fn at(&self, down: isize, right: isize) -> f32 {
+    pub(super) fn at(&self, down: isize, right: isize) -> f32 {
         // A pixel is as far from another as that one is from it.
         let [down, right] = if down < 0 {
             [-down, -right]
@@ -110,45 +99,16 @@ fn parzen(distance: isize, lags: usize) -> f64 {
     }
 }
 
-/// Real and imaginary part of a sum of waves.
-fn sums(
-    synthesis: &Synthesis<f32>,
-    waves: &mut [Complex32],
-    [rows, columns]: [usize; 2],
-) -> [Vec<f32>; 2] {
-    let [mut re, mut im] = [(); 2].map(|()| vec![0.0; rows * columns]);
-    synthesis.run(waves, [rows, columns], (&mut re, &mut im), |_, _| {});
-    [re, im]
-}
-
 /// Real part of the sum of waves of amplitudes `[rows, columns]`.
-fn transposed_sum(
-    synthesis: &Synthesis<f32>,
-    amplitudes: &[f32],
-    [rows, columns]: [usize; 2],
-) -> Vec<f32> {
+fn transposed_sum(amplitudes: &[f32], [rows, columns]: [usize; 2]) -> Vec<f32> {
     let mut waves = vec![Complex32::default(); rows * columns];
     for (i, line) in amplitudes.chunks_exact(columns).enumerate() {
         for (j, &value) in line.iter().enumerate() {
             waves[j * rows + i].re = value;
         }
     }
-    let [re, _] = sums(synthesis, &mut waves, [rows, columns]);
+    let [re, _] = lattice_sum(&mut waves, [rows, columns], [rows, columns]);
     re
-}
-
-/// Real part of a sum of the waves `[columns, rows]` of a period, of which an image of `rows` and `columns` is looked at.
-pub(crate) fn real_sum(
-    mut waves: Vec<Complex32>,
-    [high, wide]: [usize; 2],
-    [rows, columns]: [usize; 2],
-) -> Field {
-    let [values, _] = sums(&Synthesis::new(high, wide), &mut waves, [rows, columns]);
-    Field {
-        rows,
-        columns,
-        values,
-    }
 }
 
 /// Gaussian noise of variance 1 whose pixels are correlated: a spectrum from the correlation, on a torus that is larger
@@ -167,7 +127,7 @@ pub(crate) fn real_sum(
 /// Estimation of Spectra" (the window); Dietrich & Newsam (1997), "Fast and Exact Simulation of Stationary Gaussian
 /// Processes through Circulant Embedding of the Covariance Matrix".
 #[derive(Debug, Clone)]
-pub struct CorrelatedNoise {
+pub(super) struct CorrelatedNoise {
     size: [usize; 2],
     /// Pixels of a period, rows and columns.
     period: [usize; 2],
@@ -177,8 +137,7 @@ pub struct CorrelatedNoise {
 
 impl CorrelatedNoise {
     /// The noise of an image of `rows` and `columns`, at least 1 each; its opposite edges are independent.
-    #[must_use]
-    pub fn new(correlation: &Correlation, rows: usize, columns: usize) -> Self {
+    pub(super) fn new(correlation: &Correlation, rows: usize, columns: usize) -> Self {
         let lags = correlation.lags;
         let [high, wide] = [rows, columns].map(|n| fast_length((n + lags).max(2 * lags + 1)));
         let mut windowed = vec![0.0; high * wide];
@@ -193,8 +152,7 @@ impl CorrelatedNoise {
                 windowed[i * wide + j] = correlation.at(down, right) * window as f32;
             }
         }
-        let synthesis = Synthesis::new(high, wide);
-        let power = transposed_sum(&synthesis, &windowed, [high, wide]);
+        let power = transposed_sum(&windowed, [high, wide]);
         // The mean of P is the variance, so that some of it is above 0.
         let total: f64 = power.iter().map(|&p| f64::from(p.max(0.0))).sum();
         let mut amplitudes = vec![0.0; high * wide];
@@ -210,8 +168,7 @@ impl CorrelatedNoise {
     }
 
     /// Independent standard normal numbers that [`field`](Self::field) is made of.
-    #[must_use]
-    pub fn normals(&self) -> usize {
+    pub(super) fn normals(&self) -> usize {
         2 * self.amplitudes.len()
     }
 
@@ -220,12 +177,17 @@ impl CorrelatedNoise {
     /// # Panics
     ///
     /// If there are fewer numbers than [`normals`](Self::normals).
-    #[must_use]
-    pub fn field(&self, normals: &[f32]) -> Field {
+    pub(super) fn field(&self, normals: &[f32]) -> Field {
         let pairs = normals[..self.normals()].as_chunks::<2>().0;
         let waves = self.amplitudes.iter().zip(pairs);
         let waves = waves.map(|(&a, &[re, im])| Complex32::new(a * re, a * im));
-        real_sum(waves.collect(), self.period, self.size)
+        let [rows, columns] = self.size;
+        let [values, _] = lattice_sum(&mut waves.collect::<Vec<_>>(), self.period, self.size);
+        Field {
+            rows,
+            columns,
+            values,
+        }
     }
 }
 
