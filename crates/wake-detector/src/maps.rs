@@ -114,22 +114,51 @@ impl Maps {
         }
         let centre = 0.5 * (STRIDE as f32 - 1.0);
         let length = LENGTH_UNIT * self.map(Map::Length)[at].clamp(-3.0, 2.5).exp();
+        let axis_deg = (first + pull / total).rem_euclid(360.0);
+        let wake = Wake {
+            tip: cell.map(|x| STRIDE as f32 * x + centre),
+            axis_deg,
+            half_angle_deg: (ANGLE_UNIT * self.map(Map::HalfAngle)[at]).clamp(0.0, 30.0),
+            length,
+            snr: f32::INFINITY,
+            contrast_db: None,
+        };
+        let score = self.map(Map::Tip)[at] * support;
         Detection {
-            score: self.map(Map::Tip)[at] * support,
-            wake: Wake {
-                tip: cell.map(|x| STRIDE as f32 * x + centre),
-                axis_deg: (first + pull / total).rem_euclid(360.0),
-                half_angle_deg: (ANGLE_UNIT * self.map(Map::HalfAngle)[at]).clamp(0.0, 30.0),
-                length,
-                snr: f32::INFINITY,
-                contrast_db: None,
-            },
+            forward: Some(self.forward(cell, axis_deg)),
+            ..Detection::new(score, wake)
         }
+    }
+
+    /// Mean agreement of the lines on a ray with its direction, weighted with how much line there is.
+    fn forward(&self, cell: [f32; 2], angle: f32) -> f32 {
+        let [right, down] = direction(angle);
+        let (mut sum, mut total) = (0.0, 1e-6);
+        for i in self.cells(cell, angle) {
+            let (dx, dy) = (self.map(Map::LineRight)[i], self.map(Map::LineDown)[i]);
+            sum += self.map(Map::Line)[i] * (dx * right + dy * down).clamp(-1.0, 1.0);
+            total += self.map(Map::Line)[i];
+        }
+        sum / total
+    }
+
+    /// The cells of a ray from behind its tip to the border.
+    fn cells(&self, [x, y]: [f32; 2], angle: f32) -> impl Iterator<Item = usize> + use<> {
+        let [right, down] = direction(angle);
+        let (rows, columns) = (self.rows, self.columns);
+        let cell = move |k: usize| {
+            let column = (x + k as f32 * right).round();
+            let row = (y + k as f32 * down).round();
+            let inside =
+                column >= 0.0 && row >= 0.0 && column < columns as f32 && row < rows as f32;
+            inside.then(|| row as usize * columns + column as usize)
+        };
+        (SKIPPED..LONGEST).map_while(cell)
     }
 
     /// How much of a ray is a line that runs its way: the best mean over its first part, short ones at a loss; and the
     /// sum over all of it.
-    fn support(&self, [x, y]: [f32; 2], angle: f32) -> [f32; 2] {
+    fn support(&self, cell: [f32; 2], angle: f32) -> [f32; 2] {
         let [right, down] = direction(angle);
         let (line, to_right, to_down) = (
             self.map(Map::Line),
@@ -137,16 +166,7 @@ impl Maps {
             self.map(Map::LineDown),
         );
         let (mut sum, mut best, mut count) = (0.0, 0.0f32, 0.0);
-        for k in SKIPPED..LONGEST {
-            let (column, row) = (
-                (x + k as f32 * right).round(),
-                (y + k as f32 * down).round(),
-            );
-            if column < 0.0 || row < 0.0 || column >= self.columns as f32 || row >= self.rows as f32
-            {
-                break;
-            }
-            let i = row as usize * self.columns + column as usize;
+        for i in self.cells(cell, angle) {
             let (dx, dy) = (to_right[i], to_down[i]);
             let agreement = (dx * right + dy * down) / dx.hypot(dy).max(0.3);
             sum += line[i] * agreement;
@@ -294,7 +314,7 @@ mod tests {
         let found = |wakes: Vec<Wake>| {
             let all = wakes
                 .into_iter()
-                .map(|wake| Detection { score: 0.5, wake })
+                .map(|wake| Detection::new(0.5, wake))
                 .collect();
             without_repeats(all, 40.0)
         };
