@@ -38,6 +38,8 @@ pub struct Detector {
 const NAME: &str = "detector.safetensors";
 const WEIGHTS: &[u8] = include_bytes!("../assets/detector.safetensors");
 const CALIBRATION: &str = include_str!("../assets/detector.calibration.json");
+/// Detections with lower scores are not told, unless they are asked for.
+const LEAST_SCORE: f32 = 0.03;
 /// Score from which on a detection counts as found where no calibration says one.
 const UNCALIBRATED: f32 = 0.25;
 
@@ -101,7 +103,7 @@ impl Detector {
             calibration: None,
             search: Search {
                 spacing: None,
-                least_score: 0.0,
+                least_score: LEAST_SCORE,
             },
         })
     }
@@ -147,7 +149,7 @@ impl Detector {
         Ok(self)
     }
 
-    /// The same detector with another least score that is told, 0 to 1; by default every detection is told.
+    /// The same detector with another least score that is told, 0 to 1, by default 0.03.
     ///
     /// # Errors
     ///

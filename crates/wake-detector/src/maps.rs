@@ -191,7 +191,10 @@ pub(crate) fn without_repeats(mut found: Vec<Detection>, near: f32) -> Vec<Detec
     });
     let mut kept: Vec<Detection> = Vec::new();
     for one in found {
-        if !kept.iter().any(|other| same(&other.wake, &one.wake, near)) {
+        let is_repeat = |other: &Detection| {
+            same(&other.wake, &one.wake, near) || reversed(&other.wake, &one.wake, near)
+        };
+        if !kept.iter().any(is_repeat) {
             kept.push(one);
         }
     }
@@ -206,6 +209,20 @@ const SAME_LINE: f32 = 16.0;
 /// follow.
 const HIDDEN: f32 = 2.5;
 const FOLLOWING: f32 = 5.0;
+
+/// The axis of a wake that is followed from its end differs from the opposite one by less \[deg\].
+const OPPOSITE: f32 = 15.0;
+
+/// Whether a weaker wake is a stronger one, followed from its end to its tip: a line begins once.
+fn reversed(strong: &Wake, weak: &Wake, near: f32) -> bool {
+    let turn = (strong.axis_deg - weak.axis_deg).rem_euclid(360.0) - 180.0;
+    let (dx, dy) = (weak.tip[0] - strong.tip[0], weak.tip[1] - strong.tip[1]);
+    let [right, down] = strong.direction();
+    let (along, across) = (dx * right + dy * down, dy * right - dx * down);
+    turn.abs() < OPPOSITE
+        && across.abs() < SAME_LINE
+        && (0.0..strong.length + HIDDEN * near).contains(&along)
+}
 
 /// Whether a weaker wake is a stronger one again.
 pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
@@ -302,6 +319,23 @@ mod tests {
             .for_each(|x| *x = -*x);
         let after = maps.detections()[0].score;
         assert!(before > 0.6 && after < 0.05, "{before} {after}");
+    }
+
+    /// A wake from (100, 100) to the right for 120 pixels: from its end back it is the same line; a ship that comes the other way on
+    /// another line, or beyond the end, is another one.
+    #[test]
+    fn a_line_that_is_followed_both_ways_is_told_once() {
+        let kept = |tip: [f32; 2], axis_deg: f32| {
+            let both = vec![
+                Detection::new(0.9, wake([100.0, 100.0], 90.0)),
+                Detection::new(0.5, wake(tip, axis_deg)),
+            ];
+            without_repeats(both, 40.0).len()
+        };
+        assert_eq!(kept([225.0, 104.0], 265.0), 1);
+        assert_eq!(kept([225.0, 104.0], 240.0), 2);
+        assert_eq!(kept([225.0, 140.0], 270.0), 2);
+        assert_eq!(kept([400.0, 100.0], 270.0), 2);
     }
 
     #[test]
