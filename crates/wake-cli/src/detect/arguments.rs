@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// Weights of the network, by default those in the repository
     #[arg(long, value_name = "FILE")]
     pub(super) weights: Option<PathBuf>,
-    /// Least score that is told, 0 to 1; from 0.25 on there are few false alarms
+    /// Leave out detections with a lower score, 0 to 1
     #[arg(long, default_value_t = 0.03, value_parser = named::score)]
     pub(super) least_score: f32,
     /// Print the wakes as JSON, and nothing else
