@@ -2,7 +2,8 @@
 
 use super::layout::{Layout, Manifest, broken, cannot};
 use super::metadata::{Rows, parse};
-use super::pair::{Grey, Pair};
+use super::grey::Grey;
+use super::pair::Pair;
 use super::shuffle::shuffled;
 use crate::error::Result;
 use image::ImageFormat;

@@ -1,5 +1,6 @@
 //! Scene number `index` of a recipe: a pure function.
 
+use super::delivery::Delivery;
 use super::recipe::{Draw, Recipe};
 use crate::error::Result;
 use crate::sea::Sea;
@@ -102,6 +103,14 @@ impl Simulated {
         match &self.recipe.draw {
             Draw::PaperGrid => None,
             Draw::Values(draws) => draws.quick_look(NoiseSource::new(self.seed), index),
+        }
+    }
+
+    /// How image number `index` is passed on; `None` where it is the product's own.
+    pub fn delivery(&self, index: u64) -> Option<Delivery> {
+        match &self.recipe.draw {
+            Draw::PaperGrid => None,
+            Draw::Values(draws) => draws.delivery(NoiseSource::new(self.seed), index),
         }
     }
 
