@@ -19,6 +19,7 @@ fn wake(hull: Hull, speed: f64, heading: f64) -> KelvinWake {
         track: Track::new([0.0, 0.0], heading, 0.0),
         depth: f64::INFINITY,
         filter_depth: 0.0,
+        steepness: None,
     }
 }
 
