@@ -419,8 +419,12 @@ pub enum Sensor {
     TerraSarXSm,
     #[serde(rename = "cosmo-skymed-hi")]
     CosmoSkyMedHi,
+    #[serde(rename = "cosmo-skymed-dgm")]
+    CosmoSkyMedDgm,
     #[serde(rename = "iceye-strip")]
     IceyeStrip,
+    #[serde(rename = "alos-fbs")]
+    AlosFbs,
     #[serde(rename = "alos-2-sm3")]
     Alos2Sm3,
     #[serde(rename = "alos-2-sm6")]

@@ -54,7 +54,7 @@ pub struct SensorMode {
 
 impl Sensor {
     /// Every sensor.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::Sentinel1Iw,
         Self::Sentinel1Ew,
         Self::TerraSarXSm,
@@ -66,6 +66,8 @@ impl Sensor {
         Self::Radarsat2S,
         Self::NovaSar1,
         Self::Ers2Pri,
+        Self::CosmoSkyMedDgm,
+        Self::AlosFbs,
     ];
 
     /// The numbers of the mode.
@@ -86,11 +88,13 @@ impl Sensor {
             Self::Radarsat2S => radarsat_2_s(),
             Self::NovaSar1 => novasar_1(),
             Self::Ers2Pri => ers_2_pri(),
+            Self::CosmoSkyMedDgm => cosmo_skymed_dgm(),
+            Self::AlosFbs => alos_fbs(),
         }
     }
 }
 
-/// Interferometric wide swath, ground range detected, high resolution.
+/// Interferometric wide swath, ground range detected, high resolution; alike on Sentinel-1A to 1D, whose radars and orbits are the same.
 ///
 /// Frequency, windows, looks and overlap (3.5 of 14.1 MHz), noise, pulse rate (of IW1) and resolution: annotation of a
 /// product of 12 June 2022. Azimuth is unwindowed, as its sea was measured.
@@ -161,6 +165,37 @@ fn cosmo_skymed_hi() -> SensorMode {
         looks: (1, 0.0),
         nesz: -20.0,
         prf: 3100.0,
+    }
+}
+
+/// Himage stripmap as delivered: detected, multi-looked to 5 m, in ground range (DGM). Resolution, spacing, looks: the mission's product
+/// description, quoted from memory, not verified. The rest as [`cosmo_skymed_hi`].
+fn cosmo_skymed_dgm() -> SensorMode {
+    SensorMode {
+        spacing: 2.5,
+        range_resolution: RangeResolution::Ground(5.0),
+        azimuth_resolution: 5.0,
+        looks: (3, 0.0),
+        ..cosmo_skymed_hi()
+    }
+}
+
+/// Fine beam single of PALSAR on ALOS, level 1.5. Frequency, altitude, incidence, spacing, resolution, looks, noise: the user
+/// handbook of 2008, quoted from memory, not verified. Windows, pulse rate: chosen.
+fn alos_fbs() -> SensorMode {
+    SensorMode {
+        frequency: 1.27e9,
+        polarization: Polarization::HH,
+        altitude: 691.65e3,
+        incidence: 38.7,
+        incidence_range: [8.0, 60.0],
+        spacing: 6.25,
+        range_resolution: slant(10.0, 38.7),
+        azimuth_resolution: 10.0,
+        windows: [Window::Hamming(0.75); 2],
+        looks: (2, 0.0),
+        nesz: -23.0,
+        prf: 2100.0,
     }
 }
 
