@@ -39,7 +39,7 @@ impl Delivery {
 
     /// Pixels along an axis of the product that carry `count` delivered pixels and the blocks around them.
     fn product_pixels(&self, count: usize) -> usize {
-        let half = (count.div_ceil(2) + BLOCK) as f64 / self.resize;
+        let half = (count.div_ceil(2) + 2 * BLOCK) as f64 / self.resize;
         2 * (half + REACH * self.widening()).ceil() as usize + 2
     }
 

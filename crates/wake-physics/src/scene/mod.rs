@@ -138,7 +138,7 @@ pub struct Sea {
 const DEFAULT_MOTTLE: f64 = 250.0;
 
 fn is_default_mottle(scale: &f64) -> bool {
-    *scale == DEFAULT_MOTTLE
+    scale.to_bits() == DEFAULT_MOTTLE.to_bits()
 }
 
 impl Default for Sea {
@@ -251,7 +251,7 @@ pub struct Ship {
 const DEFAULT_DAMPING: f64 = 0.6;
 
 fn is_default_damping(damping: &f64) -> bool {
-    *damping == DEFAULT_DAMPING
+    damping.to_bits() == DEFAULT_DAMPING.to_bits()
 }
 
 impl Default for Ship {

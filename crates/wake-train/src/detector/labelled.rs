@@ -1,7 +1,7 @@
 //! Squares of labelled images, for fine-tuning with a few real labels.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use wake_dataset::{Grey, Pair, Source};
 use wake_detector::{GreyImage, Wake};
@@ -167,31 +167,31 @@ pub(crate) fn source(images: &LabelledImages, seed: u64, size: usize) -> Result<
     Labelled::new(images.read()?, seed, size)
 }
 
-/// A folder with images of one wake each, drawn as a bright line: for tests.
-#[cfg(test)]
-pub(crate) fn folder_of(names: &[&str], folder: &Path) {
-    let mut images = Vec::new();
-    for name in names {
-        let mut image = image::GrayImage::from_pixel(120, 100, image::Luma([50]));
-        for n in 0..60 {
-            image.put_pixel(30 + n, 40, image::Luma([200]));
-        }
-        image.save(folder.join(name)).unwrap();
-        images.push(format!(
-            r#""{name}": {{"width": 120, "height": 100, "wakes": [
-                {{"tip": [30, 40], "axis_deg": 90, "length_px": 60, "confidence": "clear"}}]}}"#
-        ));
-    }
-    let text = format!(r#"{{"images": {{{}}}}}"#, images.join(", "));
-    std::fs::write(folder.join("labels.json"), text).unwrap();
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::detector::Sample;
+    use std::path::Path;
 
     const NAMES: [&str; 4] = ["a.png", "b.png", "c.png", "d.png"];
+
+    /// A folder with images of one wake each, drawn as a bright line.
+    fn folder_of(names: &[&str], folder: &Path) {
+        let mut images = Vec::new();
+        for name in names {
+            let mut image = image::GrayImage::from_pixel(120, 100, image::Luma([50]));
+            for n in 0..60 {
+                image.put_pixel(30 + n, 40, image::Luma([200]));
+            }
+            image.save(folder.join(name)).unwrap();
+            images.push(format!(
+                r#""{name}": {{"width": 120, "height": 100, "wakes": [
+                    {{"tip": [30, 40], "axis_deg": 90, "length_px": 60, "confidence": "clear"}}]}}"#
+            ));
+        }
+        let text = format!(r#"{{"images": {{{}}}}}"#, images.join(", "));
+        std::fs::write(folder.join("labels.json"), text).unwrap();
+    }
 
     fn names(images: &LabelledImages) -> Vec<String> {
         let tiles = images.read().unwrap();
