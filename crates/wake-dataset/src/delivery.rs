@@ -80,7 +80,8 @@ impl Delivery {
                 .collect()
         };
         let (down, right) = (taps(0, product.rows), taps(1, product.columns));
-        let along = |row: &[f32]| -> Vec<f32> { right.iter().map(|taps| taps.of(row, 1)).collect() };
+        let along =
+            |row: &[f32]| -> Vec<f32> { right.iter().map(|taps| taps.of(row, 1)).collect() };
         let lines: Vec<f32> = product
             .pixels
             .chunks_exact(product.columns.max(1))

@@ -1,8 +1,8 @@
 //! A data set on disk, read back, once or again and again.
 
+use super::grey::Grey;
 use super::layout::{Layout, Manifest, broken, cannot};
 use super::metadata::{Rows, parse};
-use super::grey::Grey;
 use super::pair::Pair;
 use super::shuffle::shuffled;
 use crate::error::Result;

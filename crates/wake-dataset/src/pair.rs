@@ -126,24 +126,26 @@ mod tests {
             "draw.delivery.quality = [80, 95]",
         ];
         let recipe = Recipe::default().with_assignments(&changes).unwrap();
-        let plain = recipe.with_assignments(&["draw.delivery.resize = 1", "draw.delivery.quality = 0"]);
+        let plain =
+            recipe.with_assignments(&["draw.delivery.resize = 1", "draw.delivery.quality = 0"]);
         let (source, plain) = (
             Simulated::new(recipe, 5).unwrap(),
             Simulated::new(plain.unwrap(), 5).unwrap(),
         );
         for index in 0..6 {
             let pair = source.pair(index).unwrap();
-            // Two pixels along the mean of 20.3 and 18.4 m.
-            assert!((pair.scene.grid.spacing - 9.66).abs() < 1e-9);
+            // Two pixels along the mean of 20.3 and 17.2 m.
+            assert!((pair.scene.grid.spacing - 9.34).abs() < 1e-9);
             assert_eq!(pair.scene, plain.scene(index).unwrap());
             let (image, other) = (&pair.image, plain.pair(index).unwrap().image);
             assert_eq!((image.rows, image.columns), (72, 61));
             assert_ne!(*image, other);
-            let brightest = (0..72 * 61).max_by(|&a, &b| image.pixels[a].total_cmp(&image.pixels[b]));
+            let brightest =
+                (0..72 * 61).max_by(|&a, &b| image.pixels[a].total_cmp(&image.pixels[b]));
             let brightest = brightest.unwrap();
             let [column, row] = pair.labels.ships[0].ship.echo_px.unwrap();
             let off = (column - (brightest % 61) as f64).hypot(row - (brightest / 61) as f64);
-            assert!(off < 60.0 / 9.66 + 3.0, "{index}: {off}");
+            assert!(off < 60.0 / 9.34 + 3.0, "{index}: {off}");
         }
     }
 

@@ -651,13 +651,15 @@ mod tests {
                 let range = scene.radar.range_resolution.unwrap();
                 (range * scene.radar.azimuth_resolution).sqrt() / scene.grid.spacing
             };
-            if scene.grid.spacing != other.grid.spacing {
+            if scene.grid.spacing.to_bits() != other.grid.spacing.to_bits() {
                 fine += 1;
                 // Steps of 1 cm in pixels of 1.5 m and more.
                 assert!((0.99..=3.83).contains(&cell(&scene)), "{}", cell(&scene));
             }
             let ships = || scene.ships.iter();
-            assert!(ships().all(|ship| ship.recovery == Recovery::Wind && ship.steepness.is_some()));
+            assert!(
+                ships().all(|ship| ship.recovery == Recovery::Wind && ship.steepness.is_some())
+            );
             turning += usize::from(ships().any(|ship| ship.turn_rate != 0.0));
             hardly_dark += usize::from(ships().any(|ship| ship.damping < 0.21));
             mottled += usize::from(scene.sea.mottle_strength > 0.0);
@@ -665,7 +667,10 @@ mod tests {
         // Five standard deviations of a binomial count.
         let share = |found: usize, share: f64| {
             let error = (share * (1.0 - share) / count as f64).sqrt();
-            assert!((found as f64 / count as f64 - share).abs() < 5.0 * error, "{found}");
+            assert!(
+                (found as f64 / count as f64 - share).abs() < 5.0 * error,
+                "{found}"
+            );
         };
         share(fine, 0.75);
         share(mottled, 0.5);
@@ -688,9 +693,17 @@ mod tests {
         let refused = |text: &str| Recipe::from_toml(text).unwrap_err().to_string();
         let message = refused("[draw]\n\"delivery.pixels\" = [1, 3]");
         assert!(message.contains("radar.range_resolution"), "{message}");
-        for (key, value) in [("pixels", "17"), ("resize", "0.2"), ("quality", "101"), ("quality", "0.5")] {
+        for (key, value) in [
+            ("pixels", "17"),
+            ("resize", "0.2"),
+            ("quality", "101"),
+            ("quality", "0.5"),
+        ] {
             let message = refused(&format!("[draw]\n\"delivery.{key}\" = {value}"));
-            assert!(message.contains(&format!("draw.delivery.{key}")), "{message}");
+            assert!(
+                message.contains(&format!("draw.delivery.{key}")),
+                "{message}"
+            );
         }
     }
 }

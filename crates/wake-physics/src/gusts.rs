@@ -114,7 +114,8 @@ impl Gusts {
         let (along, across) = (kx * sin + ky * cos, kx * cos - ky * sin);
         let (power, elongation) = (self.kind.power(), self.kind.elongation());
         let outer = TAU / self.scale;
-        let norm = self.strength * self.strength * outer.powf(2.0 * (power - 1.0)) * (power - 1.0) / PI;
+        let norm =
+            self.strength * self.strength * outer.powf(2.0 * (power - 1.0)) * (power - 1.0) / PI;
         let square = (elongation * along).powi(2) + across * across + outer * outer;
         norm * elongation * square.powf(-power)
     }
@@ -328,7 +329,10 @@ mod tests {
             };
             let sum: f64 = (-count..=count).map(row).sum::<f64>() * step * step;
             let expected = 0.0064 * (-outer * distance).exp();
-            assert!((sum - expected).abs() < 0.013 * 0.0064, "{distance}: {sum} {expected}");
+            assert!(
+                (sum - expected).abs() < 0.013 * 0.0064,
+                "{distance}: {sum} {expected}"
+            );
         }
         let raster = Raster::image(60, 60, 10.0);
         let other = Gusts {

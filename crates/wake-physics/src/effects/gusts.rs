@@ -54,7 +54,12 @@ impl Effect for GustField {
     fn change_sigma0(&self, site: &Site<'_>, sigma0: &mut Field, _: Option<&Field>) {
         for (gusts, drawn) in &self.gusts {
             let draw = || gusts.coarse_field(&site.whole, site.scene.seed);
-            gusts.modulate_strip(sigma0, site.first_row, drawn.get_or_init(draw), self.exponent);
+            gusts.modulate_strip(
+                sigma0,
+                site.first_row,
+                drawn.get_or_init(draw),
+                self.exponent,
+            );
         }
     }
 }

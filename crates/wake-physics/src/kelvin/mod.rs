@@ -149,8 +149,8 @@ impl KelvinWake {
         };
         let mean = (0..INTERFERENCE).map(square).sum::<f64>() / INTERFERENCE as f64;
         let cosh = (wavenumber / shortest).sqrt().max(1.0);
-        let squared = 8.0 * wavenumber.powi(4) * mean
-            / (std::f64::consts::PI * shortest * length * cosh);
+        let squared =
+            8.0 * wavenumber.powi(4) * mean / (std::f64::consts::PI * shortest * length * cosh);
         (1.0 + squared / (limit * limit)).powf(-0.5)
     }
 }

@@ -136,8 +136,8 @@ impl DarkLine {
 mod tests {
     use super::DarkLine;
     use crate::track::Track;
-    use crate::turbulent::{Suppression, TurbulentWake};
     use crate::turbulent::current::{EdgeResponse, WakeCurrent, WakeEdge};
+    use crate::turbulent::{Suppression, TurbulentWake};
 
     /// The mean square over windows across the track, by sums over the damping itself and a Gaussian smear, at places
     /// ten times closer. The window's 16 places leave a thousandth where it is no wider than the line.

@@ -53,7 +53,11 @@ impl ShortWaves {
         let [from, to] = models.subpixel_band();
         let band = [if drawn(Term::Kelvin) { 0.0 } else { from }, to];
         (mean > 0.0).then(|| Self {
-            waves: models.wakes.iter().map(|wake| wake.subpixel(band)).collect(),
+            waves: models
+                .wakes
+                .iter()
+                .map(|wake| wake.subpixel(band))
+                .collect(),
             backscatter,
             mean,
             table: OnceLock::new(),

@@ -4,11 +4,6 @@
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serializer};
 
-/// Whether a value is 0, which files leave out.
-pub(super) fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
 /// A depth as a number, or "infinite".
 pub(super) mod depth {
     use super::{Deserialize, Deserializer, Serializer};

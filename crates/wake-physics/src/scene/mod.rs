@@ -113,10 +113,8 @@ pub struct Sea {
     pub gust_scale: f64,
     /// Standard deviation of the logarithm of the wind speed in the eddies of the surface layer \[1\], 0 to 0.5; 0: none. See
     /// [`crate::gusts`].
-    #[serde(skip_serializing_if = "forms::is_zero")]
     pub mottle_strength: f64,
     /// Outer scale of these eddies \[m\], 20 to 5000.
-    #[serde(skip_serializing_if = "is_default_mottle")]
     pub mottle_scale: f64,
     /// Significant height of a swell \[m\], 0 to 15; 0: none. See [`crate::swell`].
     pub swell_height: f64,
@@ -134,13 +132,6 @@ pub struct Sea {
     pub slick_scale: f64,
 }
 
-/// Outer scale of the surface layer's eddies \[m\]: the wavelength of the peak of Kaimal's spectrum 10 m above the sea, rounded.
-const DEFAULT_MOTTLE: f64 = 250.0;
-
-fn is_default_mottle(scale: &f64) -> bool {
-    scale.to_bits() == DEFAULT_MOTTLE.to_bits()
-}
-
 impl Default for Sea {
     fn default() -> Self {
         Self {
@@ -156,7 +147,7 @@ impl Default for Sea {
             gust_strength: 0.0,
             gust_scale: 2000.0,
             mottle_strength: 0.0,
-            mottle_scale: DEFAULT_MOTTLE,
+            mottle_scale: 250.0,
             swell_height: 0.0,
             swell_length: 200.0,
             swell_toward: 0.0,
@@ -229,10 +220,8 @@ pub struct Ship {
     pub steepness: Option<f64>,
     /// Damping of the Bragg waves at the stern in the middle of the turbulent wake \[1\], 0 to 1; with `recovery = "wind"` in a
     /// wind of 5 m/s. See [`crate::turbulent`].
-    #[serde(skip_serializing_if = "is_default_damping")]
     pub damping: f64,
     /// How damping and edges of the turbulent wake follow the wind.
-    #[serde(skip_serializing_if = "Recovery::is_constant")]
     pub recovery: Recovery,
     /// Whether the turbulent wake has a current and bright edges. See [`crate::turbulent::current`].
     pub edge: bool,
@@ -245,13 +234,6 @@ pub struct Ship {
     /// Standard deviation of the line-of-sight velocity of points on the ship by roll and pitch [m/s], 0 to 2; only with
     /// [`Self::echo`].
     pub roll: f64,
-}
-
-/// Damping at the stern \[1\], that is −4 dB: chosen, as [`crate::turbulent::STERN_DAMPING`].
-const DEFAULT_DAMPING: f64 = 0.6;
-
-fn is_default_damping(damping: &f64) -> bool {
-    damping.to_bits() == DEFAULT_DAMPING.to_bits()
 }
 
 impl Default for Ship {
@@ -269,7 +251,7 @@ impl Default for Ship {
             echo: false,
             filter_depth: 0.0,
             steepness: None,
-            damping: DEFAULT_DAMPING,
+            damping: 0.6,
             recovery: Recovery::Constant,
             edge: false,
             edge_time: None,
@@ -304,12 +286,6 @@ pub enum Recovery {
     Constant,
     /// The wind restores the damped waves: damping, its length and the response of the edges fall with wind.
     Wind,
-}
-
-impl Recovery {
-    fn is_constant(&self) -> bool {
-        *self == Self::Constant
-    }
 }
 
 /// Form of the hull.

@@ -4,7 +4,9 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 use wake_physics::Scene;
 use wake_physics::constants::GRAVITY;
-use wake_physics::scene::{Grid, HullForm, Model, Polarization, Radar, Recovery, Sea, Sensor, Ship};
+use wake_physics::scene::{
+    Grid, HullForm, Model, Polarization, Radar, Recovery, Sea, Sensor, Ship,
+};
 use wake_physics::scene::{SpectrumModel, SpreadingModel, Term, TermRule, Terms};
 use wake_physics::window::Window;
 

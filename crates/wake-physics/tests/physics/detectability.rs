@@ -61,7 +61,13 @@ fn arms(wake: &WakeLabel) -> f64 {
 
 fn grid() -> Vec<Seen> {
     let mut all = Vec::new();
-    let counts = [WIND.len(), SPEED.len(), LENGTH.len(), HEADING.len(), INCIDENCE.len()];
+    let counts = [
+        WIND.len(),
+        SPEED.len(),
+        LENGTH.len(),
+        HEADING.len(),
+        INCIDENCE.len(),
+    ];
     for n in 0..counts.iter().product() {
         let mut left: usize = n;
         let places = counts.map(|count| {
@@ -109,25 +115,39 @@ fn visibility_follows_the_published_trends() {
     let grid = grid();
     let all: Vec<&Seen> = grid.iter().collect();
     let of = |axis: usize, count: usize| {
-        let share = means(&all, axis, count, |seen| f64::from(u8::from(seen.whole > 0.0)));
+        let share = means(&all, axis, count, |seen| {
+            f64::from(u8::from(seen.whole > 0.0))
+        });
         let whole = means(&all, axis, count, |seen| seen.whole);
         let arms = means(&all, axis, count, |seen| seen.arms);
         println!("{axis}: share {share:.2?}, length {whole:.0?}, arms {arms:.0?}");
         (share, whole, arms)
     };
     let (share, whole, arms) = of(0, WIND.len());
-    assert!(falls(&share) && falls(&whole) && falls(&arms), "wind: {share:?} {whole:?} {arms:?}");
+    assert!(
+        falls(&share) && falls(&whole) && falls(&arms),
+        "wind: {share:?} {whole:?} {arms:?}"
+    );
     for (axis, count, name) in [(1, SPEED.len(), "speed"), (2, LENGTH.len(), "length")] {
         let (share, whole, arms) = of(axis, count);
-        assert!(rises(&share) && rises(&whole) && rises(&arms), "{name}: {share:?} {whole:?} {arms:?}");
+        assert!(
+            rises(&share) && rises(&whole) && rises(&arms),
+            "{name}: {share:?} {whole:?} {arms:?}"
+        );
     }
     let (share, whole, arms) = of(3, HEADING.len());
     assert!(falls(&arms), "course: {share:?} {whole:?} {arms:?}");
     let (share, whole, arms) = of(4, INCIDENCE.len());
-    assert!(falls(&share) && falls(&whole) && falls(&arms), "incidence: {share:?} {whole:?} {arms:?}");
+    assert!(
+        falls(&share) && falls(&whole) && falls(&arms),
+        "incidence: {share:?} {whole:?} {arms:?}"
+    );
     // At every course the wake is seen less far the stronger the wind.
     for course in 0..HEADING.len() {
-        let here: Vec<&Seen> = grid.iter().filter(|seen| seen.places[3] == course).collect();
+        let here: Vec<&Seen> = grid
+            .iter()
+            .filter(|seen| seen.places[3] == course)
+            .collect();
         let whole = means(&here, 0, WIND.len(), |seen| seen.whole);
         assert!(falls(&whole), "course {}: {whole:?}", HEADING[course]);
     }

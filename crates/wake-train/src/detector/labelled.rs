@@ -116,7 +116,10 @@ impl Labelled {
         };
         let [left, top] = corner.map(|c| c.floor() as usize);
         let levels = image.window(top, left, self.size, self.size);
-        let levels: Vec<u8> = levels.iter().map(|l| l.round().clamp(0.0, 255.0) as u8).collect();
+        let levels: Vec<u8> = levels
+            .iter()
+            .map(|l| l.round().clamp(0.0, 255.0) as u8)
+            .collect();
         let here = |wake: &Wake| Wake {
             tip: [wake.tip[0] - left as f32, wake.tip[1] - top as f32],
             ..*wake
@@ -211,8 +214,14 @@ mod tests {
         assert_eq!(names(&images(Some("c.png"), Some(2))), ["d.png", "a.png"]);
         assert_eq!(names(&images(Some("a.png"), None)), NAMES[1..]);
         let unknown = images(Some("e.png"), None).read().unwrap_err().to_string();
-        assert!(unknown.contains("e.png") && unknown.contains("d.png"), "{unknown}");
-        let many = images(Some("a.png"), Some(4)).read().unwrap_err().to_string();
+        assert!(
+            unknown.contains("e.png") && unknown.contains("d.png"),
+            "{unknown}"
+        );
+        let many = images(Some("a.png"), Some(4))
+            .read()
+            .unwrap_err()
+            .to_string();
         assert!(many.contains("labelled images is 4"), "{many}");
     }
 

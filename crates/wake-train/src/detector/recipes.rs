@@ -131,7 +131,9 @@ impl ImageRecipe {
             Self::Echo => [&CALM, &NO_EDGE, &[]],
             Self::Edge => [&CALM, &[], &[]],
             Self::Satellites => [&[]; 3],
-            Self::Detector => return Ok(Arc::new(simulated(Recipe::detector()?, &[], seed, size)?)),
+            Self::Detector => {
+                return Ok(Arc::new(simulated(Recipe::detector()?, &[], seed, size)?));
+            }
             Self::Cluttered => {
                 let scenes = simulated(Recipe::detector()?, &[], seed, size)?;
                 return Ok(Arc::new(Cluttered::new(scenes)));
@@ -161,7 +163,12 @@ impl ImageRecipe {
         };
         let empty = ["draw.count = 0", "draw.sea.slick_damping = 0"];
         let changes = [&changes.concat()[..], &empty].concat();
-        Ok(Arc::new(simulated(Recipe::satellites()?, &changes, seed, size)?))
+        Ok(Arc::new(simulated(
+            Recipe::satellites()?,
+            &changes,
+            seed,
+            size,
+        )?))
     }
 }
 

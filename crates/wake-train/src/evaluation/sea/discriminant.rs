@@ -126,7 +126,9 @@ impl Line {
         }
         let apart = (0..count).map(|n| means[0][n] - means[1][n]).collect();
         Self {
-            middle: (0..count).map(|n| 0.5 * (means[0][n] + means[1][n])).collect(),
+            middle: (0..count)
+                .map(|n| 0.5 * (means[0][n] + means[1][n]))
+                .collect(),
             direction: solved(matrix, apart),
         }
     }
@@ -164,7 +166,11 @@ mod tests {
 
     #[test]
     fn a_system_is_solved() {
-        let matrix = vec![vec![4.0, 1.0, 0.5], vec![1.0, 3.0, -0.2], vec![0.5, -0.2, 2.0]];
+        let matrix = vec![
+            vec![4.0, 1.0, 0.5],
+            vec![1.0, 3.0, -0.2],
+            vec![0.5, -0.2, 2.0],
+        ];
         let x = solved(matrix.clone(), vec![1.0, -2.0, 0.3]);
         for (row, right) in matrix.iter().zip([1.0, -2.0, 0.3]) {
             let left: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();
@@ -203,7 +209,10 @@ mod tests {
             let row = rows.iter().find(|row| row.group.starts_with(name));
             row.expect("a row").accuracy
         };
-        assert!(accuracy("power") > 0.99 && accuracy("all") > 0.99, "{rows:?}");
+        assert!(
+            accuracy("power") > 0.99 && accuracy("all") > 0.99,
+            "{rows:?}"
+        );
         assert!(accuracy("mottle") < 0.9, "{rows:?}");
     }
 }

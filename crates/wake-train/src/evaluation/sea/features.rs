@@ -170,10 +170,19 @@ fn detail(window: &Field) -> Field {
         };
         (0..values.len()).map(mean).collect()
     };
-    let rows: Vec<f32> = window.values.chunks_exact(window.columns).flat_map(along).collect();
+    let rows: Vec<f32> = window
+        .values
+        .chunks_exact(window.columns)
+        .flat_map(along)
+        .collect();
     let mut values = window.values.clone();
     for j in 0..window.columns {
-        let column: Vec<f32> = rows.iter().skip(j).step_by(window.columns).copied().collect();
+        let column: Vec<f32> = rows
+            .iter()
+            .skip(j)
+            .step_by(window.columns)
+            .copied()
+            .collect();
         for (i, mean) in along(&column).into_iter().enumerate() {
             values[i * window.columns + j] -= mean;
         }
@@ -197,7 +206,10 @@ fn correlation(field: &Field, axis: Axis, lag: usize, variance: f64) -> f64 {
 }
 
 fn correlations(field: &Field, lags: &[usize], variance: f64) -> Vec<f64> {
-    let along = |axis| lags.iter().map(move |&lag| correlation(field, axis, lag, variance));
+    let along = |axis| {
+        lags.iter()
+            .map(move |&lag| correlation(field, axis, lag, variance))
+    };
     along(Axis::Rows).chain(along(Axis::Columns)).collect()
 }
 
@@ -325,7 +337,10 @@ mod tests {
         let smooth = filtered(&white, Axis::Rows, 0, 4);
         let found = of("lags", &smooth);
         // Binomial weights 1 4 6 4 1: (1 · 4 + 4 · 1) of 70 at lag 3, 1 of 70 at lag 4.
-        assert!((found[0] - 8.0 / 70.0).abs() < 0.06 && found[4].abs() < 0.06, "{found:?}");
+        assert!(
+            (found[0] - 8.0 / 70.0).abs() < 0.06 && found[4].abs() < 0.06,
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -341,6 +356,9 @@ mod tests {
             *value = 2.0 * (0.5 * *value).round();
         }
         let comb = of("JPEG", &comb);
-        assert!(comb[2] > plain[2] + 0.5 && comb[3] > 0.3 && plain[3] < 0.05, "{comb:?}");
+        assert!(
+            comb[2] > plain[2] + 0.5 && comb[3] > 0.3 && plain[3] < 0.05,
+            "{comb:?}"
+        );
     }
 }
