@@ -10,7 +10,8 @@ use wake_nn::device_named;
 use wake_physics::Field;
 use wake_physics::picture::Picture;
 use wake_train::evaluation::sea::{
-    GroupAccuracy, SeaPair, SeaRow, discriminant, gaussian_amplitude, kinds, mean_spectrum, simulated_seas,
+    GroupAccuracy, SeaPair, SeaRow, discriminant, gaussian_amplitude, kinds, mean_spectrum,
+    simulated_seas,
 };
 use wake_train::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
 
@@ -104,12 +105,15 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     }
     // What cannot be read leaves no folder behind.
     whole_files::make_folder(&options.out)?;
-    let right = |pairs: &[SeaPair]| -> Vec<Field> { pairs.iter().map(|p| p.right.clone()).collect() };
+    let right =
+        |pairs: &[SeaPair]| -> Vec<Field> { pairs.iter().map(|p| p.right.clone()).collect() };
     let real: Vec<Vec<Field>> = images.iter().map(|pairs| right(pairs)).collect();
     let right = right(&pairs);
     let told = |others: &[Field]| -> Outcome<TwoSample> {
         let options = TwoSampleOptions::default();
-        Ok(classifier_two_sample_test(&right, others, &options, &device)?)
+        Ok(classifier_two_sample_test(
+            &right, others, &options, &device,
+        )?)
     };
     let bar = progress::bar(recipes.len() as u64, "recipes");
     let mut rows = Vec::new();

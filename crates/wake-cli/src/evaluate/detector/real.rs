@@ -26,7 +26,7 @@ pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
 /// - `finder`: of a tile by its number
 pub(crate) fn judge<'a>(
     name: &str,
-    finder: impl Fn(usize) -> &'a dyn Finder + Sync,
+    finder: impl Fn(usize) -> &'a (dyn Finder + 'a) + Sync,
     tiles: &[Tile],
     out: &Path,
     report: &mut Report,
