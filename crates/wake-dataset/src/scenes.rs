@@ -523,8 +523,11 @@ mod tests {
         for (text, word) in [
             ("speckles = true", "speckles"),
             ("draw = \"papers\"", "papers"),
-            ("base = \"papers\"", "paper, ranges, detector or model"),
-            ("base = 3", "paper, ranges, detector or model"),
+            (
+                "base = \"papers\"",
+                "paper, ranges, satellites, detector or model",
+            ),
+            ("base = 3", "paper, ranges, satellites, detector or model"),
             ("[draw.ship]\nsped = [1, 2]", "sped"),
             ("[draw]\nseed = [1, 2]", "seed of its own"),
             ("[draw.grid]\nrows = [16, 32]", "one size"),
