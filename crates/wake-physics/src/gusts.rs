@@ -163,10 +163,15 @@ impl Gusts {
 
     /// g at every few pixels of a raster, and how many: 1/200 of the outer scale of gusts, 1/100 of that of eddies.
     pub(crate) fn coarse_field(&self, raster: &Raster, seed: u64) -> (Field, usize) {
-        let step = ((self.scale / (self.kind.places() * raster.spacing)) as usize).max(1);
+        let step = self.step(raster.spacing);
         let [rows, columns] = raster.every(step);
         let coarse = Raster::image(rows, columns, step as f64 * raster.spacing);
         (self.field(&coarse, seed), step)
+    }
+
+    /// Pixels from one place at which g is drawn to the next.
+    pub(crate) fn step(&self, spacing: f64) -> usize {
+        ((self.scale / (self.kind.places() * spacing)) as usize).max(1)
     }
 
     /// Multiplies σ⁰ with exp(n g − ½n²s²), g interpolated linearly; the rows are those from `first` on.

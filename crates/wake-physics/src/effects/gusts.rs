@@ -37,6 +37,19 @@ impl GustField {
     }
 }
 
+impl GustField {
+    /// Fields that are interpolated, and those drawn at every pixel, whose FFTs take five times as long and as much memory.
+    ///
+    /// - `spacing` of the computed pixels \[m\]
+    pub(crate) fn patterns(&self, spacing: f64) -> f64 {
+        let of = |gusts: &Gusts| match gusts.kind {
+            GustKind::Mottle => 1.0 + 5.0 / (gusts.step(spacing) as f64).powi(2),
+            _ => 1.0,
+        };
+        self.gusts.iter().map(|(gusts, _)| of(gusts)).sum()
+    }
+}
+
 impl Effect for GustField {
     fn term(&self) -> Term {
         Term::Gusts
