@@ -120,7 +120,7 @@ impl KelvinWake {
     /// (1 + s²/s_max²)^{−½},     s² = 8 k⁴ ⟨|F|²⟩/(π ν L cosh u),     k = ν cosh² u
     /// ```
     ///
-    /// s is the slope amplitude k a_loc that stationary phase gives the divergent waves of wavenumber k at the distance L of one
+    /// s is the slope amplitude k `a_loc` that stationary phase gives the divergent waves of wavenumber k at the distance L of one
     /// ship length, ⟨|F|²⟩ the square of Michell's integral averaged over the interference of bow and stern, `s_max` the limit
     /// [`Self::steepness`]. A thin ship makes divergent waves steeper than water bears (slopes of 0.4 to 0.7 near the track); what is
     /// steeper becomes turbulence near the hull. Long waves are not steep and stay. Next to the cusp, where stationary phase

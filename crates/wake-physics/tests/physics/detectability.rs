@@ -143,12 +143,12 @@ fn visibility_follows_the_published_trends() {
         "incidence: {share:?} {whole:?} {arms:?}"
     );
     // At every course the wake is seen less far the stronger the wind.
-    for course in 0..HEADING.len() {
+    for (course, heading) in HEADING.iter().enumerate() {
         let here: Vec<&Seen> = grid
             .iter()
             .filter(|seen| seen.places[3] == course)
             .collect();
         let whole = means(&here, 0, WIND.len(), |seen| seen.whole);
-        assert!(falls(&whole), "course {}: {whole:?}", HEADING[course]);
+        assert!(falls(&whole), "course {heading}: {whole:?}");
     }
 }

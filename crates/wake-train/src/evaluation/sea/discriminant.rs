@@ -144,10 +144,11 @@ impl Line {
 fn solved(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
     let count = right.len();
     for n in 0..count {
+        let pivot = matrix[n].clone();
         for below in n + 1..count {
-            let factor = matrix[below][n] / matrix[n][n];
-            for column in n..count {
-                matrix[below][column] -= factor * matrix[n][column];
+            let factor = matrix[below][n] / pivot[n];
+            for (value, above) in matrix[below].iter_mut().zip(&pivot) {
+                *value -= factor * above;
             }
             right[below] -= factor * right[n];
         }

@@ -347,7 +347,12 @@ mod tests {
     fn blocks_and_combs_are_found() {
         let mut blocks = white(4);
         for (n, value) in blocks.values.iter_mut().enumerate() {
-            *value = value.round() + if n % SIDE / 8 % 2 == 0 { 30.0 } else { 0.0 };
+            *value = value.round()
+                + if (n % SIDE / 8).is_multiple_of(2) {
+                    30.0
+                } else {
+                    0.0
+                };
         }
         let [plain, blocky] = [white(4), blocks].map(|window| of("JPEG", &window));
         assert!(blocky[0] > plain[0] + 0.3, "{blocky:?} {plain:?}");
