@@ -1,8 +1,9 @@
 //! A data set on disk, read back, once or again and again.
 
+use super::grey::Grey;
 use super::layout::{Layout, Manifest, broken};
 use super::metadata::{Rows, parse};
-use super::pair::{Grey, Pair};
+use super::pair::Pair;
 use super::shuffle::shuffled;
 use crate::error::Result;
 use image::ImageFormat;

@@ -250,6 +250,7 @@ fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
         ),
         depth,
         filter_depth: ship.filter_depth,
+        steepness: ship.steepness,
     }
 }
 

@@ -16,7 +16,7 @@ pub(crate) struct Pairs {
     /// Folder that `wake dataset` wrote; without it, pairs are simulated first
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// paper, ranges, detector or model, or a recipe file: the pairs to simulate where there is no --data
+    /// paper, ranges, satellites, detector or model, or a recipe file: the pairs to simulate where there is no --data
     #[arg(long, default_value = "model", conflicts_with = "data")]
     recipe: String,
     /// Pairs to simulate where there is no --data
