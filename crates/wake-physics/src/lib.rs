@@ -96,6 +96,7 @@ pub mod picture;
 mod prepared;
 mod simulate;
 pub mod measure;
+pub mod estimate;
 pub mod reference;
 
 pub use error::{Error, Result};

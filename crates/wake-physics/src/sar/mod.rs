@@ -17,6 +17,7 @@ pub mod scatterers;
 pub mod speckle;
 
 mod imaging;
+pub(crate) mod smooth;
 mod spread;
 
 pub use coherence::AzimuthResolution;

@@ -1,0 +1,308 @@
+//! Mean σ⁰ of a facet by its slope and by wind and incidence: a polynomial with all its derivatives.
+//!
+//! ```text
+//! σ(s) = ∬ p(u) σ_facet(s + u) du      p Gaussian: the slopes of the whole sea
+//! ```
+//!
+//! The average makes σ an entire function, so Chebyshev polynomials converge as fast as they do for a Gaussian of the
+//! width of p. The Bragg return is sampled once on a lattice of slopes and averaged at the nodes; derivatives by the slope are
+//! those of the polynomial, derivatives by wind and incidence are central differences of whole tables of nodes.
+
+use crate::numeric::vectorized;
+use crate::scattering::{Backscatter, SlopeCovariance};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Spacing of plane facets \[1\]: that of the first try of the table.
+const SPACING: f64 = 0.02;
+
+/// Standard deviations that an average looks at.
+const REACH: f64 = 5.5;
+
+/// Values by which tables are differenced: wind speed, wind direction, incidence.
+pub(super) const OUTER: usize = 3;
+
+/// Bragg return, specular return, and the derivatives of both by the outer values.
+const CHANNELS: usize = 2 * (1 + OUTER);
+
+/// The polynomial.
+pub(super) struct CrossSection {
+    /// Half the side of the square of slopes that it covers \[1\].
+    reach: f64,
+    nodes: usize,
+    /// `[nodes, nodes]`, that of the slope along x running fastest.
+    coefficients: Vec<[f64; CHANNELS]>,
+    /// Largest variance of the averaged slopes \[1\].
+    pub(super) averaged: f64,
+}
+
+/// σ⁰ at one slope: Bragg and specular.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct At {
+    pub(super) value: [f64; 2],
+    /// By the slopes along x and y.
+    pub(super) slope: [[f64; 2]; 2],
+    /// Second derivatives xx, xy, yy.
+    pub(super) curvature: [[f64; 3]; 2],
+    /// By wind speed, wind direction and incidence.
+    pub(super) outer: [[f64; OUTER]; 2],
+}
+
+/// Nodes that a polynomial needs over slopes up to `reach` for averages of a standard deviation.
+fn nodes_for(reach: f64, deviation: f64) -> usize {
+    (9.0 + 5.0 * reach / deviation).ceil().min(41.0) as usize
+}
+
+impl CrossSection {
+    /// Fits σ⁰ over the square of slopes up to `reach`.
+    ///
+    /// - `outer`: for each outer value σ⁰ at a step below and above, and twice the step; `None` for no derivative
+    pub(super) fn new(
+        here: &Backscatter,
+        outer: &[Option<([&Backscatter; 2], f64)>; OUTER],
+        reach: f64,
+        nodes: Option<usize>,
+    ) -> Self {
+        let axes = here.tilt.principal_axes();
+        let nodes = nodes.unwrap_or_else(|| nodes_for(reach, axes.variance[1].sqrt()));
+        let far = reach + REACH * axes.variance[0].sqrt();
+        let places = chebyshev_nodes(nodes, reach);
+        let table = |b: &Backscatter| averages(b, &places, far);
+        let mut channels = vec![[0.0; CHANNELS]; nodes * nodes];
+        let mut put = |channel: usize, values: &[[f64; 2]]| {
+            for (to, from) in channels.iter_mut().zip(values) {
+                to[channel] = from[0];
+                to[channel + 1 + OUTER] = from[1];
+            }
+        };
+        put(0, &table(here));
+        for (n, pair) in outer.iter().enumerate() {
+            if let Some(([below, above], width)) = pair {
+                let [below, above] = [table(below), table(above)];
+                let difference = |(a, b): (&[f64; 2], &[f64; 2])| {
+                    [(b[0] - a[0]) / width, (b[1] - a[1]) / width]
+                };
+                let slopes: Vec<_> = below.iter().zip(&above).map(difference).collect();
+                put(1 + n, &slopes);
+            }
+        }
+        Self {
+            reach,
+            nodes,
+            coefficients: coefficients(&channels, nodes),
+            averaged: axes.variance[1],
+        }
+    }
+
+    pub(super) fn nodes(&self) -> usize {
+        self.nodes
+    }
+
+    /// σ⁰ at a slope; steeper slopes than the polynomial covers are taken as its edge.
+    #[inline(always)]
+    pub(super) fn at(&self, slope: [f64; 2]) -> At {
+        let inside = slope.map(|s| (s / self.reach).clamp(-1.0, 1.0));
+        let mut rows = [[[0.0; 3]; 41]; 2];
+        for (rows, &u) in rows.iter_mut().zip(&inside) {
+            polynomials(u, &mut rows[..self.nodes]);
+        }
+        let mut value = [0.0; CHANNELS];
+        // First and second derivatives of the two returns.
+        let (mut first, mut second) = ([[0.0; 2]; 2], [[0.0; 3]; 2]);
+        for (line, [v, dv, ddv]) in self.coefficients.chunks_exact(self.nodes).zip(&rows[1]) {
+            let mut sum = [0.0; CHANNELS];
+            let (mut slope, mut bend) = ([0.0; 2], [0.0; 2]);
+            for (c, [u, du, ddu]) in line.iter().zip(&rows[0]) {
+                for (sum, c) in sum.iter_mut().zip(c) {
+                    *sum += u * c;
+                }
+                for (n, c) in [c[0], c[1 + OUTER]].into_iter().enumerate() {
+                    slope[n] += du * c;
+                    bend[n] += ddu * c;
+                }
+            }
+            for (value, sum) in value.iter_mut().zip(&sum) {
+                *value += v * sum;
+            }
+            for n in 0..2 {
+                let sum = sum[n * (1 + OUTER)];
+                first[n][0] += v * slope[n];
+                first[n][1] += dv * sum;
+                second[n][0] += v * bend[n];
+                second[n][1] += dv * slope[n];
+                second[n][2] += ddv * sum;
+            }
+        }
+        let per = 1.0 / self.reach;
+        At {
+            value: [value[0], value[1 + OUTER]],
+            slope: first.map(|d| d.map(|d| per * d)),
+            curvature: second.map(|d| d.map(|d| per * per * d)),
+            outer: [0, 1].map(|n| std::array::from_fn(|p| value[n * (1 + OUTER) + 1 + p])),
+        }
+    }
+
+    /// The mean over more Gaussian slopes, by Gauss–Hermite rules along their axes.
+    #[inline(always)]
+    pub(super) fn over(&self, slope: [f64; 2], more: &SlopeCovariance) -> At {
+        let axes = more.principal_axes();
+        let rule: &[[f64; 2]] = match axes.variance[0] > 0.02 * self.averaged {
+            true => &HERMITE_5,
+            false => &HERMITE_3,
+        };
+        let deviation = axes.variance.map(f64::sqrt);
+        let mut sum = At::default();
+        for [v, weight_v] in rule {
+            for [u, weight_u] in rule {
+                let [dx, dy] = axes.slope([u * deviation[0], v * deviation[1]]);
+                sum.add(
+                    weight_u * weight_v,
+                    &self.at([slope[0] + dx, slope[1] + dy]),
+                );
+            }
+        }
+        sum
+    }
+}
+
+impl At {
+    #[inline(always)]
+    fn add(&mut self, weight: f64, other: &Self) {
+        for n in 0..2 {
+            self.value[n] += weight * other.value[n];
+            for k in 0..2 {
+                self.slope[n][k] += weight * other.slope[n][k];
+            }
+            for k in 0..3 {
+                self.curvature[n][k] += weight * other.curvature[n][k];
+                self.outer[n][k] += weight * other.outer[n][k];
+            }
+        }
+    }
+}
+
+/// Nodes and weights of the mean over a unit Gaussian, exact to the fifth power, and to the ninth.
+const HERMITE_3: [[f64; 2]; 3] = [
+    [-1.732_050_807_568_877_2, 1.0 / 6.0],
+    [0.0, 2.0 / 3.0],
+    [1.732_050_807_568_877_2, 1.0 / 6.0],
+];
+const HERMITE_5: [[f64; 2]; 5] = [
+    [-2.856_970_013_872_805_6, 0.011_257_411_327_720_69],
+    [-1.355_626_179_974_265_8, 0.222_075_922_005_612_64],
+    [0.0, 8.0 / 15.0],
+    [1.355_626_179_974_265_8, 0.222_075_922_005_612_64],
+    [2.856_970_013_872_805_6, 0.011_257_411_327_720_69],
+];
+
+/// Zeros of the Chebyshev polynomial of degree `count`, scaled to ±`reach`.
+fn chebyshev_nodes(count: usize, reach: f64) -> Vec<f64> {
+    let node = |n: usize| reach * (PI * (n as f64 + 0.5) / count as f64).cos();
+    (0..count).map(node).collect()
+}
+
+/// Chebyshev polynomials at u with first and second derivative.
+#[inline(always)]
+fn polynomials(u: f64, out: &mut [[f64; 3]]) {
+    let mut before = [1.0, 0.0, 0.0];
+    let mut this = [u, 1.0, 0.0];
+    for out in out {
+        *out = before;
+        let next = [
+            2.0 * u * this[0] - before[0],
+            2.0 * (this[0] + u * this[1]) - before[1],
+            4.0 * this[1] + 2.0 * u * this[2] - before[2],
+        ];
+        (before, this) = (this, next);
+    }
+}
+
+/// Coefficients of the polynomial through values at the nodes.
+fn coefficients(values: &[[f64; CHANNELS]], count: usize) -> Vec<[f64; CHANNELS]> {
+    let cosine = |degree: usize, node: usize| {
+        let weight = if degree == 0 { 1.0 } else { 2.0 };
+        weight / count as f64 * (PI * degree as f64 * (node as f64 + 0.5) / count as f64).cos()
+    };
+    let mut half = vec![[0.0; CHANNELS]; count * count];
+    let mut out = half.clone();
+    for (n, half) in half.iter_mut().enumerate() {
+        let (j, degree) = (n / count, n % count);
+        for i in 0..count {
+            let weight = cosine(degree, i);
+            for (sum, v) in half.iter_mut().zip(&values[j * count + i]) {
+                *sum += weight * v;
+            }
+        }
+    }
+    for (n, out) in out.iter_mut().enumerate() {
+        let (degree, i) = (n / count, n % count);
+        for j in 0..count {
+            let weight = cosine(degree, j);
+            for (sum, v) in out.iter_mut().zip(&half[j * count + i]) {
+                *sum += weight * v;
+            }
+        }
+    }
+    out
+}
+
+/// Bragg and specular return at all pairs of places, the one along x running fastest.
+///
+/// - `far`: half the side of the lattice of plane facets
+fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]> {
+    let half = (far / SPACING).ceil() as i32;
+    let side = (2 * half + 1) as usize;
+    let first = -f64::from(half) * SPACING;
+    let at = |n: usize| first + n as f64 * SPACING;
+    let mut facets = vec![0.0; side * side];
+    for (j, row) in facets.chunks_exact_mut(side).enumerate() {
+        backscatter
+            .two_scale
+            .facets([first, at(j)], [SPACING, 0.0], row);
+    }
+    let tilt = &backscatter.tilt;
+    let determinant = tilt.determinant();
+    let [xx, xy, yy] = [tilt.yy, -tilt.xy, tilt.xx].map(|c| 0.5 * c / determinant);
+    let count = places.len();
+    (0..count * count)
+        .into_par_iter()
+        .map(|n| {
+            let [x, y] = [places[n % count], places[n / count]];
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (j, row) in facets.chunks_exact(side).enumerate() {
+                let dy = at(j) - y;
+                let dx = first - x;
+                let start = xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy;
+                // Rows this far weigh nothing.
+                if dy * dy > tilt.yy * (REACH * REACH + 16.0) {
+                    continue;
+                }
+                let slope = 2.0 * (xx * dx + xy * dy) * SPACING + xx * SPACING * SPACING;
+                let [line, weight] = weighed_row(row, start, slope, 2.0 * xx * SPACING * SPACING);
+                sum += line;
+                weights += weight;
+            }
+            [sum / weights, backscatter.specular.sigma0([x, y])]
+        })
+        .collect()
+}
+
+/// Σ f e^{−q(n)} and Σ e^{−q(n)} of a quadratic q with the given start, first and second difference.
+fn weighed_row(row: &[f64], start: f64, slope: f64, bend: f64) -> [f64; 2] {
+    vectorized(
+        #[inline(always)]
+        || {
+            let (mut sum, mut weights) = ([0.0; 8], [0.0; 8]);
+            for (c, chunk) in row.chunks(8).enumerate() {
+                for (lane, &value) in chunk.iter().enumerate() {
+                    let n = (8 * c + lane) as f64;
+                    let q = start + n * slope + 0.5 * n * (n - 1.0) * bend;
+                    let weight = crate::numeric::vector::exp(-q);
+                    sum[lane] += weight * value;
+                    weights[lane] += weight;
+                }
+            }
+            [sum.iter().sum(), weights.iter().sum()]
+        },
+    )
+}

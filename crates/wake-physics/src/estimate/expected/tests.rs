@@ -1,0 +1,97 @@
+use super::*;
+use crate::expected_intensity;
+
+fn scene(keys: &[&str]) -> Scene {
+    let small = [
+        "grid.rows=96",
+        "grid.columns=96",
+        "grid.spacing=4",
+        "model.tolerance=1e-4",
+        "ship.heading=60",
+        "ship.position=[60, 40]",
+    ];
+    Scene::default()
+        .with_assignments(&[&small[..], keys].concat())
+        .unwrap()
+}
+
+/// Scenes that a derivative may fail on.
+const HARD: [&[&str]; 7] = [
+    &[],
+    &["sea.depth=12", "ship.speed=8"],
+    &["radar.range_to_velocity=0"],
+    &["radar.range_to_velocity=150", "ship.heading=170"],
+    &["radar.incidence=16", "sea.wind_speed=7"],
+    &["radar.incidence=45", "sea.wind_speed=3", "ship.position=[190, -180]"],
+    &[
+        "radar.sensor=sentinel-1-iw",
+        "grid.spacing=10",
+        "grid.rows=48",
+        "grid.columns=48",
+        "radar.incidence=35",
+        "ship.speed=7",
+        "ship.edge=true",
+        "ship.filter_depth=1",
+    ],
+];
+
+/// The smooth image is the expected image, but for the corners of the weights of range.
+#[test]
+fn it_is_the_expected_image() {
+    for keys in HARD {
+        let scene = scene(keys);
+        let expected = expected_intensity(&scene).unwrap();
+        let smooth = ExpectedImage::new(&scene, &[]).unwrap();
+        let found = smooth.intensity(&scene).unwrap();
+        let (largest, rms) = expected.difference(&found);
+        let deviation = {
+            let mean = expected.mean();
+            let square = expected.values.iter().map(|v| (f64::from(*v) - mean).powi(2));
+            (square.sum::<f64>() / expected.values.len() as f64).sqrt()
+        };
+        println!("{keys:?}: {rms:.2e} {largest:.2e} mean {:.3e} deviation {deviation:.2e} nodes {}", expected.mean(), smooth.nodes);
+        assert!(rms < 0.02 * deviation, "{keys:?}");
+    }
+}
+
+/// What a value is moved by at a step of 1: the image changes by about as much as it is bright.
+fn unit(value: Value) -> f64 {
+    match value {
+        Value::Speed => 1.0,
+        Value::Heading => 10.0,
+        Value::X | Value::Y => 10.0,
+        Value::Length | Value::Beam | Value::Draft => 10.0,
+        Value::WindSpeed => 3.0,
+        Value::WindToward => 50.0,
+        Value::Incidence => 10.0,
+    }
+}
+
+/// Root mean square of a central difference less the derivative, over that of the derivative.
+fn error_of(image: &ExpectedImage, scene: &Scene, value: Value, slope: &Field, step: f64) -> f64 {
+    let step = step * unit(value);
+    let [below, above] =
+        [-step, step].map(|by| image.intensity(&value.moved(scene, by)).unwrap());
+    let pixels = below.values.iter().zip(&above.values).zip(&slope.values);
+    let (mut error, mut square) = (0.0, 0.0);
+    for ((a, b), slope) in pixels {
+        let difference = (f64::from(*b) - f64::from(*a)) / (2.0 * step);
+        error += (difference - f64::from(*slope)).powi(2);
+        square += f64::from(*slope).powi(2);
+    }
+    (error / square).sqrt()
+}
+
+#[test]
+fn derivatives_are_those_of_central_differences() {
+    for keys in HARD {
+        let scene = scene(keys);
+        let image = ExpectedImage::new(&scene, &Value::ALL).unwrap();
+        let here = image.at(&scene).unwrap();
+        for (value, slope) in &here.derivatives {
+            let errors = [1e-2, 1e-3, 1e-4, 1e-5]
+                .map(|step| error_of(&image, &scene, *value, slope, step));
+            println!("{keys:?} {value:?}: {errors:.1e?}");
+        }
+    }
+}

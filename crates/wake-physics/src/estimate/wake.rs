@@ -1,0 +1,365 @@
+//! One image: which ship and which wind made it, how well that is known, and what else may have.
+
+use super::echo::Echo;
+use super::fit::{Fit, Fitter, Priors, fitted};
+use super::likelihood::Observed;
+use super::noise::Noise;
+use super::options::{Detection, Options};
+use super::parameter::{Parameter, State};
+use super::search::{Filters, Start, Wind, winds};
+use super::value::Value;
+use crate::error::{Error, Result};
+use crate::measure::angle_between;
+use crate::raster::{Field, Raster};
+use crate::scene::Scene;
+use serde::Serialize;
+
+/// A value with its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fitted {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation; infinite where the image does not tell.
+    pub deviation: f64,
+}
+
+/// Everything read from one image.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Wakes: one, or none where the image shows none.
+    pub wakes: Vec<Estimated>,
+    /// The expected image of the estimate, in the unit of the image, and what it leaves of the image, relative.
+    pub fit: Field,
+    /// Relative residual I/μ − 1.
+    pub residual: Field,
+    /// The scene of the estimate.
+    pub scene: Scene,
+}
+
+/// A wake with the ship and the sea that made it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimated {
+    /// Bow (column, row) in the image, where the ship is and not where its echo appears.
+    pub tip: [f64; 2],
+    /// Midship (x, y) \[m\].
+    pub position: [Fitted; 2],
+    /// Where the ship moves to \[deg\].
+    pub heading: Fitted,
+    /// Speed through the water [m/s]: a current is not seen.
+    pub speed: Fitted,
+    /// Length \[m\], beam and draft in proportion to those of the scene that was given.
+    pub length: Fitted,
+    /// Wind speed [m/s].
+    pub wind_speed: Fitted,
+    /// Where the wind blows to \[deg\].
+    pub wind_toward: Fitted,
+    /// Factor on the image, and on the variance of its texture.
+    pub nuisance: [Fitted; 2],
+    /// Names of the values in the covariance.
+    pub names: Vec<&'static str>,
+    /// Covariance of all values, row after row.
+    pub covariance: Vec<f64>,
+    /// Velocity toward the radar by the displacement of the ship's echo [m/s], where there is an echo.
+    pub radial_velocity: Option<Fitted>,
+    /// ln likelihood, priors included.
+    pub log_likelihood: f64,
+    /// The same less that of the sea without a wake.
+    pub above_sea: f64,
+    /// Whether the image tells speed and heading: the wake stands out, no other mode is as likely, and the deviations are
+    /// small.
+    pub identifiable: bool,
+    /// Other modes.
+    pub alternatives: Vec<Alternative>,
+    /// How well the model fits.
+    pub goodness_of_fit: GoodnessOfFit,
+}
+
+/// Another ship or wind that may have made the image.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alternative {
+    /// Probability against the estimate and the other modes, 0 to 1.
+    pub weight: f64,
+    /// Speed [m/s].
+    pub speed: f64,
+    /// Heading \[deg\].
+    pub heading: f64,
+    /// Wind speed [m/s].
+    pub wind_speed: f64,
+    /// Where the wind blows to \[deg\].
+    pub wind_toward: f64,
+}
+
+/// How far what is left differs from sea and speckle, in standard deviations.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GoodnessOfFit {
+    /// Power that is left over its expectation, by ring of wavenumbers, the longest waves first.
+    pub power: Vec<f64>,
+    /// The largest difference of the power from 1.
+    pub largest: f64,
+    /// Gain and texture over their prior deviations.
+    pub priors: [f64; 2],
+    /// Whether nothing stands out.
+    pub consistent: bool,
+}
+
+/// ln likelihood ratio of wake to none that counts as a wake: of 200 images without one the largest is lower.
+const LEAST_ABOVE_SEA: f64 = 20.0;
+
+/// Share of the speed, and degrees of heading, above which a deviation says that the image does not tell.
+const WIDEST: [f64; 2] = [0.1, 5.0];
+
+/// Largest weight of other modes of the ship.
+const OTHERS: f64 = 0.1;
+
+/// Deviations from which a fit is called inconsistent.
+const INCONSISTENT: [f64; 2] = [6.0, 4.0];
+
+/// Reads an image of intensity with speckle.
+///
+/// - `image`: linear, in the unit of σ⁰, or times an unknown factor if the prior of the gain is infinitely wide
+/// - `known`: grid and radar of the image, fetch, depth and the ship's proportions; its values that are estimated do not
+///   matter, only the length is a start
+///
+/// # Errors
+///
+/// A scene out of range, without a ship or with one that turns, an image of another size than the grid, or an image without
+/// light.
+pub fn estimate(image: &Field, known: &Scene, options: &Options) -> Result<Estimate> {
+    let known = prepared(image, known)?;
+    let echo = Echo::of(image, &known);
+    let torus = Noise::new(&known)?.size;
+    let shown = |i: usize, j: usize| echo.as_ref().map_or(1.0, |echo| echo.shown(&known, i, j));
+    let observed = Observed::new(image.clone(), torus, shown);
+    let fitter = Fitter {
+        observed: &observed,
+        priors: options.priors,
+        steps: 12,
+        echo,
+    };
+    let winds = winds(&observed, &known, options.priors.gain.is_finite())?;
+    let sea = sea(&fitter, &known, &winds)?;
+    let template = sea_with_ship(&sea, &known);
+    let filters = Filters::new(&observed, &template.scene)?;
+    let detection = options.detection.unwrap_or(Detection {
+        position: [0.0; 2],
+        within: ANYWHERE,
+        heading: None,
+    });
+    let starts = filters.starts(&detection, options.starts);
+    let mut modes = Vec::new();
+    for start in &starts {
+        modes.push(fitter.mode(&started(&template, start), &OF_SHIP, false)?);
+    }
+    modes.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+    let Some(first) = modes.first() else {
+        return Ok(nothing(&sea, &known));
+    };
+    let mut best = fitter.mode(&first.state, &Parameter::OF_WAKE, true)?;
+    let mut others: Vec<Fit> = modes.into_iter().skip(1).collect();
+    if let Some(wind) = other_wind(&best, &winds) {
+        let mut state = best.state.clone();
+        (state.scene.sea.wind_speed, state.scene.sea.wind_toward) = (wind.speed, wind.toward);
+        let turned = fitter.mode(&state, &Parameter::OF_WAKE, true)?;
+        others.push(match turned.log_posterior > best.log_posterior {
+            true => std::mem::replace(&mut best, turned),
+            false => turned,
+        });
+    }
+    Ok(report(best, &sea, &others, (echo.as_ref(), options)))
+}
+
+/// Distance from the middle of the image within which a ship is looked for where no detection says where \[m\].
+const ANYWHERE: f64 = 150.0;
+
+/// Values of the ship alone: the wind stays.
+const OF_SHIP: [Parameter; 5] = [
+    Parameter::Value(Value::Speed),
+    Parameter::Value(Value::Heading),
+    Parameter::Value(Value::X),
+    Parameter::Value(Value::Y),
+    Parameter::Size,
+];
+
+/// Values of a sea without ships.
+const OF_SEA: [Parameter; 4] = [
+    Parameter::Value(Value::WindSpeed),
+    Parameter::Value(Value::WindToward),
+    Parameter::Gain,
+    Parameter::Texture,
+];
+
+/// The scene that is known, checked against the image.
+fn prepared(image: &Field, known: &Scene) -> Result<Scene> {
+    known.validate()?;
+    let conflict = |name: &str, value: String, requirement: &str| {
+        Err(Error::Conflict {
+            name: name.to_owned(),
+            value,
+            requirement: requirement.to_owned(),
+        })
+    };
+    let size = [known.grid.rows, known.grid.columns];
+    if [image.rows, image.columns] != size {
+        let value = format!("{} x {} pixels", size[0], size[1]);
+        let requirement = format!("but the image has {} x {}", image.rows, image.columns);
+        return conflict("grid", value, &requirement);
+    }
+    let lit = image.values.iter().all(|v| v.is_finite() && *v >= 0.0) && image.mean() > 0.0;
+    if !lit {
+        let requirement = "but intensities are finite, not negative, and not all 0";
+        return conflict("image", "dark or not a number somewhere".to_owned(), requirement);
+    }
+    if known.ships.is_empty() {
+        let requirement = "but an estimate needs the proportions of one";
+        return conflict("ship", "missing".to_owned(), requirement);
+    }
+    let mut scene = known.clone();
+    scene.ships.truncate(1);
+    scene.ships[0].echo = false;
+    Ok(scene)
+}
+
+/// The sea without a wake.
+fn sea(fitter: &Fitter<'_>, known: &Scene, winds: &[Wind]) -> Result<Fit> {
+    let mut state = State::of(known);
+    state.scene.ships.clear();
+    if let Some(wind) = winds.first() {
+        (state.scene.sea.wind_speed, state.scene.sea.wind_toward) = (wind.speed, wind.toward);
+    }
+    fitter.mode(&state, &OF_SEA, false)
+}
+
+/// The sea of a fit with the ship that is known.
+fn sea_with_ship(sea: &Fit, known: &Scene) -> State {
+    let mut state = sea.state.clone();
+    state.scene.ships.clone_from(&known.ships);
+    state
+}
+
+fn started(template: &State, start: &Start) -> State {
+    let mut state = template.clone();
+    for ship in &mut state.scene.ships {
+        (ship.speed, ship.heading, ship.position) = (start.speed, start.heading, start.position);
+    }
+    state
+}
+
+/// The most likely wind that is not the one of a fit.
+fn other_wind(best: &Fit, winds: &[Wind]) -> Option<Wind> {
+    let toward = best.state.scene.sea.wind_toward;
+    let other = |wind: &&Wind| angle_between(wind.toward, toward).abs() > 60.0;
+    winds.iter().find(other).copied()
+}
+
+/// An estimate without a wake.
+fn nothing(sea: &Fit, known: &Scene) -> Estimate {
+    let mut scene = sea.state.scene.clone();
+    scene.ships.clone_from(&known.ships);
+    Estimate {
+        wakes: Vec::new(),
+        fit: fitted(sea),
+        residual: sea.near.residual.clone(),
+        scene,
+    }
+}
+
+/// A fit as an estimate.
+fn report(best: Fit, sea: &Fit, others: &[Fit], (echo, options): (Option<&Echo>, &Options)) -> Estimate {
+    let above_sea = best.log_posterior - sea.log_posterior;
+    if above_sea < LEAST_ABOVE_SEA {
+        return nothing(sea, &best.state.scene);
+    }
+    let alternatives = alternatives(&best, others);
+    let read = |parameter: Parameter| Fitted {
+        value: best.state.get(parameter),
+        deviation: best.deviation(parameter),
+    };
+    let [speed, heading, x, y] =
+        [Value::Speed, Value::Heading, Value::X, Value::Y].map(|v| read(Parameter::Value(v)));
+    let other_ships: f64 = alternatives
+        .iter()
+        .filter(|a| {
+            (a.speed / speed.value - 1.0).abs() > 0.02
+                || angle_between(a.heading, heading.value).abs() > 2.0
+        })
+        .map(|a| a.weight)
+        .sum();
+    let scene = best.state.scene.clone();
+    let raster = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
+    let forward = crate::track::direction(heading.value);
+    let half = 0.5 * best.state.get(Parameter::Size);
+    let radial = echo.and_then(|e| e.radial_velocity(&scene, [y.value, y.deviation]));
+    let estimated = Estimated {
+        tip: raster.pixel(x.value + half * forward[0], y.value + half * forward[1]),
+        position: [x, y],
+        heading,
+        speed,
+        length: read(Parameter::Size),
+        wind_speed: read(Parameter::Value(Value::WindSpeed)),
+        wind_toward: read(Parameter::Value(Value::WindToward)),
+        nuisance: [Parameter::Gain, Parameter::Texture].map(read),
+        names: best.parameters.iter().map(|p| p.name()).collect(),
+        covariance: best.covariance.as_ref().map_or_else(Vec::new, |m| m.values.clone()),
+        radial_velocity: radial.map(|[value, deviation]| Fitted { value, deviation }),
+        log_likelihood: best.log_posterior,
+        above_sea,
+        identifiable: best.converged
+            && speed.deviation < WIDEST[0] * speed.value
+            && heading.deviation < WIDEST[1]
+            && other_ships < OTHERS,
+        alternatives,
+        goodness_of_fit: goodness(&best, &options.priors),
+    };
+    Estimate {
+        fit: fitted(&best),
+        residual: best.near.residual.clone(),
+        scene,
+        wakes: vec![estimated],
+    }
+}
+
+/// Other modes by their weights, those of less than a thousandth left out: Laplace's approximation of their probability.
+fn alternatives(best: &Fit, others: &[Fit]) -> Vec<Alternative> {
+    let differs = |fit: &&Fit| {
+        let off = |v: Value| angle_between(v.of(&fit.state.scene), v.of(&best.state.scene)).abs();
+        let speed = Value::Speed.of(&fit.state.scene) / Value::Speed.of(&best.state.scene) - 1.0;
+        off(Value::WindToward) > 20.0 || off(Value::Heading) > 2.0 || speed.abs() > 0.02
+    };
+    let distinct: Vec<&Fit> = others.iter().filter(differs).collect();
+    let weight = |fit: &Fit| (fit.log_posterior - best.log_posterior).min(50.0).exp();
+    let total = 1.0 + distinct.iter().map(|fit| weight(fit)).sum::<f64>();
+    let all = distinct.into_iter().map(|fit| {
+        let [speed, heading, wind_speed, wind_toward] =
+            [Value::Speed, Value::Heading, Value::WindSpeed, Value::WindToward]
+                .map(|v| v.of(&fit.state.scene));
+        Alternative {
+            weight: weight(fit) / total,
+            speed,
+            heading,
+            wind_speed,
+            wind_toward,
+        }
+    });
+    all.filter(|a| a.weight > 1e-3).collect()
+}
+
+fn goodness(best: &Fit, priors: &Priors) -> GoodnessOfFit {
+    let deviations = best.near.rings.iter().map(|[ratio, count]| {
+        let peakedness = 1.0;
+        (ratio - 1.0) / (2.0 * peakedness / count.max(1.0)).sqrt()
+    });
+    let largest = deviations.fold(0.0, |most: f64, d| if d.abs() > most.abs() { d } else { most });
+    let [gain, texture] = [
+        (Parameter::Gain, priors.gain),
+        (Parameter::Texture, priors.texture),
+    ]
+    .map(|(parameter, deviation)| best.state.get(parameter) / deviation);
+    GoodnessOfFit {
+        power: best.near.rings.iter().map(|r| r[0]).collect(),
+        largest,
+        priors: [gain, texture],
+        consistent: largest.abs() < INCONSISTENT[0]
+            && gain.abs() < INCONSISTENT[1]
+            && texture.abs() < INCONSISTENT[1],
+    }
+}
