@@ -12,6 +12,8 @@ mod locate;
 mod simulate;
 
 #[cfg(feature = "prompt")]
+mod estimate;
+#[cfg(feature = "prompt")]
 mod prompt;
 
 #[cfg(feature = "dataset")]
@@ -59,6 +61,8 @@ enum Command {
     Simulate(simulate::Arguments),
     #[cfg(feature = "prompt")]
     Prompt(prompt::Arguments),
+    #[cfg(feature = "prompt")]
+    Estimate(estimate::Arguments),
     #[cfg(feature = "generate")]
     Generate(generate::Arguments),
     #[cfg(feature = "dataset")]
@@ -86,6 +90,8 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         #[cfg(feature = "prompt")]
         Command::Prompt(arguments) => prompt::run(&arguments),
+        #[cfg(feature = "prompt")]
+        Command::Estimate(arguments) => estimate::run(&arguments),
         #[cfg(feature = "generate")]
         Command::Generate(arguments) => generate::run(&arguments),
         #[cfg(feature = "dataset")]

@@ -4,6 +4,7 @@ mod ablation;
 mod detector;
 mod domain;
 mod domain_report;
+mod estimate;
 mod model;
 mod options;
 mod plot;
@@ -33,6 +34,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         Some(Task::Domain(options)) => domain::run(options),
         Some(Task::Sea(options)) => sea::run(options),
         Some(Task::Detector(options)) => detector::run(options),
+        Some(Task::Estimate(options)) => estimate::run(options),
     }
 }
 

@@ -8,15 +8,15 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Parameter {
-    /// A value of the scene.
-    #[serde(untagged)]
-    Value(Value),
     /// Length of the ship \[m\], its beam and draft in proportion.
     Size,
     /// Logarithm of a factor on the image: calibration, and what the mean image is wrong by.
     Gain,
     /// Logarithm of a factor on the variance of the sea's texture.
     Texture,
+    /// A value of the scene.
+    #[serde(untagged)]
+    Value(Value),
 }
 
 impl Parameter {

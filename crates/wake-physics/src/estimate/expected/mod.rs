@@ -24,7 +24,6 @@ use crate::raster::{Field, Raster};
 use crate::sar::impulse::Reflectivity;
 use crate::sar::smooth::{Displacement, SmoothSum};
 use crate::scene::{Scene, Term};
-use crate::workspace::Workspace;
 use drawn::{Drawn, Surface};
 use waves::Linear;
 

@@ -90,8 +90,8 @@ fn derivatives_are_those_of_central_differences() {
         let here = image.at(&scene).unwrap();
         for (value, slope) in &here.derivatives {
             let errors = [1e-2, 1e-3, 1e-4, 1e-5]
-                .map(|step| error_of(&image, &scene, *value, slope, step));
-            println!("{keys:?} {value:?}: {errors:.1e?}");
+                .map(|step| format!("{:.1e}", error_of(&image, &scene, *value, slope, step)));
+            println!("{keys:?} {value:?}: {errors:?}");
         }
     }
 }
