@@ -67,6 +67,14 @@ impl Echo {
         })
     }
 
+    /// The echo in other coordinates.
+    pub(super) fn moved(&self, to: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+        Self {
+            position: to(self.position),
+            ..*self
+        }
+    }
+
     /// Weight of a pixel: 0 where the echo is.
     pub(super) fn shown(&self, scene: &Scene, i: usize, j: usize) -> f64 {
         let raster = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);

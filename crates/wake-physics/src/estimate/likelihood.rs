@@ -36,10 +36,11 @@ pub(super) struct Observed {
 
 /// The likelihood near a state.
 pub(super) struct Near {
-    pub(super) parameters: Vec<Parameter>,
     pub(super) score: Vec<f64>,
     pub(super) log_likelihood: f64,
     pub(super) information: Information,
+    /// The part of the slope that comes from the spectrum.
+    pub(super) of_power: Matrix,
     /// Σ|R|²/S over its expectation, by ring of wavenumbers, with the number of independent ones.
     pub(super) rings: Vec<[f64; 2]>,
     /// Relative intensity that is left, seen through the window.
@@ -176,7 +177,7 @@ impl Observed {
         let gain = state.gain.exp() as f32;
         let mean = &expected.intensity.values;
         let residual = taper.of(self.image.values.iter().zip(mean).map(|(i, m)| i / (gain * m) - 1.0));
-        let directions: Vec<Field> = parameters.iter().map(|p| self.direction(*p, state, expected)).collect();
+        let directions = self.directions(parameters, (state, expected));
         let zero = Field::default();
         let mut spectra: Vec<Spectrum> = Vec::new();
         let all: Vec<&Field> = std::iter::once(&residual).chain(&directions).collect();
@@ -196,11 +197,13 @@ impl Observed {
             .map(|s| s.as_ref().map(|s| taper.power(torus, s)))
             .collect();
         let scale = taper.energy / (torus.size * torus.size) as f64;
+        let (information, of_power) =
+            self.information(scale, &power, (&spectra, &slopes), taper.peakedness);
         let mut near = Near {
-            parameters: parameters.to_vec(),
             score: score(torus, scale, (&left, &power), (&spectra, &slopes)),
             log_likelihood: self.log_likelihood(scale, (&left, &power), gain, mean),
-            information: self.information(scale, &power, (&spectra, &slopes), taper.peakedness),
+            information,
+            of_power,
             rings: self.rings(scale, &left, &power),
             residual,
         };
@@ -209,6 +212,27 @@ impl Observed {
             near.information.variance = self.variance(scale, (&power, &covariance), (&spectra, &slopes));
         }
         near
+    }
+
+    /// The same image without a taper.
+    pub(super) fn whole(&self) -> Self {
+        let torus = Torus::new(self.torus.size);
+        let size = [self.image.rows, self.image.columns];
+        Self {
+            taper: Taper::flat(&torus, size),
+            torus,
+            image: self.image.clone(),
+        }
+    }
+
+    /// w ∂ln μ by each parameter.
+    pub(super) fn directions(
+        &self,
+        parameters: &[Parameter],
+        (state, expected): (&State, &Expected),
+    ) -> Vec<Field> {
+        let of = |p: &Parameter| self.direction(*p, state, expected);
+        parameters.iter().map(of).collect()
     }
 
     /// w ∂ln μ by a parameter.
@@ -275,7 +299,7 @@ impl Observed {
         power: &[f32],
         (spectra, slopes): (&[Spectrum], &[Option<Vec<f32>>]),
         peakedness: f64,
-    ) -> Information {
+    ) -> (Information, Matrix) {
         let size = spectra.len();
         let [mut of_mean, mut of_power] = [Matrix::zero(size), Matrix::zero(size)];
         let pairs: Vec<[usize; 2]> = (0..size).flat_map(|p| (0..=p).map(move |q| [p, q])).collect();
@@ -304,10 +328,11 @@ impl Observed {
         }
         let mut variance = of_power.clone();
         variance.values.iter_mut().for_each(|v| *v *= peakedness);
-        Information {
+        let information = Information {
             slope: of_mean.clone().plus(&of_power),
             variance: variance.plus(&of_mean),
-        }
+        };
+        (information, of_power)
     }
 
     /// V with the covariance between all pixels.

@@ -9,6 +9,7 @@
 //! and [`bound`] says how well any estimator can.
 
 mod bound;
+mod coarse;
 mod echo;
 mod expected;
 mod fit;

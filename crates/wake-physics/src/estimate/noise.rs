@@ -51,11 +51,6 @@ impl Noise {
         })
     }
 
-    /// Variance of the sea \[1\].
-    pub(super) fn sea_variance(&self) -> f64 {
-        f64::from(self.sea[0])
-    }
-
     /// Covariance with the sea's variance times a factor.
     pub(super) fn covariance(&self, factor: f64) -> Field {
         let pairs = self.sea.iter().zip(&self.speckle);
@@ -129,6 +124,19 @@ impl Taper {
             let (i, j) = (n / columns, n % columns);
             (edge(i, rows) * edge(j, columns) * shown(i, j)) as f32
         };
+        Self::of_weights(torus, [rows, columns], weight)
+    }
+
+    /// All of the image.
+    pub(super) fn flat(torus: &Torus, size: [usize; 2]) -> Self {
+        Self::of_weights(torus, size, |_| 1.0)
+    }
+
+    fn of_weights(
+        torus: &Torus,
+        [rows, columns]: [usize; 2],
+        weight: impl Fn(usize) -> f32,
+    ) -> Self {
         let weights = Field {
             rows,
             columns,

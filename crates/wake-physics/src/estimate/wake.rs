@@ -1,5 +1,6 @@
 //! One image: which ship and which wind made it, how well that is known, and what else may have.
 
+use super::coarse::Coarse;
 use super::echo::Echo;
 use super::fit::{Fit, Fitter, Priors, fitted};
 use super::likelihood::Observed;
@@ -138,34 +139,29 @@ pub fn estimate(image: &Field, known: &Scene, options: &Options) -> Result<Estim
     };
     let winds = winds(&observed, &known, options.priors.gain.is_finite())?;
     let sea = sea(&fitter, &known, &winds)?;
-    let template = sea_with_ship(&sea, &known);
-    let filters = Filters::new(&observed, &template.scene)?;
     let detection = options.detection.unwrap_or(Detection {
         position: [0.0; 2],
         within: ANYWHERE,
         heading: None,
     });
-    let starts = filters.starts(&detection, options.starts);
-    let mut modes = Vec::new();
-    for start in &starts {
-        modes.push(fitter.mode(&started(&template, start), &OF_SHIP, false)?);
-    }
-    modes.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-    let Some(first) = modes.first() else {
+    let mut modes = ships(image, &known, (&sea, echo.as_ref()), (&detection, options))?;
+    if modes.is_empty() {
         return Ok(nothing(&sea, &known));
-    };
-    let mut best = fitter.mode(&first.state, &Parameter::OF_WAKE, true)?;
-    let mut others: Vec<Fit> = modes.into_iter().skip(1).collect();
+    }
+    let first = sea_with(&sea, &modes.remove(0));
+    let mut best = fitter.mode(&first, &Parameter::OF_WAKE, true)?;
+    let others = modes;
+    let mut winds_of = Vec::new();
     if let Some(wind) = other_wind(&best, &winds) {
         let mut state = best.state.clone();
         (state.scene.sea.wind_speed, state.scene.sea.wind_toward) = (wind.speed, wind.toward);
         let turned = fitter.mode(&state, &Parameter::OF_WAKE, true)?;
-        others.push(match turned.log_posterior > best.log_posterior {
+        winds_of.push(match turned.log_posterior > best.log_posterior {
             true => std::mem::replace(&mut best, turned),
             false => turned,
         });
     }
-    Ok(report(best, &sea, &others, (echo.as_ref(), options)))
+    Ok(report(best, &sea, (&winds_of, &others), (echo.as_ref(), options)))
 }
 
 /// Distance from the middle of the image within which a ship is looked for where no detection says where \[m\].
@@ -229,10 +225,79 @@ fn sea(fitter: &Fitter<'_>, known: &Scene, winds: &[Wind]) -> Result<Fit> {
     fitter.mode(&state, &OF_SEA, false)
 }
 
-/// The sea of a fit with the ship that is known.
-fn sea_with_ship(sea: &Fit, known: &Scene) -> State {
+/// A ship that may have made the wake, and ln of its likelihood less that of the best one.
+struct Ship {
+    speed: f64,
+    heading: f64,
+    position: [f64; 2],
+    length: f64,
+    /// A ship of the same proportions.
+    proportions: crate::scene::Ship,
+    below_best: f64,
+}
+
+/// Ships at modes of the likelihood of the image at half its resolution, the wind held; the best first.
+fn ships(
+    image: &Field,
+    known: &Scene,
+    (sea, echo): (&Fit, Option<&Echo>),
+    (detection, options): (&Detection, &Options),
+) -> Result<Vec<Ship>> {
+    let coarse = Coarse::of(image, known);
+    let [x, y] = coarse.origin;
+    let mut template = State {
+        scene: coarse.scene.clone(),
+        ..sea.state.clone()
+    };
+    template.scene.sea = sea.state.scene.sea.clone();
+    let moved = |[a, b]: [f64; 2]| [a - x, b - y];
+    let echo = echo.map(|echo| echo.moved(moved));
+    let shown = |i: usize, j: usize| echo.as_ref().map_or(1.0, |e| e.shown(&template.scene, i, j));
+    let torus = Noise::new(&template.scene)?.size;
+    let observed = Observed::new(coarse.image.clone(), torus, shown);
+    let fitter = Fitter {
+        observed: &observed,
+        priors: options.priors,
+        steps: 8,
+        echo,
+    };
+    let filters = Filters::new(&observed, &template.scene)?;
+    let near = Detection {
+        position: moved(detection.position),
+        ..*detection
+    };
+    let mut modes = Vec::new();
+    for start in filters.starts(&near, options.starts) {
+        modes.push(fitter.mode(&started(&template, &start), &OF_SHIP, false)?);
+    }
+    modes.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+    let best = modes.first().map_or(0.0, |fit| fit.log_posterior);
+    let ship = |fit: &Fit| {
+        let [speed, heading, a, b] =
+            [Value::Speed, Value::Heading, Value::X, Value::Y].map(|v| v.of(&fit.state.scene));
+        Ship {
+            speed,
+            heading,
+            position: [a + x, b + y],
+            length: fit.state.get(Parameter::Size),
+            proportions: known.ships[0].clone(),
+            below_best: best - fit.log_posterior,
+        }
+    };
+    Ok(modes.iter().map(ship).collect())
+}
+
+/// The sea of a fit with a ship.
+fn sea_with(sea: &Fit, ship: &Ship) -> State {
     let mut state = sea.state.clone();
-    state.scene.ships.clone_from(&known.ships);
+    state.scene.ships = vec![crate::scene::Ship {
+        speed: ship.speed,
+        heading: ship.heading,
+        position: ship.position,
+        ..ship.proportions.clone()
+    }];
+    let longer = ship.length - state.get(Parameter::Size);
+    state.advance(Parameter::Size, longer);
     state
 }
 
@@ -264,12 +329,12 @@ fn nothing(sea: &Fit, known: &Scene) -> Estimate {
 }
 
 /// A fit as an estimate.
-fn report(best: Fit, sea: &Fit, others: &[Fit], (echo, options): (Option<&Echo>, &Options)) -> Estimate {
+fn report(best: Fit, sea: &Fit, (winds, ships): (&[Fit], &[Ship]), (echo, options): (Option<&Echo>, &Options)) -> Estimate {
     let above_sea = best.log_posterior - sea.log_posterior;
     if above_sea < LEAST_ABOVE_SEA {
         return nothing(sea, &best.state.scene);
     }
-    let alternatives = alternatives(&best, others);
+    let alternatives = alternatives(&best, winds, ships);
     let read = |parameter: Parameter| Fitted {
         value: best.state.get(parameter),
         deviation: best.deviation(parameter),
@@ -318,29 +383,41 @@ fn report(best: Fit, sea: &Fit, others: &[Fit], (echo, options): (Option<&Echo>,
     }
 }
 
-/// Other modes by their weights, those of less than a thousandth left out: Laplace's approximation of their probability.
-fn alternatives(best: &Fit, others: &[Fit]) -> Vec<Alternative> {
-    let differs = |fit: &&Fit| {
-        let off = |v: Value| angle_between(v.of(&fit.state.scene), v.of(&best.state.scene)).abs();
-        let speed = Value::Speed.of(&fit.state.scene) / Value::Speed.of(&best.state.scene) - 1.0;
-        off(Value::WindToward) > 20.0 || off(Value::Heading) > 2.0 || speed.abs() > 0.02
-    };
-    let distinct: Vec<&Fit> = others.iter().filter(differs).collect();
-    let weight = |fit: &Fit| (fit.log_posterior - best.log_posterior).min(50.0).exp();
-    let total = 1.0 + distinct.iter().map(|fit| weight(fit)).sum::<f64>();
-    let all = distinct.into_iter().map(|fit| {
+/// Other modes by their weights, those of less than a thousandth left out: winds by the likelihood of the whole image, ships by
+/// that at half its resolution.
+fn alternatives(best: &Fit, winds: &[Fit], ships: &[Ship]) -> Vec<Alternative> {
+    let sea = &best.state.scene.sea;
+    let winds = winds.iter().map(|fit| {
         let [speed, heading, wind_speed, wind_toward] =
             [Value::Speed, Value::Heading, Value::WindSpeed, Value::WindToward]
                 .map(|v| v.of(&fit.state.scene));
         Alternative {
-            weight: weight(fit) / total,
+            weight: (fit.log_posterior - best.log_posterior).min(50.0).exp(),
             speed,
             heading,
             wind_speed,
             wind_toward,
         }
     });
-    all.filter(|a| a.weight > 1e-3).collect()
+    let ships = ships.iter().map(|ship| Alternative {
+        weight: (-ship.below_best).exp(),
+        speed: ship.speed,
+        heading: ship.heading,
+        wind_speed: sea.wind_speed,
+        wind_toward: sea.wind_toward,
+    });
+    let differs = |other: &Alternative| {
+        let scene = &best.state.scene;
+        let off = |one: f64, value: Value| angle_between(one, value.of(scene)).abs();
+        off(other.wind_toward, Value::WindToward) > 20.0
+            || off(other.heading, Value::Heading) > 2.0
+            || (other.speed / Value::Speed.of(scene) - 1.0).abs() > 0.02
+    };
+    let mut all: Vec<Alternative> = winds.chain(ships).filter(differs).collect();
+    let total = 1.0 + all.iter().map(|a| a.weight).sum::<f64>();
+    all.iter_mut().for_each(|a| a.weight /= total);
+    all.retain(|a| a.weight > 1e-3);
+    all
 }
 
 fn goodness(best: &Fit, priors: &Priors) -> GoodnessOfFit {

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test that cannot go on has failed; reports are printed")]
 
+mod derivatives;
+
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::Instant;
@@ -47,6 +49,28 @@ fn one(index: u64) -> (Scene, Estimate, f64) {
     let start = Instant::now();
     let found = estimate(&image, &known, &options).unwrap();
     (scene, found, start.elapsed().as_secs_f64())
+}
+
+/// Seconds of an image, and of an image with its derivatives.
+#[test]
+#[ignore = "a timing"]
+fn timings() {
+    let (scene, _) = scene(3);
+    let time = |name: &str, work: &mut dyn FnMut()| {
+        let start = Instant::now();
+        (0..3).for_each(|_| work());
+        println!("{name}: {:.1} ms", start.elapsed().as_secs_f64() / 3.0 * 1e3);
+    };
+    let mut simulator = wake_physics::Simulator::default();
+    time("expected_intensity, warm", &mut || drop(simulator.expected_intensity(&scene)));
+    time("expected_intensity", &mut || drop(wake_physics::expected_intensity(&scene)));
+    let values = &Value::ALL[..9];
+    time("freeze", &mut || drop(wake_physics::estimate::ExpectedImage::new(&scene, values)));
+    let image = wake_physics::estimate::ExpectedImage::new(&scene, values).unwrap();
+    time("image", &mut || drop(image.intensity(&scene)));
+    time("image and 9 derivatives", &mut || drop(image.at(&scene)));
+    time("linear sea", &mut || drop(wake_physics::LinearSea::new(&scene)));
+    time("simulate", &mut || drop(simulate(&scene)));
 }
 
 /// `SCENES=FIRST..LAST cargo test -p wake-physics --test estimate report -- --ignored --nocapture`

@@ -25,16 +25,24 @@ pub(super) const OUTER: usize = 3;
 /// Bragg return, specular return, and the derivatives of both by the outer values.
 const CHANNELS: usize = 2 * (1 + OUTER);
 
-/// The polynomial.
+/// Cells of the spline across the square of slopes, and beyond it on each side, where the conditions at its ends fade.
+const CELLS: usize = 64;
+const BEYOND: usize = 6;
+
+/// The polynomial, as a cubic spline that is faster to look up: twice differentiable, of fourth order in cells of a
+/// thirty-second of the reach.
 pub(super) struct CrossSection {
     /// Half the side of the square of slopes that it covers \[1\].
     reach: f64,
     nodes: usize,
-    /// `[nodes, nodes]`, that of the slope along x running fastest.
+    /// Coefficients of B-splines, `[side, side]`, that of the slope along x running fastest.
     coefficients: Vec<[f64; CHANNELS]>,
     /// Largest variance of the averaged slopes \[1\].
     pub(super) averaged: f64,
 }
+
+/// Coefficients along each axis.
+const SIDE: usize = CELLS + 2 * BEYOND + 1;
 
 /// σ⁰ at one slope: Bragg and specular.
 #[derive(Debug, Clone, Copy, Default)]
@@ -50,7 +58,7 @@ pub(super) struct At {
 
 /// Nodes that a polynomial needs over slopes up to `reach` for averages of a standard deviation.
 fn nodes_for(reach: f64, deviation: f64) -> usize {
-    (9.0 + 5.0 * reach / deviation).ceil().min(41.0) as usize
+    (7.0 + 6.0 * reach / deviation).ceil().min(48.0) as usize
 }
 
 impl CrossSection {
@@ -65,8 +73,9 @@ impl CrossSection {
     ) -> Self {
         let axes = here.tilt.principal_axes();
         let nodes = nodes.unwrap_or_else(|| nodes_for(reach, axes.variance[1].sqrt()));
-        let far = reach + REACH * axes.variance[0].sqrt();
-        let places = chebyshev_nodes(nodes, reach);
+        let beyond = reach * (1.0 + 2.0 * BEYOND as f64 / CELLS as f64);
+        let far = beyond + REACH * axes.variance[0].sqrt();
+        let places = chebyshev_nodes(nodes, beyond);
         let table = |b: &Backscatter| averages(b, &places, far);
         let mut channels = vec![[0.0; CHANNELS]; nodes * nodes];
         let mut put = |channel: usize, values: &[[f64; 2]]| {
@@ -89,7 +98,7 @@ impl CrossSection {
         Self {
             reach,
             nodes,
-            coefficients: coefficients(&channels, nodes),
+            coefficients: spline(&coefficients(&channels, nodes), nodes),
             averaged: axes.variance[1],
         }
     }
@@ -101,39 +110,47 @@ impl CrossSection {
     /// σ⁰ at a slope; steeper slopes than the polynomial covers are taken as its edge.
     #[inline(always)]
     pub(super) fn at(&self, slope: [f64; 2]) -> At {
-        let inside = slope.map(|s| (s / self.reach).clamp(-1.0, 1.0));
-        let mut rows = [[[0.0; 3]; 41]; 2];
-        for (rows, &u) in rows.iter_mut().zip(&inside) {
-            polynomials(u, &mut rows[..self.nodes]);
+        let per = CELLS as f64 / (2.0 * self.reach);
+        let mut first_cell = [0; 2];
+        let mut weights = [[[0.0; 4]; 3]; 2];
+        for axis in 0..2 {
+            let inside = slope[axis].clamp(-self.reach, self.reach);
+            let place = (inside + self.reach) * per + BEYOND as f64;
+            let cell = (place as usize).min(SIDE - 3);
+            first_cell[axis] = cell - 1;
+            weights[axis] = spline_weights(place - cell as f64);
         }
+        let [[u, du, ddu], [v, dv, ddv]] = weights;
         let mut value = [0.0; CHANNELS];
-        // First and second derivatives of the two returns.
         let (mut first, mut second) = ([[0.0; 2]; 2], [[0.0; 3]; 2]);
-        for (line, [v, dv, ddv]) in self.coefficients.chunks_exact(self.nodes).zip(&rows[1]) {
+        for j in 0..4 {
+            let start = (first_cell[1] + j) * SIDE + first_cell[0];
+            let Some(line) = self.coefficients[start..].first_chunk::<4>() else {
+                continue;
+            };
             let mut sum = [0.0; CHANNELS];
             let (mut slope, mut bend) = ([0.0; 2], [0.0; 2]);
-            for (c, [u, du, ddu]) in line.iter().zip(&rows[0]) {
+            for (i, c) in line.iter().enumerate() {
                 for (sum, c) in sum.iter_mut().zip(c) {
-                    *sum += u * c;
+                    *sum += u[i] * c;
                 }
                 for (n, c) in [c[0], c[1 + OUTER]].into_iter().enumerate() {
-                    slope[n] += du * c;
-                    bend[n] += ddu * c;
+                    slope[n] += du[i] * c;
+                    bend[n] += ddu[i] * c;
                 }
             }
             for (value, sum) in value.iter_mut().zip(&sum) {
-                *value += v * sum;
+                *value += v[j] * sum;
             }
             for n in 0..2 {
                 let sum = sum[n * (1 + OUTER)];
-                first[n][0] += v * slope[n];
-                first[n][1] += dv * sum;
-                second[n][0] += v * bend[n];
-                second[n][1] += dv * slope[n];
-                second[n][2] += ddv * sum;
+                first[n][0] += v[j] * slope[n];
+                first[n][1] += dv[j] * sum;
+                second[n][0] += v[j] * bend[n];
+                second[n][1] += dv[j] * slope[n];
+                second[n][2] += ddv[j] * sum;
             }
         }
-        let per = 1.0 / self.reach;
         At {
             value: [value[0], value[1 + OUTER]],
             slope: first.map(|d| d.map(|d| per * d)),
@@ -201,19 +218,81 @@ fn chebyshev_nodes(count: usize, reach: f64) -> Vec<f64> {
     (0..count).map(node).collect()
 }
 
-/// Chebyshev polynomials at u with first and second derivative.
+/// Weights of four B-splines at t in their middle cell, with first and second derivative.
 #[inline(always)]
-fn polynomials(u: f64, out: &mut [[f64; 3]]) {
-    let mut before = [1.0, 0.0, 0.0];
-    let mut this = [u, 1.0, 0.0];
-    for out in out {
-        *out = before;
-        let next = [
-            2.0 * u * this[0] - before[0],
-            2.0 * (this[0] + u * this[1]) - before[1],
-            4.0 * this[1] + 2.0 * u * this[2] - before[2],
-        ];
-        (before, this) = (this, next);
+fn spline_weights(t: f64) -> [[f64; 4]; 3] {
+    let r = 1.0 - t;
+    [
+        [
+            r * r * r / 6.0,
+            (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+            (4.0 - 6.0 * r * r + 3.0 * r * r * r) / 6.0,
+            t * t * t / 6.0,
+        ],
+        [
+            -0.5 * r * r,
+            -2.0 * t + 1.5 * t * t,
+            2.0 * r - 1.5 * r * r,
+            0.5 * t * t,
+        ],
+        [r, 3.0 * t - 2.0, 3.0 * r - 2.0, t],
+    ]
+}
+
+/// B-spline coefficients of a polynomial given by Chebyshev coefficients: values at the knots, then the inverse of 1/6, 4/6, 1/6 along both axes.
+fn spline(polynomial: &[[f64; CHANNELS]], count: usize) -> Vec<[f64; CHANNELS]> {
+    let chebyshev: Vec<f64> = (0..SIDE)
+        .flat_map(|n| {
+            // The polynomial covers twice as much beyond as the spline.
+            let half = (CELLS / 2 + 2 * BEYOND) as f64;
+            let at = (n as f64 - (CELLS / 2 + BEYOND) as f64) / half;
+            let angle = at.clamp(-1.0, 1.0).acos();
+            (0..count).map(move |degree| (degree as f64 * angle).cos())
+        })
+        .collect();
+    let sum = |rows: &[[f64; CHANNELS]], stride: usize, n: usize| {
+        let mut sum = [0.0; CHANNELS];
+        for degree in 0..count {
+            let t = chebyshev[n * count + degree];
+            for (sum, c) in sum.iter_mut().zip(&rows[degree * stride]) {
+                *sum += t * c;
+            }
+        }
+        sum
+    };
+    // [degree along y, knot along x], then [knot along y, knot along x].
+    let half: Vec<[f64; CHANNELS]> = (0..count * SIDE)
+        .map(|n| sum(&polynomial[(n / SIDE) * count..], 1, n % SIDE))
+        .collect();
+    let mut out: Vec<[f64; CHANNELS]> = (0..SIDE * SIDE)
+        .map(|n| sum(&half[n % SIDE..], SIDE, n / SIDE))
+        .collect();
+    for (step, line) in [(1, SIDE), (SIDE, 1)] {
+        for n in 0..SIDE {
+            for channel in 0..CHANNELS {
+                let mut values: Vec<f64> =
+                    (0..SIDE).map(|k| out[n * line + k * step][channel]).collect();
+                unsmooth(&mut values);
+                for (k, value) in values.iter().enumerate() {
+                    out[n * line + k * step][channel] = *value;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Solves (c₋ + 4c + c₊)/6 = value along a line, its ends left as they are.
+fn unsmooth(values: &mut [f64]) {
+    let last = values.len() - 1;
+    let mut factor = vec![0.0; last];
+    for n in 1..last {
+        let pivot = 1.0 / (4.0 - factor[n - 1]);
+        factor[n] = pivot;
+        values[n] = (6.0 * values[n] - values[n - 1]) * pivot;
+    }
+    for n in (1..last).rev() {
+        values[n] -= factor[n] * values[n + 1];
     }
 }
 
@@ -269,16 +348,20 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
         .map(|n| {
             let [x, y] = [places[n % count], places[n / count]];
             let (mut sum, mut weights) = (0.0, 0.0);
+            let around = (REACH + 1.0) * tilt.xx.sqrt() / SPACING;
+            let middle = (x - first) / SPACING;
+            let from = (middle - around).max(0.0) as usize;
+            let to = ((middle + around).ceil() as usize).min(side);
             for (j, row) in facets.chunks_exact(side).enumerate() {
                 let dy = at(j) - y;
-                let dx = first - x;
+                let dx = at(from) - x;
                 let start = xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy;
                 // Rows this far weigh nothing.
                 if dy * dy > tilt.yy * (REACH * REACH + 16.0) {
                     continue;
                 }
                 let slope = 2.0 * (xx * dx + xy * dy) * SPACING + xx * SPACING * SPACING;
-                let [line, weight] = weighed_row(row, start, slope, 2.0 * xx * SPACING * SPACING);
+                let [line, weight] = weighed_row(&row[from..to], start, slope, 2.0 * xx * SPACING * SPACING);
                 sum += line;
                 weights += weight;
             }

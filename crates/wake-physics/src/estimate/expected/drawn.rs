@@ -1,11 +1,11 @@
 //! A scene drawn with frozen plan: the fields of its surface, and what each pixel returns.
 
 use super::cross_section::{CrossSection, OUTER};
-use super::surroundings::{Slopes, Surroundings};
+use super::surroundings::{FIELDS, Slopes, Surroundings};
 use super::waves::{Change, LINEAR, Linear, Seen, WakeSums, difference, sums};
 use super::{ExpectedImage, averaged, imaging, with_ships_of};
 use crate::estimate::value::Value;
-use crate::kelvin::fade_with_slope;
+use crate::kelvin::{fade_at, fade_with_slope};
 use crate::models::Models;
 use crate::numeric::Dual;
 use crate::sar::smooth::{Displacement, Source};
@@ -123,19 +123,31 @@ impl<'a> Surface<'a> {
         }
     }
 
+    /// Whether all pixels are alike: neither waves nor effects.
+    pub(super) fn is_uniform(&self) -> bool {
+        self.wakes.is_empty() && self.surroundings.each().iter().all(Option::is_none)
+    }
+
     pub(super) fn noise(&self) -> f64 {
         self.surroundings.noise
     }
 
-    /// Largest values, without the fading of waves along the hull.
-    pub(super) fn largest(&self) -> Largest {
+    /// Largest values.
+    pub(super) fn largest(&self, raster: &crate::Raster) -> Largest {
         let of = |linear: Linear| {
             let at = self.fields.iter().position(|&f| f == linear);
-            let fields = self.wakes.iter().filter_map(|wake| Some(&wake.sums[at?].field));
-            fields
-                .map(|f| f.values.iter().fold(0f32, |most, v| most.max(v.abs())))
-                .map(f64::from)
-                .sum::<f64>()
+            let pairs = self.wakes.iter().zip(&self.models.wakes);
+            let largest = pairs.filter_map(|(sums, wake)| {
+                let field = &sums.sums[at?].field;
+                let value = |n: usize| {
+                    let (i, j) = (n / raster.columns, n % raster.columns);
+                    let place = [raster.x(j), raster.y(i)];
+                    let shown = fade_at(&wake.track, wake.hull.length(), place);
+                    shown * f64::from(field.values[n].abs())
+                };
+                Some((0..field.values.len()).map(value).fold(0.0, f64::max))
+            });
+            largest.sum::<f64>()
         };
         let rough = self.surroundings.roughness.as_ref();
         let most = |n: usize| {
@@ -198,13 +210,36 @@ struct Place<const N: usize> {
 }
 
 /// Everything that pixels are computed from.
-pub(super) struct Drawn<'a> {
+pub(super) struct Drawn<'a, const N: usize> {
     surface: &'a Surface<'a>,
     cross_section: CrossSection,
     displacement: Displacement,
     raster: crate::Raster,
-    /// By value: derivative of position and forward direction of the first ship, its length, and numbers of the radar.
-    slopes: Vec<ValueSlopes>,
+    /// Ships, of which the first has derivatives.
+    places: Vec<Place<N>>,
+    columns_per_elevation: Dual<N>,
+    variance: Dual<N>,
+    sine: Dual<N>,
+    effects: [Option<EffectField<'a, N>>; FIELDS],
+}
+
+/// A field of an effect and its derivatives by value.
+struct EffectField<'a, const N: usize> {
+    field: &'a [f32],
+    by: Vec<(usize, &'a [f32])>,
+}
+
+impl<const N: usize> EffectField<'_, N> {
+    #[inline(always)]
+    fn at(&self, pixel: usize) -> Dual<N> {
+        let mut dual = Dual::constant(f64::from(self.field[pixel]));
+        for (n, slopes) in &self.by {
+            if let Some(by) = dual.by.get_mut(*n) {
+                *by = f64::from(slopes[pixel]);
+            }
+        }
+        dual
+    }
 }
 
 /// What one value changes besides fields.
@@ -219,92 +254,97 @@ struct ValueSlopes {
     sine: f64,
 }
 
-impl<'a> Drawn<'a> {
-    pub(super) fn new(
-        frozen: &ExpectedImage,
-        surface: &'a Surface<'a>,
-        values: &[Value],
-    ) -> Self {
+/// A number with its derivatives.
+fn dual<const N: usize>(
+    slopes: &[ValueSlopes],
+    value: f64,
+    slope: impl Fn(&ValueSlopes) -> f64,
+) -> Dual<N> {
+    let mut dual = Dual::constant(value);
+    for one in slopes {
+        if let Some(by) = dual.by.get_mut(one.at) {
+            *by = slope(one);
+        }
+    }
+    dual
+}
+
+impl Moved {
+    /// What the value changes besides fields.
+    fn slopes(&self, displacement: impl Fn(&Models) -> Displacement) -> ValueSlopes {
+        let ship = |of: fn(&crate::kelvin::KelvinWake) -> f64| {
+            self.slope(|m| m.wakes.first().map_or(0.0, of))
+        };
+        ValueSlopes {
+            at: self.value as usize,
+            position: [ship(|w| w.track.position[0]), ship(|w| w.track.position[1])],
+            forward: [ship(|w| w.track.forward[0]), ship(|w| w.track.forward[1])],
+            length: ship(|w| w.hull.length()),
+            columns_per_elevation: self.slope(|m| displacement(m).columns_per_elevation),
+            variance: self.slope(|m| displacement(m).variance),
+            sine: self.slope(|m| m.incidence.sin()),
+        }
+    }
+}
+
+impl<'a, const N: usize> Drawn<'a, N> {
+    pub(super) fn new(frozen: &ExpectedImage, surface: &'a Surface<'a>) -> Self {
         let displacement = |models: &Models| {
             Displacement::new(&imaging(models, &frozen.plan), &frozen.raster)
         };
-        let slopes = |moved: &Moved| {
-            let ship = |of: fn(&crate::kelvin::KelvinWake) -> f64| {
-                moved.slope(|m| m.wakes.first().map_or(0.0, of))
-            };
-            ValueSlopes {
-                at: moved.value as usize,
-                position: [
-                    ship(|w| w.track.position[0]),
-                    ship(|w| w.track.position[1]),
-                ],
-                forward: [ship(|w| w.track.forward[0]), ship(|w| w.track.forward[1])],
-                length: ship(|w| w.hull.length()),
-                columns_per_elevation: moved.slope(|m| displacement(m).columns_per_elevation),
-                variance: moved.slope(|m| displacement(m).variance),
-                sine: moved.slope(|m| m.incidence.sin()),
+        let slopes: Vec<ValueSlopes> =
+            surface.moved.iter().map(|moved| moved.slopes(displacement)).collect();
+        let here = displacement(surface.models);
+        let wakes = surface.models.wakes.iter().enumerate();
+        let places = wakes.map(|(n, wake)| {
+            let slopes = if n == 0 { &slopes[..] } else { &[] };
+            Place {
+                position: [0, 1].map(|a| dual(slopes, wake.track.position[a], |s| s.position[a])),
+                forward: [0, 1].map(|a| dual(slopes, wake.track.forward[a], |s| s.forward[a])),
+                length: dual(slopes, wake.hull.length(), |s| s.length),
             }
+        });
+        let each = surface.surroundings.each();
+        let effect = |n: usize| {
+            let field = &each[n]?.values[..];
+            let by = surface.slopes.iter().filter_map(|slopes| {
+                let slope = slopes.fields[n].as_ref()?;
+                Some((slopes.value as usize, &slope.values[..]))
+            });
+            Some(EffectField {
+                field,
+                by: by.collect(),
+            })
         };
-        debug_assert_eq!(values.len(), surface.moved.len());
         Self {
             cross_section: surface.cross_section(frozen, Some(frozen.nodes)),
-            displacement: displacement(surface.models),
             raster: frozen.raster,
-            slopes: surface.moved.iter().map(slopes).collect(),
+            places: places.collect(),
+            columns_per_elevation: dual(&slopes, here.columns_per_elevation, |s| {
+                s.columns_per_elevation
+            }),
+            variance: dual(&slopes, here.variance, |s| s.variance),
+            sine: dual(&slopes, surface.models.incidence.sin(), |s| s.sine),
+            effects: std::array::from_fn(effect),
+            displacement: here,
             surface,
-        }
-    }
-
-    /// A number with its derivatives.
-    #[inline(always)]
-    fn dual<const N: usize>(&self, value: f64, slope: impl Fn(&ValueSlopes) -> f64) -> Dual<N> {
-        let mut dual = Dual::constant(value);
-        for one in &self.slopes {
-            if let Some(by) = dual.by.get_mut(one.at) {
-                *by = slope(one);
-            }
-        }
-        dual
-    }
-
-    #[inline(always)]
-    fn place<const N: usize>(&self, ship: usize) -> Place<N> {
-        let wake = &self.surface.models.wakes[ship];
-        let track = &wake.track;
-        let first = |value: f64, slope: &dyn Fn(&ValueSlopes) -> f64| match ship {
-            0 => self.dual(value, slope),
-            _ => Dual::constant(value),
-        };
-        Place {
-            position: [0, 1].map(|a| first(track.position[a], &|s| s.position[a])),
-            forward: [0, 1].map(|a| first(track.forward[a], &|s| s.forward[a])),
-            length: first(wake.hull.length(), &|s| s.length),
         }
     }
 
     /// A field of an effect with its derivatives.
     #[inline(always)]
-    fn effect<const N: usize>(&self, number: usize, pixel: usize) -> Option<Dual<N>> {
-        let field = self.surface.surroundings.each()[number]?;
-        let mut dual = Dual::constant(f64::from(field.values[pixel]));
-        for slopes in &self.surface.slopes {
-            if let (Some(field), Some(by)) =
-                (&slopes.fields[number], dual.by.get_mut(slopes.value as usize))
-            {
-                *by = f64::from(field.values[pixel]);
-            }
-        }
-        Some(dual)
+    fn effect(&self, number: usize, pixel: usize) -> Option<Dual<N>> {
+        self.effects[number].as_ref().map(|field| field.at(pixel))
     }
 
     /// The linear fields at a pixel, faded along the hulls.
     #[inline(always)]
-    fn linear<const N: usize>(&self, (i, j): (usize, usize)) -> [Dual<N>; LINEAR] {
+    fn linear(&self, (i, j): (usize, usize)) -> [Dual<N>; LINEAR] {
         let mut out = [Dual::constant(0.0); LINEAR];
         let pixel = i * self.raster.columns + j;
         let at = [self.raster.x(j), self.raster.y(i)];
         for (n, wake) in self.surface.wakes.iter().enumerate() {
-            let place = self.place::<N>(n);
+            let place = &self.places[n];
             let from = [0, 1].map(|a| Dual::constant(at[a]) - place.position[a]);
             let ahead = from[0] * place.forward[0] + from[1] * place.forward[1];
             let [shown, by_ahead, by_length] = fade_with_slope(ahead.value, place.length.value);
@@ -343,11 +383,11 @@ impl<'a> Drawn<'a> {
 
     /// What a pixel returns, and where that is imaged.
     #[inline(always)]
-    pub(super) fn source<const N: usize>(&self, i: usize, j: usize) -> Source<N> {
+    pub(super) fn source(&self, i: usize, j: usize) -> Source<N> {
         let pixel = i * self.raster.columns + j;
-        let linear = self.linear::<N>((i, j));
+        let linear = self.linear((i, j));
         let of = |field: Linear| linear[field as usize];
-        let rough = [2, 3, 4].map(|n| self.effect::<N>(n, pixel));
+        let rough = [2, 3, 4].map(|n| self.effect(n, pixel));
         let power = self.returned([of(Linear::SlopeX), of(Linear::SlopeY)], rough, || {
             let mut factor = of(Linear::Modulation).exp();
             if let Some(remaining) = self.effect(0, pixel) {
@@ -360,23 +400,21 @@ impl<'a> Drawn<'a> {
             _ => power,
         };
         let mut radial = of(Linear::Radial);
-        if let Some(current) = self.effect::<N>(1, pixel) {
-            let sine = self.dual(self.surface.models.incidence.sin(), |s| s.sine);
-            radial = radial - current * sine;
+        if let Some(current) = self.effect(1, pixel) {
+            radial = radial - current * self.sine;
         }
         let d = &self.displacement;
-        let columns = self.dual(d.columns_per_elevation, |s| s.columns_per_elevation);
         let acceleration = of(Linear::Acceleration);
         let mut square = acceleration * acceleration;
-        if let Some(rough) = self.effect::<N>(5, pixel) {
+        if let Some(rough) = self.effect(5, pixel) {
             square = square + rough * rough;
         }
         let least = crate::sar::smooth::SMALLEST_VARIANCE;
-        let variance = self.dual(d.variance, |s| s.variance) + square.times(d.variance_per_square);
+        let variance = self.variance + square.times(d.variance_per_square);
         Source {
             power,
             up: radial.times(d.rows_per_velocity),
-            left: of(Linear::Elevation) * columns,
+            left: of(Linear::Elevation) * self.columns_per_elevation,
             variance: match variance.value > least {
                 true => variance,
                 false => Dual::constant(least),
@@ -388,7 +426,7 @@ impl<'a> Drawn<'a> {
     ///
     /// - `rough`: slope variances xx, xy, yy below the pixels; `factor` on the Bragg return
     #[inline(always)]
-    fn returned<const N: usize>(
+    fn returned(
         &self,
         slope: [Dual<N>; 2],
         rough: [Option<Dual<N>>; 3],

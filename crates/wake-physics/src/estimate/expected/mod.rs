@@ -138,7 +138,7 @@ impl ExpectedImage {
             plan: prepared.plan.clone(),
         };
         let surface = Surface::new(&frozen, scene, models, &[]);
-        let largest = surface.largest();
+        let largest = surface.largest(&raster);
         let rough = largest.roughness.sqrt();
         frozen.reach = (STEEPER * (largest.slope + 2.9 * rough)).clamp(0.1, 1.5);
         let series = surface.cross_section(&frozen, None);
@@ -196,9 +196,16 @@ impl ExpectedImage {
             });
         }
         let surface = Surface::new(self, scene, &models, values);
-        let drawn = Drawn::new(self, &surface, values);
+        let drawn = Drawn::<N>::new(self, &surface);
         let by: Vec<usize> = values.iter().map(|v| *v as usize).collect();
-        let mut fields = self.sum.image(&by, |i, j| drawn.source::<N>(i, j));
+        let mut fields = match surface.is_uniform() {
+            true => {
+                let power = drawn.source(0, 0).power;
+                let values = std::iter::once(power.value).chain(by.iter().map(|&n| power.by[n]));
+                values.map(|v| Field::constant(&self.computed, v as f32)).collect()
+            }
+            false => self.sum.image(&by, |i, j| drawn.source(i, j)),
+        };
         let noise = surface.noise() as f32;
         fields[0].values.iter_mut().for_each(|v| *v += noise);
         let finish = |field: Field| match &models.response {
@@ -263,7 +270,3 @@ fn with_ships_of(scene: &Scene, models: &Models) -> Models {
         ..models.clone()
     }
 }
-
-#[cfg(test)]
-#[path = "tests.rs"]
-mod tests;

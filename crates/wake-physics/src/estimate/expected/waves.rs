@@ -17,6 +17,7 @@ use crate::track::Track;
 use crate::waves::{LARGEST_MODULATING_WAVENUMBER, PlaneWaves, Quantity, Transfer};
 use crate::workspace::Workspace;
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 /// Fields that the image is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,7 +166,7 @@ pub(super) fn sums(
     let of = |seen| Strengths::new(seen, plan, fields, Some(modulating));
     let here = of(seen);
     let changed: Vec<(Value, [Option<Strengths>; 4], f64)> = changes
-        .iter()
+        .par_iter()
         .map(|change| (change.value, change.seen.map(|s| s.map(of)), change.step))
         .collect();
     let stretches = changed
