@@ -25,7 +25,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value = "decibel")]
     pub(crate) grey: GreyName,
     /// Midship in the image, column and row, within --within metres; by default the middle of the image
-    #[arg(long, value_name = "COLUMN,ROW", value_delimiter = ',', num_args = 2, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "COLUMN,ROW",
+        value_delimiter = ',',
+        num_args = 2,
+        allow_negative_numbers = true
+    )]
     pub(crate) ship: Option<Vec<f64>>,
     /// Distance from --ship within which the ship is looked for [m]
     #[arg(long, value_name = "METRES", default_value_t = 150.0)]

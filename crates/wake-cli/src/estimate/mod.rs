@@ -44,12 +44,18 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     options.detection = detection(arguments, &known);
     let found = estimate(&image, &known, &options)?;
     // A scene beyond what a prompt can say has none.
-    let sentence = found.wakes.first().and_then(|_| wake_text::prompt(&rounded(&found.scene)).ok());
+    let sentence = found
+        .wakes
+        .first()
+        .and_then(|_| wake_text::prompt(&rounded(&found.scene)).ok());
     let told = told::as_json(&found, sentence.as_deref());
     let out = &arguments.out;
     whole_files::make_folder(out)?;
     whole_files::write_json(&out.join("estimate.json"), &told)?;
-    whole_files::write_atomically(&out.join("estimate.toml"), found.scene.to_toml()?.as_bytes())?;
+    whole_files::write_atomically(
+        &out.join("estimate.toml"),
+        found.scene.to_toml()?.as_bytes(),
+    )?;
     sheet(&image, &found).write(&out.join("estimate.png"))?;
     if arguments.json {
         exit::say(&format!("{told:#}"))?;

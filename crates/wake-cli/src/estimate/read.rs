@@ -11,7 +11,6 @@ use wake_physics::grey::GreyScale;
 
 use super::arguments::GreyName;
 
-
 /// The field of a simulation that has speckle.
 const FIELD: &str = "speckled";
 
@@ -19,7 +18,8 @@ const FIELD: &str = "speckled";
 pub(crate) fn intensity(path: &Path, grey: GreyName) -> Outcome<(Field, bool)> {
     let bytes = whole_files::read_bytes(path)?;
     if path.extension().is_some_and(|e| e == "safetensors") {
-        let field = tensor(&bytes).map_err(|why| format!("cannot read {}: {why}", path.display()))?;
+        let field =
+            tensor(&bytes).map_err(|why| format!("cannot read {}: {why}", path.display()))?;
         return Ok((field, true));
     }
     let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;

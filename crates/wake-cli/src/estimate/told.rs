@@ -49,18 +49,30 @@ pub(crate) fn as_text(estimate: &Estimate, sentence: Option<&str>) -> String {
     };
     let mut lines = vec![
         format!("heading       {}", with(wake.heading, 1, "deg")),
-        format!("speed         {} (through the water)", with(wake.speed, 2, "m/s")),
+        format!(
+            "speed         {} (through the water)",
+            with(wake.speed, 2, "m/s")
+        ),
         format!("midship x     {}", with(wake.position[0], 1, "m")),
         format!("midship y     {}", with(wake.position[1], 1, "m")),
-        format!("length        {} (beam and draft in proportion)", with(wake.length, 0, "m")),
+        format!(
+            "length        {} (beam and draft in proportion)",
+            with(wake.length, 0, "m")
+        ),
         format!("wind speed    {}", with(wake.wind_speed, 2, "m/s")),
         format!("wind toward   {}", with(wake.wind_toward, 1, "deg")),
     ];
     if let Some(radial) = wake.radial_velocity {
-        lines.push(format!("toward radar  {} (by the ship's echo)", with(radial, 2, "m/s")));
+        lines.push(format!(
+            "toward radar  {} (by the ship's echo)",
+            with(radial, 2, "m/s")
+        ));
     }
     if !wake.identifiable {
-        lines.push("speed and heading are not identifiable: see the deviations and alternatives".to_owned());
+        lines.push(
+            "speed and heading are not identifiable: see the deviations and alternatives"
+                .to_owned(),
+        );
     }
     for other in &wake.alternatives {
         lines.push(format!(
@@ -82,7 +94,10 @@ pub(crate) fn as_text(estimate: &Estimate, sentence: Option<&str>) -> String {
 
 fn with(fitted: Fitted, digits: usize, unit: &str) -> String {
     match fitted.deviation.is_finite() {
-        true => format!("{:.digits$} ± {:.digits$} {unit}", fitted.value, fitted.deviation),
+        true => format!(
+            "{:.digits$} ± {:.digits$} {unit}",
+            fitted.value, fitted.deviation
+        ),
         false => format!("{:.digits$} {unit}, not told by the image", fitted.value),
     }
 }

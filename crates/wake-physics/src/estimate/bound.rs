@@ -2,8 +2,8 @@
 
 use super::expected::ExpectedImage;
 use super::fit::{Priors, values_of};
-use super::matrix::Matrix;
 use super::likelihood::{Observed, Texture};
+use super::matrix::Matrix;
 use super::parameter::{Parameter, State};
 use super::torus::Torus;
 use crate::error::Result;
@@ -66,7 +66,11 @@ pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result
         .map(|n| observed.torus.weight(n) * f64::from(spectrum[n].norm_sqr() / power[n]))
         .sum();
     Ok(Bound {
-        deviations: parameters.iter().enumerate().map(|(n, p)| (*p, deviation(n))).collect(),
+        deviations: parameters
+            .iter()
+            .enumerate()
+            .map(|(n, p)| (*p, deviation(n)))
+            .collect(),
         wake_to_noise: observed.taper.energy * sum / area,
     })
 }
@@ -120,7 +124,11 @@ fn of_mean(torus: &Torus, covariance: &Field, directions: &[Field]) -> Matrix {
     let mut out = Matrix::zero(directions.len());
     for (p, a) in directions.iter().enumerate() {
         for (q, b) in solved.iter().enumerate() {
-            out.add(p, q, 0.5 * (inner(a, b) + inner(&directions[q], &solved[p])));
+            out.add(
+                p,
+                q,
+                0.5 * (inner(a, b) + inner(&directions[q], &solved[p])),
+            );
         }
     }
     out

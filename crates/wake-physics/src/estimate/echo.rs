@@ -41,7 +41,8 @@ impl Echo {
             let inside = i > 0 && j > 0 && i + 1 < image.rows && j + 1 < image.columns;
             inside.then_some((i, j))
         };
-        let bright = |(i, j): (usize, usize)| (mean(i, j) > BRIGHT * level).then(|| (mean(i, j), i, j));
+        let bright =
+            |(i, j): (usize, usize)| (mean(i, j) > BRIGHT * level).then(|| (mean(i, j), i, j));
         let spots = (0..image.values.len()).filter_map(inner).filter_map(bright);
         let (_, row, column) = spots.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let length = scene.ships.first().map_or(100.0, |ship| ship.length);
@@ -78,7 +79,10 @@ impl Echo {
     /// Weight of a pixel: 0 where the echo is.
     pub(super) fn shown(&self, scene: &Scene, i: usize, j: usize) -> f64 {
         let raster = Raster::image(scene.grid.rows, scene.grid.columns, scene.grid.spacing);
-        let [dx, dy] = [raster.x(j) - self.position[0], raster.y(i) - self.position[1]];
+        let [dx, dy] = [
+            raster.x(j) - self.position[0],
+            raster.y(i) - self.position[1],
+        ];
         // Sidelobes lie along range and azimuth.
         let edge = |d: f64| (d / self.radius - 1.0).clamp(0.0, 1.0);
         edge(dx.hypot(dy))
@@ -96,7 +100,8 @@ impl Echo {
     pub(super) fn slope(&self, state: &State, parameter: Parameter) -> [f64; 2] {
         let by_displacement = |value: Value| {
             let step = value.step(&state.scene);
-            let [below, above] = [-step, step].map(|by| displacement(&value.moved(&state.scene, by)));
+            let [below, above] =
+                [-step, step].map(|by| displacement(&value.moved(&state.scene, by)));
             (above - below) / (2.0 * step) / self.deviation
         };
         match parameter {
@@ -110,7 +115,11 @@ impl Echo {
     }
 
     /// Velocity toward the radar by the echo's azimuth less that of midship \[m\], with its deviation.
-    pub(super) fn radial_velocity(&self, scene: &Scene, [y, deviation]: [f64; 2]) -> Option<[f64; 2]> {
+    pub(super) fn radial_velocity(
+        &self,
+        scene: &Scene,
+        [y, deviation]: [f64; 2],
+    ) -> Option<[f64; 2]> {
         let ratio = scene.radar.range_to_velocity;
         (ratio > 0.0).then(|| {
             [
@@ -123,7 +132,8 @@ impl Echo {
 
 /// Azimuth of a ship's echo less that of the ship \[m\].
 fn displacement(scene: &Scene) -> f64 {
-    let [speed, heading, incidence] = [Value::Speed, Value::Heading, Value::Incidence].map(|v| v.of(scene));
+    let [speed, heading, incidence] =
+        [Value::Speed, Value::Heading, Value::Incidence].map(|v| v.of(scene));
     let radial = ship_radial_velocity(speed, heading, incidence.to_radians());
     azimuth_displacement(scene.radar.range_to_velocity, radial)
 }

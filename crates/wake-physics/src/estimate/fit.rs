@@ -61,7 +61,11 @@ impl Priors {
 
 /// Values that derivatives are needed by.
 pub(super) fn values_of(parameters: &[Parameter]) -> Vec<Value> {
-    let mut values: Vec<Value> = parameters.iter().flat_map(|p| p.values()).copied().collect();
+    let mut values: Vec<Value> = parameters
+        .iter()
+        .flat_map(|p| p.values())
+        .copied()
+        .collect();
     values.sort_unstable();
     values.dedup();
     values
@@ -131,7 +135,12 @@ const STALE: [f64; 2] = [0.02, 2.0];
 
 impl Fitter<'_> {
     /// Follows the likelihood uphill from a start.
-    pub(super) fn mode(&self, start: &State, parameters: &[Parameter], finish: bool) -> Result<Fit> {
+    pub(super) fn mode(
+        &self,
+        start: &State,
+        parameters: &[Parameter],
+        finish: bool,
+    ) -> Result<Fit> {
         let values = values_of(parameters);
         let mut frozen = ExpectedImage::new(&start.scene, &values)?;
         let mut frozen_at = start.scene.clone();
@@ -139,7 +148,9 @@ impl Fitter<'_> {
         let mut texture = Texture::new(&state.scene, parameters)?;
         let mut texture_at = state.scene.clone();
         let mut expected = frozen.at(&state.scene)?;
-        let mut near = self.observed.near(parameters, (&state, &expected), &texture, false);
+        let mut near = self
+            .observed
+            .near(parameters, (&state, &expected), &texture, false);
         let mut posterior = self.posterior(parameters, &state, &near);
         let (mut damping, mut converged) = (1e-3, false);
         for _ in 0..self.steps {
@@ -156,9 +167,15 @@ impl Fitter<'_> {
             }
             let candidate = frozen.at(&next.scene)?;
             let moved = stale(&texture_at, &next.scene);
-            let newer = if moved { Some(Texture::new(&next.scene, parameters)?) } else { None };
+            let newer = if moved {
+                Some(Texture::new(&next.scene, parameters)?)
+            } else {
+                None
+            };
             let used = newer.as_ref().unwrap_or(&texture);
-            let there = self.observed.near(parameters, (&next, &candidate), used, false);
+            let there = self
+                .observed
+                .near(parameters, (&next, &candidate), used, false);
             let found = self.posterior(parameters, &next, &there);
             if found > posterior - 0.05 {
                 damping = (damping * 0.2f64).max(1e-6);
@@ -175,7 +192,9 @@ impl Fitter<'_> {
         }
         if finish {
             let texture = Texture::new(&state.scene, parameters)?;
-            near = self.observed.near(parameters, (&state, &expected), &texture, true);
+            near = self
+                .observed
+                .near(parameters, (&state, &expected), &texture, true);
             posterior = self.posterior(parameters, &state, &near);
         }
         Ok(Fit {
@@ -192,7 +211,9 @@ impl Fitter<'_> {
     fn posterior(&self, parameters: &[Parameter], state: &State, near: &Near) -> f64 {
         let prior = parameters.iter().map(|p| self.priors.at(*p, state)[0]);
         let echo = self.echo.as_ref().filter(|_| !state.scene.ships.is_empty());
-        let echo = echo.map_or(0.0, |e| -0.5 * e.residual(state).iter().map(|r| r * r).sum::<f64>());
+        let echo = echo.map_or(0.0, |e| {
+            -0.5 * e.residual(state).iter().map(|r| r * r).sum::<f64>()
+        });
         near.log_likelihood + prior.sum::<f64>() + echo
     }
 
@@ -213,7 +234,10 @@ impl Fitter<'_> {
     /// Slope of ln of what is known besides the image.
     fn known_slope(&self, parameter: Parameter, state: &State) -> f64 {
         let echo = self.echo.as_ref().map_or(0.0, |echo| {
-            let pairs = echo.residual(state).into_iter().zip(echo.slope(state, parameter));
+            let pairs = echo
+                .residual(state)
+                .into_iter()
+                .zip(echo.slope(state, parameter));
             pairs.map(|(r, slope)| r * slope).sum()
         });
         self.priors.at(parameter, state)[1] + echo
@@ -227,7 +251,11 @@ impl Fitter<'_> {
         near: &Near,
         damping: f64,
     ) -> Option<(State, f64)> {
-        let mut slope = near.information.slope.clone().plus(&self.known(parameters, state));
+        let mut slope = near
+            .information
+            .slope
+            .clone()
+            .plus(&self.known(parameters, state));
         let plain = slope.inverse();
         for n in 0..parameters.len() {
             let own = slope.at(n, n);
@@ -270,7 +298,8 @@ fn far(frozen: &Scene, scene: &Scene) -> bool {
 fn stale(texture: &Scene, scene: &Scene) -> bool {
     let turned = scene.sea.wind_toward - texture.sea.wind_toward;
     let turned = (turned + 180.0).rem_euclid(360.0) - 180.0;
-    (scene.sea.wind_speed / texture.sea.wind_speed - 1.0).abs() > STALE[0] || turned.abs() > STALE[1]
+    (scene.sea.wind_speed / texture.sea.wind_speed - 1.0).abs() > STALE[0]
+        || turned.abs() > STALE[1]
 }
 
 /// Relative intensity that a fit leaves, and the image that it makes.

@@ -176,14 +176,23 @@ impl Observed {
         let power: Vec<f32> = power.into_iter().map(|p| p.max(floor)).collect();
         let gain = state.gain.exp() as f32;
         let mean = &expected.intensity.values;
-        let residual = taper.of(self.image.values.iter().zip(mean).map(|(i, m)| i / (gain * m) - 1.0));
+        let residual = taper.of(self
+            .image
+            .values
+            .iter()
+            .zip(mean)
+            .map(|(i, m)| i / (gain * m) - 1.0));
         let directions = self.directions(parameters, (state, expected));
         let zero = Field::default();
         let mut spectra: Vec<Spectrum> = Vec::new();
         let all: Vec<&Field> = std::iter::once(&residual).chain(&directions).collect();
         for pair in all.chunks(2) {
             let second = pair.get(1).copied().unwrap_or(&zero);
-            let second = if second.values.is_empty() { pair[0] } else { second };
+            let second = if second.values.is_empty() {
+                pair[0]
+            } else {
+                second
+            };
             let [a, b] = torus.spectra([pair[0], second]);
             spectra.push(a);
             if pair.len() > 1 {
@@ -209,7 +218,8 @@ impl Observed {
         };
         if with_variance {
             let covariance = texture.noise.covariance(factor);
-            near.information.variance = self.variance(scale, (&power, &covariance), (&spectra, &slopes));
+            near.information.variance =
+                self.variance(scale, (&power, &covariance), (&spectra, &slopes));
         }
         near
     }
@@ -261,10 +271,17 @@ impl Observed {
         self.taper.of(sum.values.into_iter())
     }
 
-    fn log_likelihood(&self, scale: f64, (left, power): (&Spectrum, &[f32]), gain: f32, mean: &[f32]) -> f64 {
+    fn log_likelihood(
+        &self,
+        scale: f64,
+        (left, power): (&Spectrum, &[f32]),
+        gain: f32,
+        mean: &[f32],
+    ) -> f64 {
         let term = |n: usize| {
             let power = f64::from(power[n]);
-            self.torus.weight(n) * (f64::from(left[n].norm_sqr()) / power + (power / self.taper.energy).ln())
+            self.torus.weight(n)
+                * (f64::from(left[n].norm_sqr()) / power + (power / self.taper.energy).ln())
         };
         let spectrum: f64 = (0..left.len()).map(term).sum();
         let jacobian: f64 = mean
@@ -302,7 +319,9 @@ impl Observed {
     ) -> (Information, Matrix) {
         let size = spectra.len();
         let [mut of_mean, mut of_power] = [Matrix::zero(size), Matrix::zero(size)];
-        let pairs: Vec<[usize; 2]> = (0..size).flat_map(|p| (0..=p).map(move |q| [p, q])).collect();
+        let pairs: Vec<[usize; 2]> = (0..size)
+            .flat_map(|p| (0..=p).map(move |q| [p, q]))
+            .collect();
         let sums: Vec<[f64; 2]> = pairs
             .par_iter()
             .map(|&[p, q]| {
@@ -321,7 +340,11 @@ impl Observed {
             })
             .collect();
         for (&[p, q], [mean, power]) in pairs.iter().zip(sums) {
-            for [p, q] in if p == q { vec![[p, q]] } else { vec![[p, q], [q, p]] } {
+            for [p, q] in if p == q {
+                vec![[p, q]]
+            } else {
+                vec![[p, q], [q, p]]
+            } {
                 of_mean.add(p, q, mean);
                 of_power.add(p, q, power);
             }
@@ -343,11 +366,20 @@ impl Observed {
         (spectra, slopes): (&[Spectrum], &[Option<Vec<f32>>]),
     ) -> Matrix {
         let (torus, taper) = (&self.torus, &self.taper);
-        let exact: Vec<f32> = torus.spectrum(covariance).iter().map(|v| v.re.max(0.0)).collect();
+        let exact: Vec<f32> = torus
+            .spectrum(covariance)
+            .iter()
+            .map(|v| v.re.max(0.0))
+            .collect();
         let keep = [self.image.rows, self.image.columns];
         let whitened: Vec<Spectrum> = spectra
             .iter()
-            .map(|s| s.iter().zip(power).map(|(d, p)| d * (taper.energy as f32 / p)).collect())
+            .map(|s| {
+                s.iter()
+                    .zip(power)
+                    .map(|(d, p)| d * (taper.energy as f32 / p))
+                    .collect()
+            })
             .collect();
         // v = w F⁻¹[D/S], so that g = Σ v r.
         let mut seen: Vec<Spectrum> = Vec::new();

@@ -56,7 +56,11 @@ impl Matrix {
                 if i == j && rest < 1e-10 {
                     return None;
                 }
-                let value = if i == j { rest.sqrt() } else { rest / lower.at(j, j) };
+                let value = if i == j {
+                    rest.sqrt()
+                } else {
+                    rest / lower.at(j, j)
+                };
                 lower.values[i * n + j] = value;
             }
         }

@@ -43,7 +43,8 @@ impl Noise {
         let size = covariance.rows;
         let lags = correlations(scene, size);
         let looks = equivalent_looks(scene);
-        let speckle = (0..size * size).map(|n| (lags[0][n / size] * lags[1][n % size] / looks) as f32);
+        let speckle =
+            (0..size * size).map(|n| (lags[0][n / size] * lags[1][n % size] / looks) as f32);
         Ok(Self {
             size,
             speckle: speckle.collect(),
@@ -79,7 +80,10 @@ fn correlations(scene: &Scene, size: usize) -> [Vec<f64>; 2] {
     let radar = &scene.radar;
     let window = radar.window.unwrap_or(Window::Uniform);
     let axes = [
-        (radar.azimuth_resolution, radar.azimuth_window.unwrap_or(window)),
+        (
+            radar.azimuth_resolution,
+            radar.azimuth_window.unwrap_or(window),
+        ),
         (radar.range_resolution.unwrap_or(1.0), window),
     ];
     axes.map(|(resolution, window)| {

@@ -163,7 +163,12 @@ impl<'a> Filters<'a> {
         let shown = Field::from_fn(&self.raster, |i, j| {
             fade_at(&wake.track, length, [self.raster.x(j), self.raster.y(i)]) as f32
         });
-        for ((v, s), w) in field.values.iter_mut().zip(&shown.values).zip(&self.observed.taper.weights.values) {
+        for ((v, s), w) in field
+            .values
+            .iter_mut()
+            .zip(&shown.values)
+            .zip(&self.observed.taper.weights.values)
+        {
             *v *= s * w;
         }
         field

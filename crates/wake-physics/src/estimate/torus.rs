@@ -30,7 +30,11 @@ impl Torus {
     /// How many wavenumbers of the whole plane one of the half plane stands for.
     pub(super) fn weight(&self, n: usize) -> f64 {
         let line = n / self.size;
-        if (2 * line).is_multiple_of(self.size) { 1.0 } else { 2.0 }
+        if (2 * line).is_multiple_of(self.size) {
+            1.0
+        } else {
+            2.0
+        }
     }
 
     /// Spectra of two real fields that fill the torus from its first row and column on.
@@ -109,7 +113,9 @@ mod tests {
 
     fn field(rows: usize, columns: usize, seed: u32) -> Field {
         let value = |n: usize| {
-            let mixed = (n as u32 + 1).wrapping_mul(2_654_435_761).wrapping_add(seed);
+            let mixed = (n as u32 + 1)
+                .wrapping_mul(2_654_435_761)
+                .wrapping_add(seed);
             (mixed >> 8) as f32 / (1u32 << 24) as f32 - 0.5
         };
         Field {
@@ -129,7 +135,12 @@ mod tests {
             let product: f64 = (0..torus.half())
                 .map(|n| torus.weight(n) * f64::from((one[n].conj() * two[n]).re))
                 .sum();
-            let direct: f64 = a.values.iter().zip(&b.values).map(|(x, y)| f64::from(x * y)).sum();
+            let direct: f64 = a
+                .values
+                .iter()
+                .zip(&b.values)
+                .map(|(x, y)| f64::from(x * y))
+                .sum();
             assert!((product / (size * size) as f64 - direct).abs() < 1e-4);
             let [back, again] = torus.fields([&one, &two], [15, 12]);
             for (from, to) in [(&a, &back), (&b, &again)] {

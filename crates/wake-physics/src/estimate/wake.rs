@@ -7,101 +7,13 @@ use super::likelihood::Observed;
 use super::noise::Noise;
 use super::options::{Detection, Options};
 use super::parameter::{Parameter, State};
+use super::report::{Alternative, Estimate, Estimated, Fitted, GoodnessOfFit};
 use super::search::{Filters, Start, Wind, winds};
 use super::value::Value;
 use crate::error::{Error, Result};
 use crate::measure::angle_between;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
-use serde::Serialize;
-
-/// A value with its standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Fitted {
-    /// The value.
-    pub value: f64,
-    /// Its standard deviation; infinite where the image does not tell.
-    pub deviation: f64,
-}
-
-/// Everything read from one image.
-#[derive(Debug, Clone)]
-pub struct Estimate {
-    /// Wakes: one, or none where the image shows none.
-    pub wakes: Vec<Estimated>,
-    /// The expected image of the estimate, in the unit of the image, and what it leaves of the image, relative.
-    pub fit: Field,
-    /// Relative residual I/μ − 1.
-    pub residual: Field,
-    /// The scene of the estimate.
-    pub scene: Scene,
-}
-
-/// A wake with the ship and the sea that made it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Estimated {
-    /// Bow (column, row) in the image, where the ship is and not where its echo appears.
-    pub tip: [f64; 2],
-    /// Midship (x, y) \[m\].
-    pub position: [Fitted; 2],
-    /// Where the ship moves to \[deg\].
-    pub heading: Fitted,
-    /// Speed through the water [m/s]: a current is not seen.
-    pub speed: Fitted,
-    /// Length \[m\], beam and draft in proportion to those of the scene that was given.
-    pub length: Fitted,
-    /// Wind speed [m/s].
-    pub wind_speed: Fitted,
-    /// Where the wind blows to \[deg\].
-    pub wind_toward: Fitted,
-    /// Factor on the image, and on the variance of its texture.
-    pub nuisance: [Fitted; 2],
-    /// Names of the values in the covariance.
-    pub names: Vec<&'static str>,
-    /// Covariance of all values, row after row.
-    pub covariance: Vec<f64>,
-    /// Velocity toward the radar by the displacement of the ship's echo [m/s], where there is an echo.
-    pub radial_velocity: Option<Fitted>,
-    /// ln likelihood, priors included.
-    pub log_likelihood: f64,
-    /// The same less that of the sea without a wake.
-    pub above_sea: f64,
-    /// Whether the image tells speed and heading: the wake stands out, no other mode is as likely, and the deviations are
-    /// small.
-    pub identifiable: bool,
-    /// Other modes.
-    pub alternatives: Vec<Alternative>,
-    /// How well the model fits.
-    pub goodness_of_fit: GoodnessOfFit,
-}
-
-/// Another ship or wind that may have made the image.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Alternative {
-    /// Probability against the estimate and the other modes, 0 to 1.
-    pub weight: f64,
-    /// Speed [m/s].
-    pub speed: f64,
-    /// Heading \[deg\].
-    pub heading: f64,
-    /// Wind speed [m/s].
-    pub wind_speed: f64,
-    /// Where the wind blows to \[deg\].
-    pub wind_toward: f64,
-}
-
-/// How far what is left differs from sea and speckle, in standard deviations.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GoodnessOfFit {
-    /// Power that is left over its expectation, by ring of wavenumbers, the longest waves first.
-    pub power: Vec<f64>,
-    /// The largest difference of the power from 1.
-    pub largest: f64,
-    /// Gain and texture over their prior deviations.
-    pub priors: [f64; 2],
-    /// Whether nothing stands out.
-    pub consistent: bool,
-}
 
 /// ln likelihood ratio of wake to none that counts as a wake: of 200 images without one the largest is lower.
 const LEAST_ABOVE_SEA: f64 = 20.0;
@@ -161,7 +73,12 @@ pub fn estimate(image: &Field, known: &Scene, options: &Options) -> Result<Estim
             false => turned,
         });
     }
-    Ok(report(best, &sea, (&winds_of, &others), (echo.as_ref(), options)))
+    Ok(report(
+        best,
+        &sea,
+        (&winds_of, &others),
+        (echo.as_ref(), options),
+    ))
 }
 
 /// Distance from the middle of the image within which a ship is looked for where no detection says where \[m\].
@@ -203,7 +120,11 @@ fn prepared(image: &Field, known: &Scene) -> Result<Scene> {
     let lit = image.values.iter().all(|v| v.is_finite() && *v >= 0.0) && image.mean() > 0.0;
     if !lit {
         let requirement = "but intensities are finite, not negative, and not all 0";
-        return conflict("image", "dark or not a number somewhere".to_owned(), requirement);
+        return conflict(
+            "image",
+            "dark or not a number somewhere".to_owned(),
+            requirement,
+        );
     }
     if known.ships.is_empty() {
         let requirement = "but an estimate needs the proportions of one";
@@ -252,7 +173,10 @@ fn ships(
     template.scene.sea = sea.state.scene.sea.clone();
     let moved = |[a, b]: [f64; 2]| [a - x, b - y];
     let echo = echo.map(|echo| echo.moved(moved));
-    let shown = |i: usize, j: usize| echo.as_ref().map_or(1.0, |e| e.shown(&template.scene, i, j));
+    let shown = |i: usize, j: usize| {
+        echo.as_ref()
+            .map_or(1.0, |e| e.shown(&template.scene, i, j))
+    };
     let torus = Noise::new(&template.scene)?.size;
     let observed = Observed::new(coarse.image.clone(), torus, shown);
     let fitter = Fitter {
@@ -329,7 +253,12 @@ fn nothing(sea: &Fit, known: &Scene) -> Estimate {
 }
 
 /// A fit as an estimate.
-fn report(best: Fit, sea: &Fit, (winds, ships): (&[Fit], &[Ship]), (echo, options): (Option<&Echo>, &Options)) -> Estimate {
+fn report(
+    best: Fit,
+    sea: &Fit,
+    (winds, ships): (&[Fit], &[Ship]),
+    (echo, options): (Option<&Echo>, &Options),
+) -> Estimate {
     let above_sea = best.log_posterior - sea.log_posterior;
     if above_sea < LEAST_ABOVE_SEA {
         return nothing(sea, &best.state.scene);
@@ -364,7 +293,10 @@ fn report(best: Fit, sea: &Fit, (winds, ships): (&[Fit], &[Ship]), (echo, option
         wind_toward: read(Parameter::Value(Value::WindToward)),
         nuisance: [Parameter::Gain, Parameter::Texture].map(read),
         names: best.parameters.iter().map(|p| p.name()).collect(),
-        covariance: best.covariance.as_ref().map_or_else(Vec::new, |m| m.values.clone()),
+        covariance: best
+            .covariance
+            .as_ref()
+            .map_or_else(Vec::new, |m| m.values.clone()),
         radial_velocity: radial.map(|[value, deviation]| Fitted { value, deviation }),
         log_likelihood: best.log_posterior,
         above_sea,
@@ -388,9 +320,13 @@ fn report(best: Fit, sea: &Fit, (winds, ships): (&[Fit], &[Ship]), (echo, option
 fn alternatives(best: &Fit, winds: &[Fit], ships: &[Ship]) -> Vec<Alternative> {
     let sea = &best.state.scene.sea;
     let winds = winds.iter().map(|fit| {
-        let [speed, heading, wind_speed, wind_toward] =
-            [Value::Speed, Value::Heading, Value::WindSpeed, Value::WindToward]
-                .map(|v| v.of(&fit.state.scene));
+        let [speed, heading, wind_speed, wind_toward] = [
+            Value::Speed,
+            Value::Heading,
+            Value::WindSpeed,
+            Value::WindToward,
+        ]
+        .map(|v| v.of(&fit.state.scene));
         Alternative {
             weight: (fit.log_posterior - best.log_posterior).min(50.0).exp(),
             speed,
@@ -425,7 +361,10 @@ fn goodness(best: &Fit, priors: &Priors) -> GoodnessOfFit {
         let peakedness = 1.0;
         (ratio - 1.0) / (2.0 * peakedness / count.max(1.0)).sqrt()
     });
-    let largest = deviations.fold(0.0, |most: f64, d| if d.abs() > most.abs() { d } else { most });
+    let largest = deviations.fold(
+        0.0,
+        |most: f64, d| if d.abs() > most.abs() { d } else { most },
+    );
     let [gain, texture] = [
         (Parameter::Gain, priors.gain),
         (Parameter::Texture, priors.texture),

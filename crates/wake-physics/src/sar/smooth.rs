@@ -13,8 +13,8 @@
 //!
 //! so that weights change by at most 3d/8 = 0.012 of the power and still sum to 1.
 
-use super::imaging::{Imaging, Response};
 pub(crate) use super::imaging::SMALLEST_VARIANCE;
+use super::imaging::{Imaging, Response};
 use super::spread::Steps;
 use crate::numeric::{Dual, vectorized};
 use crate::raster::{Field, Raster};
@@ -122,7 +122,11 @@ impl SmoothSum {
                 image.origin_row - sources.origin_row,
                 image.origin_column - sources.origin_column,
             ],
-            lean: if lean > 0.0 { lean.ceil() as usize + 2 } else { 0 },
+            lean: if lean > 0.0 {
+                lean.ceil() as usize + 2
+            } else {
+                0
+            },
             pad,
             count: image.rows.div_ceil(steps.step) + 2 * pad,
             steps,
@@ -162,7 +166,11 @@ impl SmoothSum {
                 for (j, value) in row.iter_mut().enumerate() {
                     let line = ((j % BLOCK) * parts + part) * self.count + first as usize;
                     let steps = &blocks[j / BLOCK][line..][..weights.len()];
-                    let sum: f64 = steps.iter().zip(weights).map(|(s, &w)| s * f64::from(w)).sum();
+                    let sum: f64 = steps
+                        .iter()
+                        .zip(weights)
+                        .map(|(s, &w)| s * f64::from(w))
+                        .sum();
                     *value = sum as f32;
                 }
             });

@@ -24,7 +24,11 @@ const HARD: [&[&str]; 7] = [
     &["radar.range_to_velocity=0"],
     &["radar.range_to_velocity=150", "ship.heading=170"],
     &["radar.incidence=16", "sea.wind_speed=7"],
-    &["radar.incidence=45", "sea.wind_speed=3", "ship.position=[190, -180]"],
+    &[
+        "radar.incidence=45",
+        "sea.wind_speed=3",
+        "ship.position=[190, -180]",
+    ],
     &[
         "radar.sensor=sentinel-1-iw",
         "grid.spacing=10",
@@ -48,10 +52,16 @@ fn it_is_the_expected_image() {
         let (largest, rms) = expected.difference(&found);
         let deviation = {
             let mean = expected.mean();
-            let square = expected.values.iter().map(|v| (f64::from(*v) - mean).powi(2));
+            let square = expected
+                .values
+                .iter()
+                .map(|v| (f64::from(*v) - mean).powi(2));
             (square.sum::<f64>() / expected.values.len() as f64).sqrt()
         };
-        println!("{keys:?}: {rms:.2e} {largest:.2e} mean {:.3e} deviation {deviation:.2e}", expected.mean());
+        println!(
+            "{keys:?}: {rms:.2e} {largest:.2e} mean {:.3e} deviation {deviation:.2e}",
+            expected.mean()
+        );
         assert!(rms < 0.02 * deviation, "{keys:?}");
     }
 }
@@ -72,8 +82,7 @@ fn unit(value: Value) -> f64 {
 /// Root mean square of a central difference less the derivative, over that of the derivative.
 fn error_of(image: &ExpectedImage, scene: &Scene, value: Value, slope: &Field, step: f64) -> f64 {
     let step = step * unit(value);
-    let [below, above] =
-        [-step, step].map(|by| image.intensity(&value.moved(scene, by)).unwrap());
+    let [below, above] = [-step, step].map(|by| image.intensity(&value.moved(scene, by)).unwrap());
     let pixels = below.values.iter().zip(&above.values).zip(&slope.values);
     let (mut error, mut square) = (0.0, 0.0);
     for ((a, b), slope) in pixels {
@@ -84,6 +93,10 @@ fn error_of(image: &ExpectedImage, scene: &Scene, value: Value, slope: &Field, s
     (error / square).sqrt()
 }
 
+/// Derivatives that are differences of small stages are off by this much of their root mean square: what the stages are rough by.
+const ROUGH: f64 = 3e-3;
+
+/// The error of a central difference falls with the square of the step as far as single precision allows.
 #[test]
 fn derivatives_are_those_of_central_differences() {
     for keys in HARD {
@@ -91,9 +104,38 @@ fn derivatives_are_those_of_central_differences() {
         let image = ExpectedImage::new(&scene, &Value::ALL).unwrap();
         let here = image.at(&scene).unwrap();
         for (value, slope) in &here.derivatives {
-            let errors = [1e-2, 1e-3, 1e-4, 1e-5]
-                .map(|step| format!("{:.1e}", error_of(&image, &scene, *value, slope, step)));
-            println!("{keys:?} {value:?}: {errors:?}");
+            let of = |step| error_of(&image, &scene, *value, slope, step);
+            let [wide, narrow, rounded] = [1e-2, 1e-3, 1e-4].map(of);
+            println!("{keys:?} {value:?}: {wide:.1e} {narrow:.1e} {rounded:.1e}");
+            // A hundredth, less what rounding adds.
+            assert!(
+                narrow < (wide / 50.0).max(ROUGH),
+                "{keys:?} {value:?}: {wide:e} {narrow:e}"
+            );
+            assert!(wide < 0.1, "{keys:?} {value:?}: {wide:e}");
+            // Rounding grows as the step falls.
+            assert!(
+                rounded < 12.0 * narrow.max(2e-4),
+                "{keys:?} {value:?}: {rounded:e}"
+            );
         }
     }
+}
+
+/// A ship's value without a ship, a ship that turns, a sea without wind, another number of ships: refused in one sentence.
+#[test]
+fn what_has_no_smooth_image_is_refused() {
+    for (keys, named) in [
+        (&["ship.turn_rate=0.5"][..], "ship.turn_rate"),
+        (&["sea.wind_speed=0"], "sea.wind_speed"),
+    ] {
+        let error = ExpectedImage::new(&scene(keys), &[Value::Speed]).unwrap_err();
+        assert!(error.to_string().contains(named), "{error}");
+    }
+    let mut open = scene(&[]);
+    open.ships.clear();
+    let error = ExpectedImage::new(&open, &[Value::Heading]).unwrap_err();
+    assert!(error.to_string().contains("ship.heading"), "{error}");
+    let image = ExpectedImage::new(&scene(&[]), &[]).unwrap();
+    assert!(image.intensity(&open).is_err());
 }

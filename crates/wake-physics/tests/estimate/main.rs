@@ -1,13 +1,19 @@
 //! Estimates of simulated images against the scenes they were simulated from.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test that cannot go on has failed; reports are printed")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that cannot go on has failed; reports are printed"
+)]
 
 mod derivatives;
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::Instant;
-use wake_physics::estimate::{Detection, Estimate, Options, Parameter, Priors, Value, bound, estimate};
+use wake_physics::estimate::{
+    Detection, Estimate, Options, Parameter, Priors, Value, bound, estimate,
+};
 use wake_physics::measure::angle_between;
 use wake_physics::{Scene, simulate};
 
@@ -59,17 +65,28 @@ fn timings() {
     let time = |name: &str, work: &mut dyn FnMut()| {
         let start = Instant::now();
         (0..3).for_each(|_| work());
-        println!("{name}: {:.1} ms", start.elapsed().as_secs_f64() / 3.0 * 1e3);
+        println!(
+            "{name}: {:.1} ms",
+            start.elapsed().as_secs_f64() / 3.0 * 1e3
+        );
     };
     let mut simulator = wake_physics::Simulator::default();
-    time("expected_intensity, warm", &mut || drop(simulator.expected_intensity(&scene)));
-    time("expected_intensity", &mut || drop(wake_physics::expected_intensity(&scene)));
+    time("expected_intensity, warm", &mut || {
+        drop(simulator.expected_intensity(&scene))
+    });
+    time("expected_intensity", &mut || {
+        drop(wake_physics::expected_intensity(&scene))
+    });
     let values = &Value::ALL[..9];
-    time("freeze", &mut || drop(wake_physics::estimate::ExpectedImage::new(&scene, values)));
+    time("freeze", &mut || {
+        drop(wake_physics::estimate::ExpectedImage::new(&scene, values))
+    });
     let image = wake_physics::estimate::ExpectedImage::new(&scene, values).unwrap();
     time("image", &mut || drop(image.intensity(&scene)));
     time("image and 9 derivatives", &mut || drop(image.at(&scene)));
-    time("linear sea", &mut || drop(wake_physics::LinearSea::new(&scene)));
+    time("linear sea", &mut || {
+        drop(wake_physics::LinearSea::new(&scene))
+    });
     time("simulate", &mut || drop(simulate(&scene)));
 }
 
@@ -85,18 +102,34 @@ fn report() {
         let limit = bound(&scene, &Parameter::OF_WAKE, &Priors::default()).unwrap();
         let limit = [Value::Speed, Value::Heading].map(|v| limit.of(Parameter::Value(v)));
         let ship = &scene.ships[0];
-        print!("{index}: {seconds:.1}s U {:.1} h {:.0} w {:.1} to {:.0} inc {:.0}: ", ship.speed, ship.heading, scene.sea.wind_speed, scene.sea.wind_toward, scene.radar.incidence);
+        print!(
+            "{index}: {seconds:.1}s U {:.1} h {:.0} w {:.1} to {:.0} inc {:.0}: ",
+            ship.speed,
+            ship.heading,
+            scene.sea.wind_speed,
+            scene.sea.wind_toward,
+            scene.radar.incidence
+        );
         let Some(wake) = found.wakes.first() else {
             println!("none; bound {limit:.3?}");
             continue;
         };
         let errors = [
             (wake.speed.value - ship.speed, wake.speed.deviation),
-            (angle_between(wake.heading.value, ship.heading), wake.heading.deviation),
+            (
+                angle_between(wake.heading.value, ship.heading),
+                wake.heading.deviation,
+            ),
             (wake.position[0].value, wake.position[0].deviation),
             (wake.position[1].value, wake.position[1].deviation),
-            (wake.wind_speed.value - scene.sea.wind_speed, wake.wind_speed.deviation),
-            (angle_between(wake.wind_toward.value, scene.sea.wind_toward), wake.wind_toward.deviation),
+            (
+                wake.wind_speed.value - scene.sea.wind_speed,
+                wake.wind_speed.deviation,
+            ),
+            (
+                angle_between(wake.wind_toward.value, scene.sea.wind_toward),
+                wake.wind_toward.deviation,
+            ),
         ];
         for (n, (error, deviation)) in errors.iter().enumerate() {
             print!("{error:.3}±{deviation:.3} ");
@@ -114,7 +147,13 @@ fn report() {
         );
     }
     for pulls in pulls {
-        let share = |k: f64| pulls.iter().filter(|p| p.abs() < k).count() as f64 / pulls.len() as f64;
-        println!("within 1, 2, 3 deviations: {:.2} {:.2} {:.2}", share(1.0), share(2.0), share(3.0));
+        let share =
+            |k: f64| pulls.iter().filter(|p| p.abs() < k).count() as f64 / pulls.len() as f64;
+        println!(
+            "within 1, 2, 3 deviations: {:.2} {:.2} {:.2}",
+            share(1.0),
+            share(2.0),
+            share(3.0)
+        );
     }
 }

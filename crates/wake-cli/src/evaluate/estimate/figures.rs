@@ -131,13 +131,26 @@ fn row(judged: &Judged, cases: &[Case]) -> Row {
         judged.value != Value::WindToward || found.alternatives.iter().all(|a| a.weight < 0.1)
     };
     let identified = |case: &Case| {
-        let found = case.found.as_ref().filter(|f| f.identifiable).filter(single);
+        let found = case
+            .found
+            .as_ref()
+            .filter(|f| f.identifiable)
+            .filter(single);
         found.map(|f| (judged.of)(f))
     };
-    let given: Vec<(&Case, Fitted)> = cases.iter().filter_map(|case| Some((case, identified(case)?))).collect();
-    let mut errors: Vec<f64> = given.iter().map(|(c, f)| error(f.value, &c.scene).abs()).collect();
+    let given: Vec<(&Case, Fitted)> = cases
+        .iter()
+        .filter_map(|case| Some((case, identified(case)?)))
+        .collect();
+    let mut errors: Vec<f64> = given
+        .iter()
+        .map(|(c, f)| error(f.value, &c.scene).abs())
+        .collect();
     errors.sort_by(f64::total_cmp);
-    let pulls: Vec<f64> = given.iter().map(|(c, f)| error(f.value, &c.scene) / f.deviation).collect();
+    let pulls: Vec<f64> = given
+        .iter()
+        .map(|(c, f)| error(f.value, &c.scene) / f.deviation)
+        .collect();
     let mut ranks = [0; 10];
     for pull in &pulls {
         ranks[((10.0 * normal(*pull)) as usize).min(9)] += 1;
@@ -175,7 +188,10 @@ fn measured(quantity: Quantity, cases: &[Case]) -> (usize, [f64; 2]) {
     };
     let mut errors: Vec<f64> = cases.iter().filter_map(error).collect();
     errors.sort_by(f64::total_cmp);
-    (errors.len(), [quantile(&errors, 0.5), quantile(&errors, 0.9)])
+    (
+        errors.len(),
+        [quantile(&errors, 0.5), quantile(&errors, 0.9)],
+    )
 }
 
 fn share(values: &[f64], inside: impl Fn(&f64) -> bool) -> f64 {
@@ -185,13 +201,22 @@ fn share(values: &[f64], inside: impl Fn(&f64) -> bool) -> f64 {
 /// Of sorted values; NaN of none.
 fn quantile(sorted: &[f64], part: f64) -> f64 {
     let last = sorted.len().saturating_sub(1) as f64;
-    sorted.get((part * last).round() as usize).copied().unwrap_or(f64::NAN)
+    sorted
+        .get((part * last).round() as usize)
+        .copied()
+        .unwrap_or(f64::NAN)
 }
 
 /// Distribution of a normal number, by Abramowitz and Stegun 26.2.17: to 1e-7.
 fn normal(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
-    let series = [0.319_381_53, -0.356_563_782, 1.781_477_937, -1.821_255_978, 1.330_274_429];
+    let series = [
+        0.319_381_53,
+        -0.356_563_782,
+        1.781_477_937,
+        -1.821_255_978,
+        1.330_274_429,
+    ];
     let polynomial = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
     let tail = polynomial * (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
     if x > 0.0 { 1.0 - tail } else { tail }
@@ -203,7 +228,12 @@ mod tests {
 
     #[test]
     fn the_normal_distribution_is_that_of_tables() {
-        for (x, p) in [(0.0, 0.5), (1.0, 0.841_345), (-1.96, 0.024_998), (3.0, 0.998_650)] {
+        for (x, p) in [
+            (0.0, 0.5),
+            (1.0, 0.841_345),
+            (-1.96, 0.024_998),
+            (3.0, 0.998_650),
+        ] {
             assert!((normal(x) - p).abs() < 1e-6, "{x}");
         }
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use wake_dataset::Recipe;
 use wake_physics::estimate::{Detection, Options as Estimation, Parameter, Value, bound, estimate};
 use wake_physics::{Scene, simulate};
-use wake_train::evaluation::{held_out, Reading};
+use wake_train::evaluation::{Reading, held_out};
 
 use crate::exit::{self, Outcome};
 use crate::progress;
@@ -125,7 +125,12 @@ fn case(scene: &Scene, index: u64) -> Outcome<Case> {
     let options = detection(index);
     // What is estimated is hidden; the length is a start.
     let mut known = scene.clone();
-    for value in [Value::Speed, Value::Heading, Value::WindSpeed, Value::WindToward] {
+    for value in [
+        Value::Speed,
+        Value::Heading,
+        Value::WindSpeed,
+        Value::WindToward,
+    ] {
         value.set(&mut known, value.of(&Scene::default()));
     }
     let clock = std::time::Instant::now();

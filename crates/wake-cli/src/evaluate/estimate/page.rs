@@ -10,7 +10,11 @@ pub(crate) fn page(report: &Report) -> String {
         "Simulated images with speckle that were held out. The ship lies within 40 m of where a detection says; wind, speed and heading are not known, fetch, incidence and the proportions of the hull are. `identifiable` is what the estimator says; `telling` counts scenes whose bound is below a tenth of the range.".to_owned(),
         String::new(),
     ];
-    section(&mut lines, "The paper's ranges: 256 x 256 pixels of 4 m, 4 looks", &report.ranges);
+    section(
+        &mut lines,
+        "The paper's ranges: 256 x 256 pixels of 4 m, 4 looks",
+        &report.ranges,
+    );
     section(&mut lines, "Recipe `detector`, one ship", &report.detector);
     lines.push(format!(
         "Of {} images without a ship, {} gave a wake. An estimate takes {:.2} s in the median.",
@@ -43,9 +47,11 @@ fn section(lines: &mut Vec<String>, title: &str, figures: &Figures) {
 }
 
 fn line(row: &Row) -> String {
-    let measured = row.measured.map_or_else(String::new, |(count, [median, high])| {
-        format!("{count}, {median:.2}, {high:.2}")
-    });
+    let measured = row
+        .measured
+        .map_or_else(String::new, |(count, [median, high])| {
+            format!("{count}, {median:.2}, {high:.2}")
+        });
     format!(
         "| {} \\[{}\\] | {} | {} | {} | {:.3} | {:.3} | {:.2} {:.2} {:.2} | {:.2}, {:.2} | {measured} |",
         row.name,

@@ -88,9 +88,8 @@ impl CrossSection {
         for (n, pair) in outer.iter().enumerate() {
             if let Some(([below, above], width)) = pair {
                 let [below, above] = [table(below), table(above)];
-                let difference = |(a, b): (&[f64; 2], &[f64; 2])| {
-                    [(b[0] - a[0]) / width, (b[1] - a[1]) / width]
-                };
+                let difference =
+                    |(a, b): (&[f64; 2], &[f64; 2])| [(b[0] - a[0]) / width, (b[1] - a[1]) / width];
                 let slopes: Vec<_> = below.iter().zip(&above).map(difference).collect();
                 put(1 + n, &slopes);
             }
@@ -243,9 +242,8 @@ fn spline_weights(t: f64) -> [[f64; 4]; 3] {
 fn spline(polynomial: &[[f64; CHANNELS]], count: usize) -> Vec<[f64; CHANNELS]> {
     let chebyshev: Vec<f64> = (0..SIDE)
         .flat_map(|n| {
-            // The polynomial covers twice as much beyond as the spline.
-            let half = (CELLS / 2 + 2 * BEYOND) as f64;
-            let at = (n as f64 - (CELLS / 2 + BEYOND) as f64) / half;
+            let half = (CELLS / 2 + BEYOND) as f64;
+            let at = n as f64 / half - 1.0;
             let angle = at.clamp(-1.0, 1.0).acos();
             (0..count).map(move |degree| (degree as f64 * angle).cos())
         })
@@ -270,8 +268,9 @@ fn spline(polynomial: &[[f64; CHANNELS]], count: usize) -> Vec<[f64; CHANNELS]> 
     for (step, line) in [(1, SIDE), (SIDE, 1)] {
         for n in 0..SIDE {
             for channel in 0..CHANNELS {
-                let mut values: Vec<f64> =
-                    (0..SIDE).map(|k| out[n * line + k * step][channel]).collect();
+                let mut values: Vec<f64> = (0..SIDE)
+                    .map(|k| out[n * line + k * step][channel])
+                    .collect();
                 unsmooth(&mut values);
                 for (k, value) in values.iter().enumerate() {
                     out[n * line + k * step][channel] = *value;
@@ -361,7 +360,8 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
                     continue;
                 }
                 let slope = 2.0 * (xx * dx + xy * dy) * SPACING + xx * SPACING * SPACING;
-                let [line, weight] = weighed_row(&row[from..to], start, slope, 2.0 * xx * SPACING * SPACING);
+                let [line, weight] =
+                    weighed_row(&row[from..to], start, slope, 2.0 * xx * SPACING * SPACING);
                 sum += line;
                 weights += weight;
             }
@@ -388,4 +388,74 @@ fn weighed_row(row: &[f64], start: f64, slope: f64, bend: f64) -> [f64; 2] {
             [sum.iter().sum(), weights.iter().sum()]
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    /// Splines of Chebyshev polynomials have their values and derivatives.
+    #[test]
+    fn the_spline_is_the_polynomial() {
+        let count = 9;
+        let mut polynomial = vec![[0.0; CHANNELS]; count * count];
+        // T₃(x) T₂(y) in the first channel, T₄(x) in the specular one.
+        polynomial[2 * count + 3][0] = 1.0;
+        polynomial[4][1 + OUTER] = 1.0;
+        let section = CrossSection {
+            reach: 1.0 / (1.0 + 2.0 * BEYOND as f64 / CELLS as f64),
+            nodes: count,
+            coefficients: spline(&polynomial, count),
+            averaged: 1.0,
+        };
+        for [x, y] in [[0.0, 0.0], [0.31, -0.52], [-0.8, 0.7], [0.123, 0.456]] {
+            let at = section.at([x, y]);
+            let (t3, t2) = (4.0 * x * x * x - 3.0 * x, 2.0 * y * y - 1.0);
+            let (d3, d2) = (12.0 * x * x - 3.0, 4.0 * y);
+            // Fourth order in cells of 1/38, fourth derivatives up to 192.
+            assert!((at.value[0] - t3 * t2).abs() < 1e-5);
+            assert!((at.value[1] - (8.0 * x.powi(4) - 8.0 * x * x + 1.0)).abs() < 1e-5);
+            assert!((at.slope[0][0] - d3 * t2).abs() < 1e-3);
+            assert!((at.slope[0][1] - t3 * d2).abs() < 1e-3);
+            for (found, expected) in at.curvature[0]
+                .iter()
+                .zip([24.0 * x * t2, d3 * d2, 4.0 * t3])
+            {
+                assert!((found - expected).abs() < 0.05, "{found} {expected}");
+            }
+        }
+    }
+
+    /// The fitted σ⁰ is the one by direct quadrature, also where a ship's waves roughen the sea.
+    #[test]
+    fn it_is_the_exact_cross_section() {
+        for keys in [
+            &[][..],
+            &["sea.wind_speed=3", "radar.incidence=24"],
+            &["sea.wind_toward=130", "radar.polarization=HH"],
+        ] {
+            let scene = Scene::default().with_assignments(keys).unwrap();
+            let models = super::super::frozen::averaged(&scene);
+            let exact = models.backscatter(true, true);
+            let section = CrossSection::new(&exact, &[const { None }; OUTER], 0.4, None);
+            let calm: f64 = exact.parts([0.0; 2]).iter().sum();
+            for slope in [[0.0, 0.0], [0.2, -0.1], [-0.35, 0.3]] {
+                let found = section.at(slope).value;
+                for (found, expected) in found.iter().zip(exact.parts(slope)) {
+                    assert!((found - expected).abs() < 2e-4 * calm, "{keys:?} {slope:?}");
+                }
+                let more = SlopeCovariance {
+                    xx: 4e-3,
+                    xy: 1e-3,
+                    yy: 2e-3,
+                };
+                let rough = exact
+                    .two_scale
+                    .tilt_averaged(slope, &exact.tilt.plus(&more));
+                let found = section.over(slope, &more).value[0];
+                assert!((found - rough).abs() < 1e-3 * calm, "{keys:?} {slope:?}");
+            }
+        }
+    }
 }

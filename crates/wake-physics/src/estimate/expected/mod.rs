@@ -10,21 +10,23 @@
 
 mod cross_section;
 mod drawn;
+mod frozen;
+mod surface;
 mod surroundings;
 mod waves;
 
 use super::value::Value;
 use crate::error::{Error, Result};
-use crate::linear::OpenSea;
-use crate::models::{Models, kelvin_wake};
+use crate::models::Models;
 use crate::pixels::means_over;
-use crate::plan::Plan;
 use crate::prepared::Prepared;
 use crate::raster::{Field, Raster};
 use crate::sar::impulse::Reflectivity;
 use crate::sar::smooth::{Displacement, SmoothSum};
 use crate::scene::{Scene, Term};
-use drawn::{Drawn, Surface};
+use drawn::Drawn;
+use frozen::{Frozen, averaged, imaging};
+use surface::Surface;
 use waves::Linear;
 
 /// The expected image of a scene, and its derivatives.
@@ -67,19 +69,11 @@ pub struct Expected {
 #[derive(Debug)]
 pub struct ExpectedImage {
     values: Vec<Value>,
-    plan: Plan,
-    /// Pixels with their margin, computed pixels, pixels of the image.
-    raster: Raster,
+    /// Computed pixels, and pixels of the image.
     computed: Raster,
     image: Raster,
-    fields: Vec<Linear>,
-    /// Waves of each ship that modulate.
-    modulating: Vec<Vec<bool>>,
-    /// Steepest slope that σ⁰ is fitted to, and nodes.
-    reach: f64,
-    nodes: usize,
+    frozen: Frozen,
     sum: SmoothSum,
-    tolerance: f64,
 }
 
 /// The expected image of a scene and its derivatives by some values, planned for this scene.
@@ -89,12 +83,6 @@ pub struct ExpectedImage {
 /// As [`ExpectedImage::new`].
 pub fn expected_with_derivatives(scene: &Scene, values: &[Value]) -> Result<Expected> {
     ExpectedImage::new(scene, values)?.at(scene)
-}
-
-/// Models of a scene that average over the whole sea.
-fn averaged(scene: &Scene) -> Models {
-    let models = Models::new(scene);
-    OpenSea::new(&models).averaged(&models)
 }
 
 /// Share of the tolerance that sums of waves keep.
@@ -124,32 +112,32 @@ impl ExpectedImage {
             .collect();
         let imaging = imaging(models, plan);
         let displacement = Displacement::new(&imaging, &raster);
-        let mut frozen = Self {
-            values: values.to_vec(),
+        let mut frozen = Frozen {
+            plan: plan.clone(),
             raster,
-            computed: models.pixels.computed,
-            image: models.pixels.image,
             fields,
             modulating,
             reach: 0.0,
             nodes: 0,
-            sum: SmoothSum::new([&raster, &models.pixels.computed], [1.0, 1.0], 0.0),
             tolerance,
-            plan: prepared.plan.clone(),
         };
         let surface = Surface::new(&frozen, scene, models, &[]);
         let largest = surface.largest(&raster);
         let rough = largest.roughness.sqrt();
         frozen.reach = (STEEPER * (largest.slope + 2.9 * rough)).clamp(0.1, 1.5);
-        let series = surface.cross_section(&frozen, None);
-        frozen.nodes = series.nodes();
+        frozen.nodes = surface.cross_section(&frozen, None).nodes();
         let square = STEEPER * largest.acceleration.powi(2);
         let narrowest = displacement.variance;
         let widest = 1.3 * narrowest + displacement.variance_per_square * square;
         let lean = STEEPER * largest.elevation * displacement.columns_per_elevation;
-        let rasters = [&raster, &models.pixels.computed];
-        frozen.sum = SmoothSum::new(rasters, [0.8 * narrowest, widest], lean);
-        Ok(frozen)
+        let computed = models.pixels.computed;
+        Ok(Self {
+            values: values.to_vec(),
+            image: models.pixels.image,
+            sum: SmoothSum::new([&raster, &computed], [0.8 * narrowest, widest], lean),
+            computed,
+            frozen,
+        })
     }
 
     /// Values of the derivatives, in their order.
@@ -188,21 +176,23 @@ impl ExpectedImage {
         scene.validate()?;
         let models = averaged(scene);
         check(scene, &models, values)?;
-        if models.wakes.len() != self.modulating.len() {
+        if models.wakes.len() != self.frozen.modulating.len() {
             return Err(Error::Conflict {
                 name: "ship".to_owned(),
                 value: format!("{} ships", models.wakes.len()),
-                requirement: format!("but the plan is one of {}", self.modulating.len()),
+                requirement: format!("but the plan is one of {}", self.frozen.modulating.len()),
             });
         }
-        let surface = Surface::new(self, scene, &models, values);
-        let drawn = Drawn::<N>::new(self, &surface);
+        let surface = Surface::new(&self.frozen, scene, &models, values);
+        let drawn = Drawn::<N>::new(&self.frozen, &surface);
         let by: Vec<usize> = values.iter().map(|v| *v as usize).collect();
         let mut fields = match surface.is_uniform() {
             true => {
                 let power = drawn.source(0, 0).power;
                 let values = std::iter::once(power.value).chain(by.iter().map(|&n| power.by[n]));
-                values.map(|v| Field::constant(&self.computed, v as f32)).collect()
+                values
+                    .map(|v| Field::constant(&self.computed, v as f32))
+                    .collect()
             }
             false => self.sum.image(&by, |i, j| drawn.source(i, j)),
         };
@@ -224,18 +214,6 @@ impl ExpectedImage {
     }
 }
 
-/// What the radar does, by a plan.
-fn imaging(models: &Models, plan: &Plan) -> crate::sar::Imaging {
-    crate::sar::Imaging {
-        range_to_velocity: models.range_to_velocity,
-        incidence: models.incidence,
-        resolution: match plan.uses(Term::AzimuthSmear) {
-            true => models.resolution(),
-            false => models.resolution_at_rest(),
-        },
-    }
-}
-
 /// Whether a scene has what a smooth image needs.
 fn check(scene: &Scene, models: &Models, values: &[Value]) -> Result<()> {
     let conflict = |name: &str, value: String, requirement: &str| {
@@ -251,7 +229,11 @@ fn check(scene: &Scene, models: &Models, values: &[Value]) -> Result<()> {
     }
     if models.short_waves_vanish() {
         let requirement = "but an image is differentiated for seas with wind";
-        return conflict("sea.wind_speed", scene.sea.wind_speed.to_string(), requirement);
+        return conflict(
+            "sea.wind_speed",
+            scene.sea.wind_speed.to_string(),
+            requirement,
+        );
     }
     if let Some(value) = values.iter().find(|v| v.is_of_ship())
         && scene.ships.is_empty()
@@ -260,13 +242,4 @@ fn check(scene: &Scene, models: &Models, values: &[Value]) -> Result<()> {
         return conflict(value.key(), "to be estimated".to_owned(), requirement);
     }
     Ok(())
-}
-
-/// Models of a scene that differs from another by a ship's value.
-fn with_ships_of(scene: &Scene, models: &Models) -> Models {
-    let wake = |ship| kelvin_wake(ship, scene.sea.depth, scene.sea.time);
-    Models {
-        wakes: scene.ships.iter().map(wake).collect(),
-        ..models.clone()
-    }
 }

@@ -117,9 +117,7 @@ where
     T: Copy + std::ops::Sub<Output = T> + std::ops::Mul<f64, Output = T>,
 {
     match points {
-        [Some(a), Some(b), Some(c), Some(d)] => {
-            ((c - b) * 8.0 - (d - a)) * (1.0 / (12.0 * step))
-        }
+        [Some(a), Some(b), Some(c), Some(d)] => ((c - b) * 8.0 - (d - a)) * (1.0 / (12.0 * step)),
         [_, Some(b), Some(c), _] => (c - b) * (1.0 / (2.0 * step)),
         _ => unreachable!("differences have two points at least"),
     }
