@@ -437,3 +437,7 @@ fn score(
     };
     (0..spectra.len()).map(one).collect()
 }
+
+#[cfg(test)]
+#[path = "likelihood_tests.rs"]
+mod tests;

@@ -23,7 +23,7 @@ use crate::prepared::Prepared;
 use crate::raster::{Field, Raster};
 use crate::sar::impulse::Reflectivity;
 use crate::sar::smooth::{Displacement, SmoothSum};
-use crate::scene::{Scene, Term};
+use crate::scene::Scene;
 use drawn::Drawn;
 use frozen::{Frozen, averaged, imaging};
 use surface::Surface;
