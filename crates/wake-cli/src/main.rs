@@ -14,6 +14,8 @@ mod sheet;
 mod simulate;
 
 #[cfg(feature = "prompt")]
+mod estimate;
+#[cfg(feature = "prompt")]
 mod prompt;
 
 #[cfg(feature = "dataset")]
@@ -61,6 +63,8 @@ enum Command {
     Simulate(simulate::Arguments),
     #[cfg(feature = "prompt")]
     Prompt(prompt::Arguments),
+    #[cfg(feature = "prompt")]
+    Estimate(estimate::Arguments),
     #[cfg(feature = "generate")]
     Generate(generate::Arguments),
     #[cfg(feature = "dataset")]
@@ -88,6 +92,8 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         #[cfg(feature = "prompt")]
         Command::Prompt(arguments) => prompt::run(&arguments),
+        #[cfg(feature = "prompt")]
+        Command::Estimate(arguments) => estimate::run(&arguments),
         #[cfg(feature = "generate")]
         Command::Generate(arguments) => generate::run(&arguments),
         #[cfg(feature = "dataset")]
