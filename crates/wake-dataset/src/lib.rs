@@ -25,6 +25,9 @@ mod metadata;
 mod folder;
 mod write;
 
+mod card;
+mod webdataset;
+
 mod merge;
 
 // Pairs, position by position.
@@ -42,6 +45,7 @@ mod finite;
 
 #[cfg(feature = "burn")]
 pub use batch::{Batch, Batches, ToBatch};
+pub use card::{CardOf, write_card};
 pub use draws::Draws;
 pub use error::{Error, Result};
 #[cfg(feature = "burn")]
@@ -57,6 +61,7 @@ pub use scenes::{PAPER_SCENES, Simulated};
 pub use sea::Sea;
 pub use shuffle::shuffled;
 pub use source::Source;
+pub use webdataset::write_webdataset;
 pub use write::{Progress, write};
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ use crate::wake::Detection;
 /// # References
 ///
 /// Zhou, Wang & Krähenbühl (2019), "Objects as Points" (maps of centres); Ronneberger, Fischer & Brox (2015), "U-Net".
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Detector {
     network: Network,
     device: Device,
@@ -33,14 +33,19 @@ impl Detector {
     /// The score from which on a wake is likely one: half a false alarm an image on real tiles.
     pub const OPERATING_POINT: f32 = 0.25;
 
+    /// The weights of this crate: the content of a safetensors file.
+    #[must_use]
+    pub fn pretrained_weights() -> &'static [u8] {
+        include_bytes!("../assets/detector.safetensors")
+    }
+
     /// The network of this crate on a device.
     ///
     /// # Errors
     ///
     /// [`Error::Model`](crate::Error::Model) where the weights do not fit in memory.
     pub fn pretrained(device: &Device) -> Result<Self> {
-        let bytes = include_bytes!("../assets/detector.safetensors");
-        let network = Network::new(device);
+        let (network, bytes) = (Network::new(device), Self::pretrained_weights());
         let network = load_bytes(network, Layout::Diffusers, "detector.safetensors", bytes)?;
         Ok(Self::of(network, device))
     }
@@ -55,6 +60,12 @@ impl Detector {
         let network = load(Network::new(device), Layout::Diffusers, file)?;
         self_check(&network, file, device)?;
         Ok(Self::of(network, device))
+    }
+
+    /// The network, which turns normalised pixels into maps.
+    #[must_use]
+    pub fn network(&self) -> &Network {
+        &self.network
     }
 
     fn of(network: Network, device: &Device) -> Self {

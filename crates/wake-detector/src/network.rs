@@ -187,7 +187,7 @@ impl Network {
 }
 
 /// Squares of `STRIDE` × `STRIDE` pixels as channels.
-fn patches(images: Tensor<4>) -> Tensor<4> {
+pub(crate) fn patches(images: Tensor<4>) -> Tensor<4> {
     let [batch, channels, rows, columns] = images.dims();
     let (s, r, c) = (STRIDE, rows / STRIDE, columns / STRIDE);
     images
