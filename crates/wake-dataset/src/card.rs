@@ -154,7 +154,7 @@ fn features(of: CardOf) -> String {
                 ("txt", "string"),
             ];
             let outer: String = outer.into_iter().map(field).collect();
-            indented(&(outer + "- name: json\n  struct:\n"), "  ") + &indented(&row, "  ")
+            indented(&(outer + "- name: json\n  struct:\n"), "  ") + &indented(&row, "    ")
         }
     }
 }
