@@ -39,10 +39,11 @@ pub(crate) struct Arguments {
     /// Licence of the images that the card states, by its name on Hugging Face
     #[arg(long, value_name = "NAME", default_value = "cc0-1.0", value_parser = license)]
     pub(crate) license: String,
-    /// Also write the set as WebDataset shards (train-000000.tar, …) into this folder; with --card a card there, too
+    /// Also write the set as tar files for the library webdataset (train-000000.tar, …) into this folder; with --card a card
+    /// there, too
     #[arg(long, value_name = "DIR", conflicts_with = "shard")]
     pub(crate) webdataset: Option<PathBuf>,
-    /// Most images of a WebDataset shard
+    /// Most images of such a tar file
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) per_tar: u64,
     /// Images made at the same time [default: one for each core]
