@@ -31,6 +31,9 @@ mod named;
 #[cfg(feature = "detect")]
 mod picture;
 
+#[cfg(feature = "export")]
+mod export;
+
 #[cfg(feature = "train")]
 mod sea_images;
 #[cfg(feature = "train")]
@@ -77,6 +80,8 @@ enum Command {
     Locate(locate::Arguments),
     #[cfg(feature = "train")]
     Evaluate(evaluate::Arguments),
+    #[cfg(feature = "export")]
+    Export(export::Arguments),
     #[cfg(feature = "bench")]
     Bench(bench::Arguments),
     #[cfg(feature = "bench")]
@@ -106,6 +111,8 @@ fn main() -> ExitCode {
         Command::Locate(arguments) => locate::run(&arguments),
         #[cfg(feature = "train")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        #[cfg(feature = "export")]
+        Command::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(&arguments),
         #[cfg(feature = "bench")]

@@ -110,6 +110,12 @@ impl Manifest {
         shuffled(index % scenes, scenes, self.seed) < val
     }
 
+    /// Numbers of images to train with and to validate with, of this folder.
+    pub(super) fn split_sizes(&self) -> [u64; 2] {
+        let val = self.indices().filter(|&index| self.is_val(index)).count() as u64;
+        [self.indices().end - self.indices().start - val, val]
+    }
+
     /// The pairs that it makes, without the learnt sea.
     ///
     /// # Errors
@@ -232,6 +238,10 @@ impl Layout<'_> {
 
     pub(super) fn coco(self) -> PathBuf {
         self.0.join("coco.json")
+    }
+
+    pub(super) fn card(self) -> PathBuf {
+        self.0.join("README.md")
     }
 
     pub(super) fn yolo(self) -> PathBuf {

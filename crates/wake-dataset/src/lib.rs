@@ -30,6 +30,9 @@ mod metadata;
 mod folder;
 mod write;
 
+mod card;
+mod webdataset;
+
 mod merge;
 
 // Pairs, position by position.
@@ -47,6 +50,7 @@ mod finite;
 
 #[cfg(feature = "burn")]
 pub use batch::{Batch, Batches, ToBatch};
+pub use card::{CardOf, write_card};
 pub use delivery::Delivery;
 pub use draws::Draws;
 pub use error::{Error, Result};
@@ -64,6 +68,7 @@ pub use scenes::{PAPER_SCENES, Simulated};
 pub use sea::Sea;
 pub use shuffle::shuffled;
 pub use source::Source;
+pub use webdataset::write_webdataset;
 pub use write::{Progress, write};
 
 #[cfg(test)]

@@ -45,6 +45,12 @@ const LEAST_SCORE: f32 = 0.03;
 const UNCALIBRATED: f32 = 0.25;
 
 impl Detector {
+    /// The weights of this crate: the content of a safetensors file.
+    #[must_use]
+    pub fn pretrained_weights() -> &'static [u8] {
+        WEIGHTS
+    }
+
     /// The network of this crate on a device.
     ///
     /// # Errors
@@ -73,6 +79,12 @@ impl Detector {
             detector.calibration = Some(Calibration::read(&beside, &text, &detector.weights)?);
         }
         Ok(detector)
+    }
+
+    /// The network, which turns normalised pixels into maps.
+    #[must_use]
+    pub fn network(&self) -> &Network {
+        &self.network
     }
 
     /// The network of a file, by default of this crate, without probabilities.

@@ -10,6 +10,7 @@ mod scaling;
 mod wake;
 
 pub mod network;
+mod onnx;
 pub mod self_check;
 
 pub mod calibration;
@@ -33,6 +34,7 @@ pub use error::{Error, Result};
 pub use files::{image_files, image_name, picture_name};
 pub use finder::{Finder, Radon};
 pub use image::GreyImage;
+pub use onnx::onnx;
 pub use raster::Raster;
 pub use search::Tile;
 pub use wake::{Detection, Wake, angle_of, direction};

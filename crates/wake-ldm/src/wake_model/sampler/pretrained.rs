@@ -27,15 +27,30 @@ const fn weights(part: Part) -> &'static [u8] {
     }
 }
 
+/// The configuration of the model in this crate.
+const CONFIG: &str = include_str!("../../../assets/config.json");
+
 impl WakeSampler {
+    /// The files of the model in this crate, by their names; a folder of them is one for [`from_folder`](Self::from_folder).
+    #[must_use]
+    pub fn pretrained_files() -> [(&'static str, &'static [u8]); 5] {
+        let file = |part: Part| (part.file(), weights(part));
+        [
+            (WakeModelConfig::FILE, CONFIG.as_bytes()),
+            file(Part::Patches),
+            file(Part::Parser),
+            file(Part::Prior),
+            file(Part::Flow),
+        ]
+    }
+
     /// The model that lies in this crate.
     ///
     /// # Errors
     ///
     /// None that a build from unchanged files can give.
     pub fn pretrained(device: &Device) -> Result<Self> {
-        let config = include_str!("../../../assets/config.json");
-        let config = WakeModelConfig::from_json(config, Path::new(WakeModelConfig::FILE))?;
+        let config = WakeModelConfig::from_json(CONFIG, Path::new(WakeModelConfig::FILE))?;
         let model = config.init(device);
         Self::new(
             WakeModel {
