@@ -1,7 +1,7 @@
 //! A data set as `WebDataset` shards: tar files that trainers read one after the other.
 
 use super::folder::Folder;
-use super::layout::{Layout, broken, cannot};
+use super::layout::{Layout, broken};
 use crate::error::Result;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ const SPLITS: [&str; 2] = ["train", "validation"];
 pub fn write_webdataset(folder: &Path, out: &Path, each: u64) -> Result<Vec<PathBuf>> {
     let set = Folder::open(folder)?;
     let _lock = whole_files::lock_folder(out)?;
-    let mut entries = std::fs::read_dir(out).map_err(|e| cannot("read", out, e))?;
+    let mut entries = std::fs::read_dir(out).map_err(|e| whole_files::failed("read", out, e))?;
     let is_shard = |name: &std::ffi::OsStr| name.to_string_lossy().ends_with(".tar");
     if entries.any(|entry| entry.is_ok_and(|entry| is_shard(&entry.file_name()))) {
         let message = "holds shards already; choose another folder, or remove them";
@@ -57,7 +57,7 @@ fn sample(archive: &mut Vec<u8>, folder: &Path, set: &Folder, position: u64) -> 
     let (index, row) = set.row(position)?;
     let line = serde_json::to_vec(row);
     let metadata = Layout(folder).metadata();
-    let line = line.map_err(|e| cannot("encode", &metadata, e.into()))?;
+    let line = line.map_err(|e| whole_files::failed("encode", &metadata, e))?;
     let image = folder.join(&row.file_name);
     let image = row.image_bytes(&image, position as usize + 1)?;
     let files = [
@@ -67,7 +67,7 @@ fn sample(archive: &mut Vec<u8>, folder: &Path, set: &Folder, position: u64) -> 
     ];
     for (ending, content) in files {
         let name = format!("{index:06}.{ending}");
-        append(archive, &name, content).map_err(|e| cannot("write", folder, e))?;
+        append(archive, &name, content).map_err(|e| whole_files::failed("write", folder, e))?;
     }
     Ok(())
 }

@@ -7,9 +7,9 @@ mod told;
 pub(crate) use arguments::Arguments;
 
 use crate::exit::{self, Outcome};
+use crate::sheet::Picture;
 use wake_physics::estimate::{Detection, Estimate, Options, Parameter, Priors, bound, estimate};
 use wake_physics::grey::GreyScale;
-use wake_physics::picture::Picture;
 use wake_physics::{Field, Raster, Scene, simulate};
 
 /// Pixels of a picture along its longer side.

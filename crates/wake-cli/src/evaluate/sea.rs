@@ -9,8 +9,7 @@ use wake_ldm::sea_texture::{SeaTexture, WINDOW};
 use wake_nn::device_named;
 use wake_physics::Field;
 use wake_train::evaluation::sea::{
-    SeaPair, SeaRow, discriminant, gaussian_amplitude, kinds, mean_spectrum,
-    simulated_seas,
+    SeaPair, SeaRow, discriminant, gaussian_amplitude, kinds, mean_spectrum, simulated_seas,
 };
 use wake_train::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
 

@@ -403,7 +403,8 @@ mod tests {
             Param::from_tensor(Tensor::from_data(TensorData::new(numbers, shape), &device));
         one.bias = stem.bias.clone();
         let x = Tensor::<4>::random([2, INPUTS, 16, 24], Distribution::Default, &device);
-        let difference = one.forward(x.clone()) - convolve(&stem, wake_nn::patch::space_to_depth(x, STRIDE));
+        let difference =
+            one.forward(x.clone()) - convolve(&stem, wake_nn::patch::space_to_depth(x, STRIDE));
         // Sums of 288 products below 1, in another order.
         let largest = difference.abs().max().into_scalar::<f32>();
         assert!(largest < 288.0 * f32::EPSILON, "{largest}");

@@ -177,7 +177,13 @@ impl ImageRecipe {
     ///
     /// Of the recipe.
     pub fn empty_sea(seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
-        Ok(Arc::new(simulated(&["draw.count = 0"], seed, size)?))
+        let recipe = Recipe::detector()?;
+        Ok(Arc::new(simulated(
+            recipe,
+            &["draw.count = 0"],
+            seed,
+            size,
+        )?))
     }
 }
 

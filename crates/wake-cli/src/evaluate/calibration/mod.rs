@@ -11,7 +11,7 @@ use wake_physics::Scene;
 use wake_train::detector::ImageRecipe;
 use wake_train::detector::judging::{DetectionOutcome, EmptySea, KnownImages, Spacing, score_for};
 
-use super::detector::{HELD_OUT, SIZE, real};
+use super::detector::{SIZE, real, real_sea::HELD_OUT};
 use crate::exit::{self, Outcome};
 use crate::progress;
 use report::{Check, Mode, Report};

@@ -1,7 +1,7 @@
 //! `wake evaluate detector`: how well wakes are found in simulated images that were held out, and in real tiles.
 
 pub(crate) mod real;
-mod real_sea;
+pub(crate) mod real_sea;
 mod recall;
 mod report;
 

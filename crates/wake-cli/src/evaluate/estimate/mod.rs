@@ -64,7 +64,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     seconds.sort_by(f64::total_cmp);
     let ranges = Figures::of(&cases);
     let mut others = Vec::new();
-    let scenes = wake_dataset::Scenes::new(Recipe::detector()?, SEED)?;
+    let scenes = wake_dataset::Simulated::new(Recipe::detector()?, SEED)?;
     let mut index = 0;
     while (others.len() as u64) < options.detector {
         let mut scene = scenes.scene(index)?;

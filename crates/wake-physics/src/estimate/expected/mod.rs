@@ -19,11 +19,12 @@ use super::value::Value;
 use crate::error::{Error, Result};
 use crate::models::Models;
 use crate::pixels::means_over;
+use crate::plan::Plan;
 use crate::prepared::Prepared;
 use crate::raster::{Field, Raster};
 use crate::sar::impulse::Reflectivity;
 use crate::sar::smooth::{Displacement, SmoothSum};
-use crate::scene::Scene;
+use crate::scene::{Scene, Term};
 use drawn::Drawn;
 use frozen::{Frozen, averaged, imaging};
 use surface::Surface;
@@ -99,10 +100,15 @@ impl ExpectedImage {
     /// A value of the scene out of its range, a grid that does not fit in memory, a ship that turns, a sea without wind, or
     /// the value of a ship without a ship.
     pub fn new(scene: &Scene, values: &[Value]) -> Result<Self> {
-        let prepared = Prepared::new(scene)?;
-        let raster = prepared.with_margin();
-        let prepared = prepared.over_all_seas();
-        let Prepared { models, plan, .. } = &prepared;
+        scene.validate()?;
+        let mut prepared = Prepared::new(scene);
+        let mut plan = Plan::of(&prepared)?;
+        let raster = plan.with_margin(&prepared.models.pixels.computed);
+        if plan.uses(Term::Sea) || plan.uses(Term::Swell) {
+            prepared = prepared.over_all_seas();
+            plan = plan.over_all_seas();
+        }
+        let (models, plan) = (&prepared.models, &plan);
         check(scene, models, values)?;
         let tolerance = (SUMS * scene.model.tolerance).max(1e-6);
         let fields = Linear::needed(|term| plan.uses(term));
