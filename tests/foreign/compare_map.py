@@ -1,8 +1,9 @@
 """Compares the wakes of `wake detect` with the ships of `wake simulate --product`: positions, headings, radial velocities.
 
-    python3 tests/foreign/compare_map.py SHIPS.geojson wakes.geojson AZIMUTH
+    python3 tests/foreign/compare_map.py SHIPS.geojson wakes.geojson AZIMUTH [--each]
 
-AZIMUTH is the direction of increasing range from true north (`platformHeading` of the annotation plus 90 degrees).
+AZIMUTH is the direction of increasing range from true north (`platformHeading` of the annotation plus 90 degrees). `--each` also
+prints every ship: how far the tip of its wake lies astern of the stern and to starboard of the track, the turn, and both velocities.
 """
 import json
 import math
@@ -25,6 +26,7 @@ def metres(place):
     return longitude * RADIUS * math.cos(math.radians(middle)), latitude * RADIUS
 
 
+each = "--each" in sys.argv
 errors = {"position [m]": [], "heading [deg]": [], "radial velocity [m/s]": []}
 taken = set()
 for ship in ships:
@@ -45,8 +47,18 @@ for ship in ships:
     turn = (found["heading_deg"] - math.degrees(heading) + 180) % 360 - 180
     errors["position [m]"].append(away(nearest))
     errors["heading [deg]"].append(abs(turn))
+    toward = -speed * math.cos(heading - range_azimuth) * math.sin(math.radians(found["incidence_deg"]))
+    if each:
+        tip = metres(wakes[nearest]["geometry"]["coordinates"][0])
+        east, north = tip[0] - stern[0], tip[1] - stern[1]
+        astern = -(east * math.sin(heading) + north * math.cos(heading))
+        starboard = east * math.cos(heading) - north * math.sin(heading)
+        read = found["radial_velocity_m_s"]
+        print(
+            f"{length:4.0f} m, {speed:4.1f} m/s: astern {astern:5.0f} m, starboard {starboard:4.0f} m, turn {turn:5.1f} deg, "
+            f"radial velocity {'unknown' if read is None else f'{read:.2f}'} (true {toward:.2f}) m/s, score {found['score']:.2f}"
+        )
     if found["radial_velocity_m_s"] is not None:
-        toward = -speed * math.cos(heading - range_azimuth) * math.sin(math.radians(found["incidence_deg"]))
         errors["radial velocity [m/s]"].append(abs(found["radial_velocity_m_s"] - toward))
 print(f"{len(taken)} of {len(ships)} ships found, {len(wakes) - len(taken)} other sure wakes")
 for name, values in errors.items():
