@@ -4,7 +4,7 @@
 //! flight, at low incidence and in weak wind (Tings and Velotto 2018, Int. J. Remote Sens. 39; Tings 2021, Remote Sens. 13, 165).
 
 use wake_physics::labels::WakeLabel;
-use wake_physics::{Scene, labels_of};
+use wake_physics::{Scene, expected_intensity, labels_of};
 
 /// Values of the grid, ascending.
 const WIND: [f64; 4] = [3.0, 5.0, 8.0, 11.0];
@@ -150,5 +150,79 @@ fn visibility_follows_the_published_trends() {
             .collect();
         let whole = means(&here, 0, WIND.len(), |seen| seen.whole);
         assert!(falls(&whole), "course {heading}: {whole:?}");
+    }
+}
+
+/// Largest ratio of the expected intensity to the sea on the arms, 12 to 21° off the track, and in the middle, within 6°, means over
+/// 300 to 1200 m astern of midship.
+fn arms_and_centre(keys: &[&str], heading: f64) -> [f64; 2] {
+    const STEPS: i32 = 48;
+    let common = [
+        "grid.rows=320",
+        "grid.columns=320",
+        "radar.sensor=sentinel-1-iw",
+        "grid.spacing=8",
+        "radar.incidence=35",
+        "sea.wind_speed=5",
+        "ship.length=150",
+        "ship.beam=22",
+        "ship.draft=8",
+        "ship.speed=9",
+        "ship.damping=0",
+    ];
+    let (sin, cos) = heading.to_radians().sin_cos();
+    let mut scene = Scene::default()
+        .with_assignments(&[&common[..], keys].concat())
+        .expect("a scene");
+    scene.ships[0].heading = heading;
+    scene.ships[0].position = [900.0 * sin, 900.0 * cos];
+    let image = expected_intensity(&scene).expect("an image");
+    let mut open = scene.clone();
+    open.ships.clear();
+    let level = expected_intensity(&open).expect("an image").mean();
+    let ratio = |degrees: f64| {
+        let tangent = degrees.to_radians().tan();
+        let places: Vec<f64> = (0..=90)
+            .map(|n| {
+                let (astern, aside) = (300.0 + 10.0 * f64::from(n), 0.0);
+                let aside = aside + tangent * astern;
+                let x = 900.0 * sin - astern * sin + aside * cos;
+                let y = 900.0 * cos - astern * cos - aside * sin;
+                let (row, column) = (160.0 - y / 8.0, 160.0 + x / 8.0);
+                f64::from(image.at(row.round() as usize, column.round() as usize)) / level
+            })
+            .collect();
+        places.iter().sum::<f64>() / places.len() as f64
+    };
+    let mut found = [0.0f64; 2];
+    for n in -STEPS..=STEPS {
+        let degrees = 0.5 * f64::from(n);
+        let place = match degrees.abs() {
+            at if (12.0..=21.0).contains(&at) => 0,
+            at if at <= 6.0 => 1,
+            _ => continue,
+        };
+        found[place] = found[place].max(ratio(degrees));
+    }
+    found
+}
+
+/// A thin ship's short waves make the middle of the wedge brighter than any that was measured. A limit of their slopes lowers the
+/// middle as a filter of their lengths does, and keeps more of the arms.
+#[test]
+fn breaking_lowers_the_middle_and_keeps_the_arms() {
+    for heading in [0.0, 40.0] {
+        let free = arms_and_centre(&[], heading);
+        let filtered = arms_and_centre(&["ship.filter_depth=2"], heading);
+        let broken = arms_and_centre(&["ship.steepness=0.2"], heading);
+        let more = arms_and_centre(&["ship.steepness=0.1"], heading);
+        println!(
+            "{heading}: free {free:.2?}, filtered {filtered:.2?}, slopes 0.2 {broken:.2?}, 0.1 {more:.2?}"
+        );
+        assert!(broken[1] < free[1] && more[1] < broken[1], "{heading}");
+        assert!(
+            broken[0] > filtered[0],
+            "{heading}: {broken:?} {filtered:?}"
+        );
     }
 }
