@@ -70,6 +70,7 @@ impl Frame<'_> {
         WakeLabel {
             arms_px: self.arm_lines(track, bow, arms, extent.waves),
             centreline_px: self.track_line(track, bow, [length, extent.longest()]),
+            visibility: extent.visibility,
             ..self.outlined(self.offset(self.position, bow, 0.0), opening, &seen, end)
         }
     }

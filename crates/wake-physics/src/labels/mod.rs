@@ -352,6 +352,7 @@ impl<'a> Frame<'a> {
         WakeLabel {
             arms_px: arms.collect(),
             centreline_px: centreline.unwrap_or_default(),
+            visibility: extent.visibility,
             ..self.outlined(
                 bow,
                 opening,
