@@ -190,12 +190,9 @@ pub(crate) fn labels(prepared: &Prepared<'_>) -> Labels {
         };
         LabelledShip {
             ship: frame.ship(ship, echo_displacement(scene, ship)),
-            wake: WakeLabel {
-                visibility: extent.visibility,
-                ..match wake.track.turn() {
-                    None => frame.wake(ship, opening, &extent),
-                    Some(_) => frame.curved_wake(wake, opening, &extent),
-                }
+            wake: match wake.track.turn() {
+                None => frame.wake(ship, opening, &extent),
+                Some(_) => frame.curved_wake(wake, opening, &extent),
             },
         }
     });
