@@ -94,6 +94,14 @@ pub enum Error {
         why: &'static str,
     },
 
+    /// A file that is no calibration, or one of other weights.
+    #[error("the calibration {} cannot be used: {why}", path.display())]
+    Calibration { path: PathBuf, why: String },
+
+    /// A text file that cannot be read.
+    #[error(transparent)]
+    File(#[from] whole_files::Error),
+
     /// An error of weights or devices.
     #[error(transparent)]
     Model(#[from] wake_nn::Error),

@@ -12,6 +12,8 @@ mod wake;
 pub mod network;
 pub mod self_check;
 
+pub mod calibration;
+
 mod maps;
 mod missing;
 mod search;
@@ -25,6 +27,7 @@ pub mod score;
 mod finder;
 
 pub use burn;
+pub use calibration::Calibration;
 pub use detector::Detector;
 pub use error::{Error, Result};
 pub use files::{image_files, image_name, picture_name};

@@ -8,9 +8,7 @@ use std::path::{Path, PathBuf};
 use indicatif::ProgressBar;
 use serde_json::{Map, Value, json};
 use wake_detector::drawing::Drawing;
-use wake_detector::{
-    Detection, Detector, Finder, GreyImage, Radon, image_files, image_name, picture_name,
-};
+use wake_detector::{Detection, Finder, GreyImage, Radon, image_files, image_name, picture_name};
 use whole_files::make_folder;
 
 use crate::exit::{self, Outcome};
@@ -41,7 +39,7 @@ pub(crate) struct Arguments {
     /// Weights of the network, by default those in the repository
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Least score that is told, 0 to 1; from 0.25 on there are few false alarms
+    /// Leave out detections with a lower score, 0 to 1
     #[arg(long, default_value_t = 0.03, value_parser = named::score)]
     least_score: f32,
     /// Print the wakes as JSON, and nothing else
@@ -143,38 +141,44 @@ fn search(
 
 fn draw(image: &GreyImage, found: &[Detection], arguments: &Arguments, file: &Path) -> Outcome<()> {
     let mut drawing = Drawing::new(image);
-    // Radon's score has no upper end; all that it tells is above its threshold.
-    let sure = |one: &&Detection| {
-        arguments.method == Method::Radon || one.score >= Detector::OPERATING_POINT
-    };
-    drawing.found(found.iter().filter(sure));
+    drawing.found(found.iter().filter(|one| one.sure));
     let path = arguments.out.join(picture_name(file));
     picture::write(&drawing.into_picture(), &path)
 }
 
 /// The wakes of an image that are likely ones, a line each.
 fn summary(name: &str, found: &[Detection]) -> String {
-    let sure: Vec<&Detection> = found
-        .iter()
-        .filter(|one| one.score >= Detector::OPERATING_POINT)
-        .collect();
+    let sure: Vec<&Detection> = found.iter().filter(|one| one.sure).collect();
     let mut text = format!("{name}: {} wakes", sure.len());
     for one in sure {
         let (wake, [column, row]) = (&one.wake, one.wake.tip);
         // Writing into a string cannot fail.
         let _ = write!(
             text,
-            "\n  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
-            one.score, wake.axis_deg, wake.length
+            "\n  {}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
+            how_sure(one.probability.map(f64::from), f64::from(one.score)),
+            wake.axis_deg,
+            wake.length
         );
     }
     text
 }
 
+/// The probability of a detection, or its score where none is known.
+fn how_sure(probability: Option<f64>, score: f64) -> String {
+    match probability {
+        Some(probability) => format!("probability {probability:.2}"),
+        None => format!("score {score:.2}"),
+    }
+}
+
 /// A detection as the program prints it.
 fn as_json(one: &Detection) -> Value {
     json!({
+        "probability": one.probability,
+        "sure": one.sure,
         "score": one.score,
+        "direction_probability": one.direction_probability,
         "tip": one.wake.tip,
         "axis_deg": one.wake.axis_deg,
         "half_angle_deg": one.wake.half_angle_deg,

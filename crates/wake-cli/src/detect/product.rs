@@ -7,12 +7,12 @@ use image::{ImageFormat, RgbImage};
 use indicatif::ProgressBar;
 use serde_json::json;
 use wake_detector::drawing::Drawing;
-use wake_detector::{Detection, Detector, GreyImage, Wake};
+use wake_detector::{Detection, GreyImage, Wake};
 use wake_geo::{Land, LandMask, Product, Values};
 use wake_map::{MappedWake, Search, csv, geojson, html, mapped, search};
 use whole_files::{make_folder, write_atomically, write_json};
 
-use super::Arguments;
+use super::{Arguments, how_sure};
 use crate::exit::{self, Outcome};
 use crate::{named, progress};
 
@@ -224,9 +224,7 @@ fn quick_look(product: &Product, found: &[Detection]) -> Outcome<QuickLook> {
             ..*one
         }
     };
-    let sure = found
-        .iter()
-        .filter(|one| one.score >= Detector::OPERATING_POINT);
+    let sure = found.iter().filter(|one| one.sure);
     let sure: Vec<Detection> = sure.map(scaled).collect();
     let mut drawing = Drawing::new(&small);
     drawing.found(sure.iter());
@@ -251,8 +249,8 @@ fn summary(name: &str, wakes: &[MappedWake], out: &Path) -> String {
         };
         let echo = wake.echo.and_then(|echo| echo.radial_velocity);
         text += &format!(
-            "\n  score {:.2}, {place}, heading {}, {} long, radial velocity {}",
-            wake.score,
+            "\n  {}, {place}, heading {}, {} long, radial velocity {}",
+            how_sure(wake.probability, wake.score),
             number(wake.heading, " deg"),
             number(wake.length, " m"),
             number(echo, " m/s")

@@ -1,6 +1,7 @@
 //! `wake evaluate`: every figure beside the simulator's own, on scenes that no training set holds.
 
 mod ablation;
+mod calibration;
 mod detector;
 mod domain;
 mod domain_report;
@@ -33,6 +34,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         Some(Task::Domain(options)) => domain::run(options),
         Some(Task::Sea(options)) => sea::run(options),
         Some(Task::Detector(options)) => detector::run(options),
+        Some(Task::Calibration(options)) => calibration::run(options),
     }
 }
 

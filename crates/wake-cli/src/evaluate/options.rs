@@ -1,6 +1,6 @@
 //! The command line, and what it names.
 
-use super::{detector, domain, sea};
+use super::{calibration, detector, domain, sea};
 use crate::exit::Outcome;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -50,6 +50,7 @@ pub(crate) enum Task {
     Domain(domain::Options),
     Sea(sea::Options),
     Detector(detector::Options),
+    Calibration(calibration::Options),
 }
 
 impl Arguments {

@@ -1,6 +1,6 @@
 //! `wake evaluate detector`: how well wakes are found in simulated images that were held out, and in real tiles.
 
-mod real;
+pub(crate) mod real;
 mod real_sea;
 mod recall;
 mod report;
