@@ -51,6 +51,7 @@ impl Detector {
         WEIGHTS
     }
 
+impl Detector {
     /// The network of this crate on a device.
     ///
     /// # Errors
