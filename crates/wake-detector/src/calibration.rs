@@ -129,8 +129,9 @@ fn solved(mut matrix: [[f64; 3]; 3], mut right: [f64; 3]) -> [f64; 3] {
     for k in 0..3 {
         for i in k + 1..3 {
             let factor = matrix[i][k] / matrix[k][k];
-            for j in k..3 {
-                matrix[i][j] -= factor * matrix[k][j];
+            let pivot = matrix[k];
+            for (value, above) in matrix[i].iter_mut().zip(pivot).skip(k) {
+                *value -= factor * above;
             }
             right[i] -= factor * right[k];
         }

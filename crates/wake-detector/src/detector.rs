@@ -51,7 +51,6 @@ impl Detector {
         WEIGHTS
     }
 
-impl Detector {
     /// The network of this crate on a device.
     ///
     /// # Errors

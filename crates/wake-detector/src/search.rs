@@ -605,7 +605,7 @@ mod tests {
                 let holds = |w: &[[usize; 2]; 2]| {
                     (w[0][0]..w[1][0]).contains(&y) && (w[0][1]..w[1][1]).contains(&x)
                 };
-                assert!(found.iter().any(|w| holds(w)));
+                assert!(found.iter().any(holds));
             }
         }
         assert!(windows(&[], [10, 10], 1.0).is_empty());

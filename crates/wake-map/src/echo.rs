@@ -207,7 +207,12 @@ mod tests {
             across([0.8, 0.6], 4.0),
             across([0.0, 1.0], 1.5),
         ] {
-            assert!(!(wake.deviation() <= MOST_DEVIATION) && wake.is_possible([500.0, 700.0]));
+            assert!(
+                wake.deviation()
+                    .partial_cmp(&MOST_DEVIATION)
+                    .is_none_or(std::cmp::Ordering::is_gt)
+                    && wake.is_possible([500.0, 700.0])
+            );
         }
     }
 }

@@ -128,14 +128,6 @@ fn summary(name: &str, found: &[Detection]) -> String {
     text
 }
 
-/// The probability of a detection, or its score where none is known.
-fn how_sure(probability: Option<f64>, score: f64) -> String {
-    match probability {
-        Some(probability) => format!("probability {probability:.2}"),
-        None => format!("score {score:.2}"),
-    }
-}
-
 /// A detection as the program prints it.
 fn as_json(one: &Detection) -> Value {
     json!({

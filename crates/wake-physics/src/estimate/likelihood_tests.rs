@@ -25,7 +25,7 @@ fn scores_have_mean_zero_and_the_stated_variance() {
     let scene = Scene::default().with_assignments(&keys).unwrap();
     let parameters = Parameter::OF_WAKE;
     let state = State::of(&scene);
-    let image = ExpectedImage::new(&scene, &Value::ALL[..9].as_ref()).unwrap();
+    let image = ExpectedImage::new(&scene, &Value::ALL[..9]).unwrap();
     let expected = image.at(&scene).unwrap();
     let texture = Texture::new(&scene, &parameters).unwrap();
     let sea = LinearSea::new(&scene).unwrap();
@@ -59,7 +59,6 @@ fn scores_have_mean_zero_and_the_stated_variance() {
         let seeds = SEEDS as f64;
         let mean = sums[n] / seeds / (stated[n] / seeds).sqrt();
         let ratio = squares[n] / seeds / stated[n];
-        println!("{parameter:?}: mean {mean:.2} deviations, variance {ratio:.2}");
         // A standard normal number, and a mean of 200 squares: deviation 0.1. The spectrum's score knows no kurtosis of speckle.
         let allowed = match parameter {
             Parameter::Value(Value::WindSpeed | Value::WindToward) | Parameter::Texture => 0.6,

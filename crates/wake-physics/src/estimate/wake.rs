@@ -178,7 +178,7 @@ fn ships(
             .map_or(1.0, |e| e.shown(&template.scene, i, j))
     };
     let torus = Noise::new(&template.scene)?.size;
-    let observed = Observed::new(coarse.image.clone(), torus, shown);
+    let observed = Observed::new(coarse.image, torus, shown);
     let fitter = Fitter {
         observed: &observed,
         priors: options.priors,

@@ -72,20 +72,20 @@ fn timings() {
     };
     let mut simulator = wake_physics::Simulator::default();
     time("expected_intensity, warm", &mut || {
-        drop(simulator.expected_intensity(&scene))
+        drop(simulator.expected_intensity(&scene));
     });
     time("expected_intensity", &mut || {
-        drop(wake_physics::expected_intensity(&scene))
+        drop(wake_physics::expected_intensity(&scene));
     });
     let values = &Value::ALL[..9];
     time("freeze", &mut || {
-        drop(wake_physics::estimate::ExpectedImage::new(&scene, values))
+        drop(wake_physics::estimate::ExpectedImage::new(&scene, values));
     });
     let image = wake_physics::estimate::ExpectedImage::new(&scene, values).unwrap();
     time("image", &mut || drop(image.intensity(&scene)));
     time("image and 9 derivatives", &mut || drop(image.at(&scene)));
     time("linear sea", &mut || {
-        drop(wake_physics::LinearSea::new(&scene))
+        drop(wake_physics::LinearSea::new(&scene));
     });
     time("simulate", &mut || drop(simulate(&scene)));
 }

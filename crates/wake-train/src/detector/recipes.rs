@@ -185,15 +185,6 @@ impl ImageRecipe {
             size,
         )?))
     }
-
-    /// The sea of the recipe detector without ships, with its gusts, swell and slicks.
-    ///
-    /// # Errors
-    ///
-    /// Of the recipe.
-    pub fn empty_sea(seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
-        Ok(Arc::new(simulated(&["draw.count = 0"], seed, size)?))
-    }
 }
 
 /// Images of both recipes in turn.

@@ -267,15 +267,14 @@ fn spline(polynomial: &[[f64; CHANNELS]], count: usize) -> Vec<[f64; CHANNELS]> 
         .collect();
     for (step, line) in [(1, SIDE), (SIDE, 1)] {
         for n in 0..SIDE {
-            for channel in 0..CHANNELS {
-                let mut values: Vec<f64> = (0..SIDE)
-                    .map(|k| out[n * line + k * step][channel])
-                    .collect();
+            let places: Vec<usize> = (0..SIDE).map(|k| n * line + k * step).collect();
+            (0..CHANNELS).for_each(|channel| {
+                let mut values: Vec<f64> = places.iter().map(|&at| out[at][channel]).collect();
                 unsmooth(&mut values);
-                for (k, value) in values.iter().enumerate() {
-                    out[n * line + k * step][channel] = *value;
+                for (&at, value) in places.iter().zip(values) {
+                    out[at][channel] = value;
                 }
-            }
+            });
         }
     }
     out

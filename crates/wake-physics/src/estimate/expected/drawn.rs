@@ -259,8 +259,8 @@ impl<'a, const N: usize> Drawn<'a, N> {
         };
         let part = |n: usize| {
             let mut part = Dual::constant(at.value[n]);
-            for axis in 0..2 {
-                part.chain(at.slope[n][axis], &slope[axis]);
+            for (by, along) in at.slope[n].into_iter().zip(&slope) {
+                part.chain(by, along);
             }
             if let Some(more) = &more {
                 // The heat equation: ∂σ/∂C = ½ ∇∇σ, twice where C_xy stands for C_yx.

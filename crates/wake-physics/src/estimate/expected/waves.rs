@@ -88,7 +88,7 @@ impl Strengths {
                 let k = [waves.kx[n], waves.ky[n]];
                 let mute = field == Linear::Modulation && modulating.is_some_and(|m| !m[n]);
                 let factor = field.factor(transfer, k, waves.omega[n]);
-                if mute || k == [0.0; 2] && field != Linear::Elevation {
+                if mute || k[0].hypot(k[1]) <= 0.0 && field != Linear::Elevation {
                     Complex64::ZERO
                 } else {
                     factor * waves.amplitude[n]
