@@ -1,4 +1,4 @@
-//! Hull forms of a thin ship, and what of each the waves feel.
+//! Hull forms of a thin ship, and their Michell integrals.
 //!
 //! One family serves both hulls. With the half length h = L/2 the half-breadth is a product
 //!

@@ -1,4 +1,4 @@
-//! Windows over the bandwidth of a radar, and what they do to its impulse response.
+//! Windows over the bandwidth of a radar, and their impulse responses.
 //!
 //! A window weights the spectrum over a bandwidth B: `W(f)` at the frequency f/B from −½ to ½. Distances are in units
 //! of 1/B:
@@ -26,7 +26,7 @@ const FARTHEST: f64 = 20.0;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Window {
-    /// W = 1: the sharpest response, sidelobes of −13 dB.
+    /// W = 1: the narrowest response, sidelobes of −13 dB.
     Uniform,
     /// W = α + (1 − α) cos 2πf with α from 0.5 to 1; 0.54 is Hamming's own.
     Hamming(f64),
@@ -95,7 +95,7 @@ impl Window {
         (transform / self.moment(2)).powi(2)
     }
 
-    /// Transfer of the mean intensity at the frequency f/B, 1 at 0: ∫W(u − f/2) W(u + f/2) du/∫W² du; 0 from f = 1 on.
+    /// Intensity transfer function at the frequency f/B, 1 at 0: ∫W(u − f/2) W(u + f/2) du/∫W² du; 0 from f = 1 on.
     #[must_use]
     pub fn intensity_transfer(self, f: f64) -> f64 {
         let shared = (1.0 - f.abs()).max(0.0);
