@@ -31,6 +31,7 @@ fn wake() -> KelvinWake {
         track: Track::new([0.0, 0.0], 45.0, 0.0),
         depth: f64::INFINITY,
         filter_depth: 0.0,
+        steepness: None,
     }
 }
 

@@ -11,13 +11,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         None => simulated()?,
     };
     let detector = Detector::pretrained(&Device::default())?;
-    let found = detector.find(&image);
+    let mut found = detector.find(&image);
+    found.retain(|one| one.sure);
     for one in &found {
         let ([column, row], axis) = (one.wake.tip, one.wake.axis_deg);
-        println!(
-            "score {:.2}: from ({column:.0}, {row:.0}) toward {axis:.0} degrees",
-            one.score
-        );
+        let probability = one.probability.unwrap_or(one.score);
+        println!("{probability:.2}: from ({column:.0}, {row:.0}) toward {axis:.0} degrees");
     }
     let mut drawing = Drawing::new(&image);
     drawing.found(found.iter());

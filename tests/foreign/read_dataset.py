@@ -1,12 +1,16 @@
-"""Reads a folder of make_dataset with the libraries that it is made for.
+"""Reads a folder of `wake dataset` with the libraries that it is made for; with a card and shards also those, as from a hub.
 
-    pip install datasets pillow pycocotools
-    python tests/foreign/read_dataset.py out/dataset
+    pip install datasets pillow pycocotools webdataset
+    wake dataset --card --webdataset out/shards
+    python tests/foreign/read_dataset.py out/dataset [out/shards]
 """
 
 import json
+import os
 import pathlib
 import sys
+
+os.environ["HF_HUB_OFFLINE"] = "1"
 
 from datasets import load_dataset
 from pycocotools.coco import COCO
@@ -82,3 +86,35 @@ print("YOLO-OBB and DOTA agree")
 lists = [(folder / name).read_text().split() for name in ("trainset.txt", "valset.txt")]
 assert sorted(lists[0] + lists[1]) == ["./" + line["file_name"] for line in lines]
 print(len(lists[0]), "images to train,", len(lists[1]), "to validate")
+
+# A card names the columns: the folder is read as it would be from a hub, with the types of the card.
+if (folder / "README.md").exists():
+    carded = load_dataset(str(folder))["train"]
+    assert carded.column_names == data.column_names or set(data.column_names) <= set(carded.column_names)
+    assert [row["text"] for row in carded] == [line["text"] for line in lines]
+    assert [row["seed"] for row in carded] == [line["seed"] for line in lines]
+    print("the card fits:", carded.features["objects"])
+
+# The shards hold the same rows, in their splits.
+if len(sys.argv) > 2:
+    import webdataset
+
+    shards = sorted(pathlib.Path(sys.argv[2]).glob("*.tar"))
+    splits = load_dataset(sys.argv[2])
+    for split, name in (("train", "trainset.txt"), ("validation", "valset.txt")):
+        listed = (folder / name).read_text().split()
+        expected = {line["file_name"]: line for line in lines if "./" + line["file_name"] in listed}
+        rows = list(splits[split]) if expected else []
+        assert {row["json"]["file_name"] for row in rows} == expected.keys(), split
+        for row in rows:
+            line = expected[row["json"]["file_name"]]
+            assert row["txt"] == line["text"] and row["json"]["objects"] == line["objects"]
+            assert row["png"].size == (grid["columns"], grid["rows"])
+        paths = [str(path) for path in shards if path.name.startswith(split)]
+        samples = list(webdataset.WebDataset(paths, shardshuffle=False)) if paths else []
+        assert [json.loads(sample["json"])["file_name"] for sample in samples] == list(expected)
+        for sample in samples:
+            name = json.loads(sample["json"])["file_name"]
+            assert sample["png"] == (folder / name).read_bytes()
+            assert sample["txt"].decode() == expected[name]["text"]
+    print(len(shards), "shards hold the set")

@@ -14,6 +14,8 @@ mod sheet;
 mod simulate;
 
 #[cfg(feature = "prompt")]
+mod estimate;
+#[cfg(feature = "prompt")]
 mod prompt;
 
 #[cfg(feature = "dataset")]
@@ -28,6 +30,9 @@ mod detect;
 mod named;
 #[cfg(feature = "detect")]
 mod picture;
+
+#[cfg(feature = "export")]
+mod export;
 
 #[cfg(feature = "train")]
 mod sea_images;
@@ -44,7 +49,7 @@ mod gallery;
 
 mod shell;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Simulate, generate and find ship wakes in radar images.
@@ -61,6 +66,8 @@ enum Command {
     Simulate(simulate::Arguments),
     #[cfg(feature = "prompt")]
     Prompt(prompt::Arguments),
+    #[cfg(feature = "prompt")]
+    Estimate(estimate::Arguments),
     #[cfg(feature = "generate")]
     Generate(generate::Arguments),
     #[cfg(feature = "dataset")]
@@ -73,6 +80,8 @@ enum Command {
     Locate(locate::Arguments),
     #[cfg(feature = "train")]
     Evaluate(evaluate::Arguments),
+    #[cfg(feature = "export")]
+    Export(export::Arguments),
     #[cfg(feature = "bench")]
     Bench(bench::Arguments),
     #[cfg(feature = "bench")]
@@ -88,6 +97,8 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         #[cfg(feature = "prompt")]
         Command::Prompt(arguments) => prompt::run(&arguments),
+        #[cfg(feature = "prompt")]
+        Command::Estimate(arguments) => estimate::run(&arguments),
         #[cfg(feature = "generate")]
         Command::Generate(arguments) => generate::run(&arguments),
         #[cfg(feature = "dataset")]
@@ -100,11 +111,13 @@ fn main() -> ExitCode {
         Command::Locate(arguments) => locate::run(&arguments),
         #[cfg(feature = "train")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        #[cfg(feature = "export")]
+        Command::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(&arguments),
         #[cfg(feature = "bench")]
         Command::Gallery(arguments) => gallery::run(&arguments),
-        Command::Completions(arguments) => shell::completions(&arguments),
-        Command::Man(arguments) => shell::man(&arguments),
+        Command::Completions(arguments) => shell::completions(&arguments, Program::command()),
+        Command::Man(arguments) => shell::man(&arguments, Program::command()),
     })
 }

@@ -1,5 +1,6 @@
 //! Scenes whose values are drawn, each on its own, keyed by their path in a scene file.
 
+use super::delivery::Delivery;
 use super::distribution::{Distribution, Value, choose, refused};
 use crate::error::{Error, Result};
 use crate::streams;
@@ -42,8 +43,13 @@ const COUNT: &str = "count";
 /// Grey of the sea's median amplitude, and of no amplitude: see [`Draws::quick_look`].
 const GAIN: &str = "quick_look.gain";
 const OFFSET: &str = "quick_look.offset";
+/// Pixels of the image along a resolution cell, the geometric mean of both axes; 0: the spacing stays as it is.
+const PIXELS: &str = "delivery.pixels";
+/// How the image is passed on: see [`Delivery`]; quality 0: not compressed.
+const RESIZE: &str = "delivery.resize";
+const QUALITY: &str = "delivery.quality";
 /// Keys that are none of a scene.
-const OWN: [&str; 3] = [COUNT, GAIN, OFFSET];
+const OWN: [&str; 6] = [COUNT, GAIN, OFFSET, PIXELS, RESIZE, QUALITY];
 const SENSOR: &str = "radar.sensor";
 const POSITION: &str = "ship.position";
 /// The position that is drawn in the image.
@@ -133,14 +139,22 @@ impl Draws {
     /// Gain and offset of image number `index` as a quick-look, if they are drawn.
     pub(super) fn quick_look(&self, random: NoiseSource, index: u64) -> Option<[f64; 2]> {
         let chosen = self.chosen(random, index);
-        let number = |path: &str| match chosen
-            .get(path)?
-            .at(random.uniform(stream(path), index), false)
-        {
-            Value::Number(number) => Some(number),
-            _ => None,
-        };
+        let number = |path: &str| number(&chosen, path, random, index);
         Some([number(GAIN)?, number(OFFSET).unwrap_or(0.0)])
+    }
+
+    /// How image number `index` is passed on, if it is resized or compressed.
+    pub(super) fn delivery(&self, random: NoiseSource, index: u64) -> Option<Delivery> {
+        let chosen = self.chosen(random, index);
+        let number = |path: &str| number(&chosen, path, random, index);
+        let quality = number(QUALITY).filter(|quality| *quality >= 1.0);
+        let resize = number(RESIZE).unwrap_or(1.0);
+        let phase = |of: &str| (8.0 * random.uniform(stream(of), index)) as usize % 8;
+        (quality.is_some() || (resize - 1.0).abs() > 1e-9).then(|| Delivery {
+            resize,
+            quality: quality.map(|quality| quality as u8),
+            phase: ["delivery.row", "delivery.column"].map(phase),
+        })
     }
 
     /// Checks every range against the scene's own, on `base`, and all of them at both ends together.
@@ -151,6 +165,10 @@ impl Draws {
             let own = |path: &str| case == 0 || self.together[case].1.contains_key(path);
             for (&path, distribution) in chosen.iter().filter(|(path, _)| own(path)) {
                 self.own(path, distribution)?;
+                // Pixels by the resolution need one, which another key may draw.
+                if path == PIXELS {
+                    continue;
+                }
                 for value in distribution.extremes() {
                     let fixed = Distribution::Fixed(value);
                     let mut alone = BTreeMap::from([(path, &fixed)]);
@@ -176,15 +194,18 @@ impl Draws {
         let [low, high] = match path {
             GAIN => [1e-3, 1.0],
             OFFSET => [-1.0, 1.0],
+            PIXELS => [0.0, 16.0],
+            RESIZE => [0.25, 4.0],
+            QUALITY => [0.0, 100.0],
             COUNT => [0.0, 100.0],
             _ => return Ok(()),
         };
         for value in distribution.extremes() {
             match value {
                 Value::Number(n)
-                    if (low..=high).contains(&n) && (path != COUNT || n.fract() == 0.0) => {}
+                    if (low..=high).contains(&n) && (!is_whole(path) || n.fract() == 0.0) => {}
                 value => {
-                    let kind = if path == COUNT {
+                    let kind = if is_whole(path) {
                         "whole numbers"
                     } else {
                         "numbers"
@@ -270,10 +291,18 @@ fn scene(
             set(&mut table, path, toml(&value, is_whole(path))).map_err(|e| told(&e))?;
         }
     }
-    let sea: Scene = table
-        .clone()
-        .try_into()
-        .map_err(|e: toml::de::Error| told(&e.to_string().trim().replace('\n', ", ")))?;
+    let parsed = |table: &toml::Table| -> Result<Scene> {
+        let scene = table.clone().try_into();
+        scene.map_err(|e: toml::de::Error| told(&e.to_string().trim().replace('\n', ", ")))
+    };
+    let mut sea = parsed(&table)?;
+    if let Some(Value::Number(pixels)) = drawn.get(PIXELS).map(|p| p.at(at(PIXELS), false))
+        && pixels > 0.0
+    {
+        let spacing = spacing_of(&sea, pixels)?;
+        set(&mut table, "grid.spacing", spacing.into()).map_err(|e| told(&e))?;
+        sea = parsed(&table)?;
+    }
     let (first, of_base) = match ships {
         Some(toml::Value::Array(several)) => (several.first().cloned(), several.len()),
         one => (one.clone(), usize::from(one.is_some())),
@@ -335,6 +364,30 @@ fn ship(
     Ok(ship.into())
 }
 
+/// The spacing \[m\] at which a resolution cell has so many pixels, in steps of 1 cm.
+fn spacing_of(scene: &Scene, pixels: f64) -> Result<f64> {
+    let radar = &scene.radar;
+    let range = radar.range_resolution.ok_or_else(|| Error::Recipe {
+        message: format!("draw.{PIXELS} needs radar.range_resolution, or a radar.sensor"),
+    })?;
+    let cell = (range * radar.azimuth_resolution).sqrt();
+    Ok((100.0 * cell / pixels).round().max(10.0) / 100.0)
+}
+
+/// The number that a key has in image number `index`, if the key is drawn and a number.
+fn number(
+    chosen: &BTreeMap<&str, &Distribution>,
+    path: &str,
+    random: NoiseSource,
+    index: u64,
+) -> Option<f64> {
+    let place = random.uniform(stream(path), index);
+    match chosen.get(path)?.at(place, is_whole(path)) {
+        Value::Number(number) => Some(number),
+        _ => None,
+    }
+}
+
 /// Takes away what a sensor sets: all of the radar but what no sensor sets, and the spacing.
 fn replace_radar(table: &mut toml::Table) {
     let mut of = |name: &str, keep: &dyn Fn(&str) -> bool| {
@@ -348,7 +401,7 @@ fn replace_radar(table: &mut toml::Table) {
 
 /// Whether a value of a scene is a whole number.
 fn is_whole(path: &str) -> bool {
-    ["radar.looks", "grid.oversampling"].contains(&path)
+    ["radar.looks", "grid.oversampling", COUNT, QUALITY].contains(&path)
 }
 
 fn toml(value: &Value, whole: bool) -> toml::Value {

@@ -1,8 +1,9 @@
 //! A data set on disk, read back, once or again and again.
 
-use super::layout::{Layout, Manifest, broken, cannot};
-use super::metadata::{Rows, parse};
-use super::pair::{Grey, Pair};
+use super::grey::Grey;
+use super::layout::{Layout, Manifest, broken};
+use super::metadata::{Row, Rows, parse};
+use super::pair::Pair;
 use super::shuffle::shuffled;
 use crate::error::Result;
 use image::ImageFormat;
@@ -29,8 +30,7 @@ impl Folder {
             return Err(broken(path, 0, message));
         };
         let metadata = Layout(path).metadata();
-        let text =
-            whole_files::read_regular(&metadata).map_err(|e| cannot("read", &metadata, e))?;
+        let text = whole_files::read_bytes(&metadata)?;
         let rows = parse(&metadata, &text, &manifest)?;
         let expected = manifest.indices().end - manifest.indices().start;
         if rows.len() as u64 != expected {
@@ -70,10 +70,28 @@ impl Folder {
     /// Positions of the pairs that are to be learnt from, those that `trainset.txt` names.
     #[must_use]
     pub fn trainset(&self) -> Vec<u64> {
+        self.split(false)
+    }
+
+    /// Positions of the pairs that are to be validated with, those that `valset.txt` names.
+    #[must_use]
+    pub fn valset(&self) -> Vec<u64> {
+        self.split(true)
+    }
+
+    fn split(&self, val: bool) -> Vec<u64> {
         let rows = self.rows.iter().zip(0..);
-        rows.filter(|((index, _), _)| !self.manifest.is_val(*index))
+        rows.filter(|((index, _), _)| self.manifest.is_val(*index) == val)
             .map(|(_, position)| position)
             .collect()
+    }
+
+    /// The index and the row of a pair.
+    pub(super) fn row(&self, position: u64) -> Result<&(u64, Row)> {
+        self.rows.get(position as usize).ok_or_else(|| {
+            let message = format!("no pair {position}, there are {}", self.len());
+            broken(&self.path, 0, message)
+        })
     }
 
     /// Reads a pair; `position` counts from 0 in this folder.
@@ -82,10 +100,7 @@ impl Folder {
     ///
     /// [`Error::Dataset`](crate::Error::Dataset) if there is no such pair, or its image is another one than was written.
     pub fn pair(&self, position: u64) -> Result<Pair> {
-        let Some((index, row)) = self.rows.get(position as usize) else {
-            let message = format!("no pair {position}, there are {}", self.len());
-            return Err(broken(&self.path, 0, message));
-        };
+        let (index, row) = self.row(position)?;
         let grid = &self.manifest.recipe.scene.grid;
         let path = self.path.join(&row.file_name);
         let bytes = row.image_bytes(&path, position as usize + 1)?;

@@ -5,6 +5,10 @@
 mod error;
 pub mod streams;
 
+// Images.
+mod delivery;
+mod grey;
+
 // Which scenes.
 mod distribution;
 mod draws;
@@ -26,6 +30,9 @@ mod metadata;
 mod folder;
 mod write;
 
+mod card;
+mod webdataset;
+
 mod merge;
 
 // Pairs, position by position.
@@ -43,21 +50,25 @@ mod finite;
 
 #[cfg(feature = "burn")]
 pub use batch::{Batch, Batches, ToBatch};
+pub use card::{CardOf, write_card};
+pub use delivery::Delivery;
 pub use draws::Draws;
 pub use error::{Error, Result};
 #[cfg(feature = "burn")]
 pub use finite::Finite;
 pub use folder::{Epochs, Folder};
+pub use grey::Grey;
 pub use layout::{Manifest, Shard};
 pub use loader::Loader;
 pub use merge::{merge, shard_folder};
 pub use mixture::Mixture;
-pub use pair::{Grey, Pair};
+pub use pair::Pair;
 pub use recipe::{Draw, Recipe};
 pub use scenes::{PAPER_SCENES, Simulated};
 pub use sea::Sea;
 pub use shuffle::shuffled;
 pub use source::Source;
+pub use webdataset::write_webdataset;
 pub use write::{Progress, write};
 
 #[cfg(test)]

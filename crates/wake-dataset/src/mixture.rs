@@ -122,7 +122,7 @@ impl Source for Mixture {
 
 #[cfg(test)]
 mod tests {
-    use super::super::pair::Grey;
+    use super::super::grey::Grey;
     use super::*;
     use wake_physics::Scene;
     use wake_physics::labels::Labels;

@@ -1,23 +1,11 @@
 //! One image with its words, numbers and labels.
 
+use super::grey::Grey;
 use super::scenes::Simulated;
 use crate::error::Result;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use wake_physics::grey::GreyScale;
 use wake_physics::labels::Labels;
-use wake_physics::measure::median;
 use wake_physics::{Field, Scene, Simulator, labels_of};
-
-/// A picture in grey 0…1.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Grey {
-    /// Number of rows.
-    pub rows: usize,
-    /// Number of columns.
-    pub columns: usize,
-    /// The pixels `[rows, columns]`, row after row.
-    pub pixels: Vec<f32>,
-}
 
 /// An image with its prompt, the scene it was made from, and its labels.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,8 +39,16 @@ impl Simulated {
     ///
     /// [`Sea::image`]: crate::Sea::image
     pub fn pair(&self, index: u64) -> Result<Pair> {
-        let power = self.power(&self.scene(index)?)?;
-        let (image, amplitudes) = self.grey(&power, index);
+        let scene = self.scene(index)?;
+        let (image, amplitudes) = match self.delivery(index) {
+            None => self.grey(&self.power(&scene)?, index),
+            Some(delivery) => {
+                let power = self.power(&delivery.product(&scene))?;
+                let (product, amplitudes) = self.grey(&power, index);
+                let size = [scene.grid.rows, scene.grid.columns];
+                (delivery.deliver(&product, size)?, amplitudes)
+            }
+        };
         Ok(Pair {
             image,
             amplitudes,
@@ -107,101 +103,50 @@ impl Simulated {
     }
 }
 
-impl Grey {
-    /// The grey of a field of σ⁰ or intensity.
-    pub(super) fn of_power(power: &Field, scale: &GreyScale) -> Self {
-        let grey = |&p: &f32| scale.grey(f64::from(p)) as f32;
-        Self {
-            rows: power.rows,
-            columns: power.columns,
-            pixels: power.values.iter().map(grey).collect(),
-        }
-    }
-
-    /// The grey of intensities as a quick-look shows them: amplitude stretched by an unknown factor, cut to 8 bits.
-    ///
-    /// ```text
-    /// grey = offset + gain · a / median(a),   a = √intensity,   in steps of 1/255 from 0 to 1
-    /// ```
-    ///
-    /// Beside it the amplitudes of grey 0 and 1, a = median(a) (grey − offset)/gain. An image without power is of the grey of
-    /// `offset`, which no amplitude undoes.
-    pub fn quick_look(power: &Field, gain: f64, offset: f64) -> (Self, Option<[f64; 2]>) {
-        let mut pixels: Vec<f32> = power.values.iter().map(|&p| p.max(0.0).sqrt()).collect();
-        let median = median(&pixels);
-        let factor = if median > 0.0 {
-            gain as f32 / median
-        } else {
-            0.0
-        };
-        for a in &mut pixels {
-            let grey = (offset as f32 + factor * *a).clamp(0.0, 1.0);
-            *a = (255.0 * grey).round() / 255.0;
-        }
-        let ends = [0.0, 1.0].map(|grey| f64::from(median) * (grey - offset) / gain);
-        let image = Self {
-            rows: power.rows,
-            columns: power.columns,
-            pixels,
-        };
-        (image, (median > 0.0 && gain > 0.0).then_some(ends))
-    }
-
-    /// The pixels as the nearest levels of 8 bits.
-    pub fn levels(&self) -> Vec<u8> {
-        let level = |&grey: &f32| (255.0 * grey).round() as u8;
-        self.pixels.iter().map(level).collect()
-    }
-
-    /// The picture of levels of 8 bits.
-    pub fn of_levels(levels: &[u8], rows: usize, columns: usize) -> Self {
-        Self {
-            rows,
-            columns,
-            pixels: levels.iter().map(|&l| f32::from(l) / 255.0).collect(),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Recipe;
 
-    fn field(values: &[f32]) -> Field {
-        Field {
-            rows: 1,
-            columns: values.len(),
-            values: values.to_vec(),
-        }
-    }
-
-    /// The median amplitude has the grey of gain and offset, others are linear in amplitude, in steps of 8 bits, whatever
-    /// the unit of the intensity.
+    /// In a delivered image the echo of a ship at rest is brightest where its label says: within half the ship and a resolution cell of
+    /// two pixels. The image has the size of its scene, and is another than the product's.
     #[test]
-    fn a_quick_look_is_amplitude_of_an_unknown_factor() {
-        let power = [0.0, 1.0, 4.0, 9.0, 1e6];
-        let expected = [0.1, 0.2, 0.3, 0.4, 1.0];
-        for factor in [1e-6, 1.0, 1e3] {
-            let power = power.map(|p| factor * p);
-            let (grey, amplitudes) = Grey::quick_look(&field(&power), 0.2, 0.1);
-            let [dark, bright] = amplitudes.unwrap();
-            for (level, power) in grey.pixels.iter().zip(power).take(4) {
-                // Half a level of the 255 between the ends; the last pixel is cut.
-                let found = dark + f64::from(*level) * (bright - dark);
-                assert!((found - f64::from(power).sqrt()).abs() <= (bright - dark) / 509.0);
-            }
-            assert_eq!((grey.rows, grey.columns), (1, 5));
-            for (found, expected) in grey.pixels.iter().zip(expected) {
-                // Half a level, and the rounding of both numbers.
-                assert!((found - expected).abs() <= 0.5 / 255.0 + 1e-6, "{found}");
-                assert!((255.0 * found - (255.0 * found).round()).abs() < 1e-4);
-            }
+    fn labels_follow_a_delivered_image() {
+        let changes = [
+            "scene.grid.rows = 72",
+            "scene.grid.columns = 61",
+            "scene.ship.echo = true",
+            "draw.count = 1",
+            "draw.ship.speed = 0",
+            "draw.ship.length = 120",
+            "draw.radar.sensor = \"sentinel-1-iw\"",
+            "draw.quick_look.gain = 0.1",
+            "draw.delivery.pixels = 2",
+            "draw.delivery.resize = [0.8, 1.6]",
+            "draw.delivery.quality = [80, 95]",
+        ];
+        let recipe = Recipe::default().with_assignments(&changes).unwrap();
+        let plain =
+            recipe.with_assignments(&["draw.delivery.resize = 1", "draw.delivery.quality = 0"]);
+        let (source, plain) = (
+            Simulated::new(recipe, 5).unwrap(),
+            Simulated::new(plain.unwrap(), 5).unwrap(),
+        );
+        for index in 0..6 {
+            let pair = source.pair(index).unwrap();
+            // Two pixels along the mean of 20.3 and 17.2 m.
+            assert!((pair.scene.grid.spacing - 9.34).abs() < 1e-9);
+            assert_eq!(pair.scene, plain.scene(index).unwrap());
+            let (image, other) = (&pair.image, plain.pair(index).unwrap().image);
+            assert_eq!((image.rows, image.columns), (72, 61));
+            assert_ne!(*image, other);
+            let brightest =
+                (0..72 * 61).max_by(|&a, &b| image.pixels[a].total_cmp(&image.pixels[b]));
+            let brightest = brightest.unwrap();
+            let [column, row] = pair.labels.ships[0].ship.echo_px.unwrap();
+            let off = (column - (brightest % 61) as f64).hypot(row - (brightest / 61) as f64);
+            assert!(off < 60.0 / 9.34 + 3.0, "{index}: {off}");
         }
-        let (dark, none) = Grey::quick_look(&field(&[0.0; 3]), 0.2, -0.1);
-        assert_eq!(none, None);
-        assert_eq!(dark.pixels, [0.0; 3]);
-        assert!(Grey::quick_look(&field(&[]), 0.2, 0.1).0.pixels.is_empty());
     }
 
     /// Images of a recipe that draws a gain have a median between its ends, another in each image.

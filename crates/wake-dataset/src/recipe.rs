@@ -10,7 +10,9 @@ use wake_physics::grey::GreyScale;
 use wake_physics::scene::{Grid, stored_key};
 use whole_files::sentence;
 
-/// The recipe of a detector.
+/// What satellites deliver.
+const SATELLITES: &str = include_str!("satellites.toml");
+/// What the recipe of a detector changes of it.
 const DETECTOR: &str = include_str!("detector.toml");
 /// What keys begin with that say how images are kept, not what they show.
 const OF_A_SET: [&str; 3] = ["grid.rows", "grid.columns", "quick_look."];
@@ -21,7 +23,7 @@ const OF_A_SET: [&str; 3] = ["grid.rows", "grid.columns", "quick_look."];
 /// unknown ones are errors:
 ///
 /// ```toml
-/// base = "detector"         # paper, ranges, detector or model
+/// base = "detector"         # paper, ranges, satellites, detector or model
 /// speckle = true            # false: the image before speckle
 /// paraphrase = false        # true: four wordings in turn, false: the paper's
 /// [grey]                    # σ⁰ to grey, linear in decibel or in amplitude
@@ -134,29 +136,38 @@ impl Recipe {
         }
     }
 
-    /// The recipe of a detector: what satellites deliver, see docs/dataset.md.
+    /// Products of satellites: seven sensors, ships of all sizes, and what looks like a wake, see docs/dataset.md.
     ///
     /// # Errors
     ///
     /// None, unless a sensor or a range was changed without the recipe.
-    pub fn detector() -> Result<Self> {
+    pub fn satellites() -> Result<Self> {
         let empty = Self {
             draw: Draw::Values(Draws::default()),
             scene: Scene::from_toml("")?,
             ..Self::default()
         };
-        empty.merged(DETECTOR)
+        empty.merged(SATELLITES)
     }
 
-    /// The recipe of the wake model that ships: the scenes of `ranges` and those of [`detector`](Self::detector) in turn, one as
-    /// often as the other, in one mapping to grey and without speckle.
+    /// The recipe of a detector: [`satellites`](Self::satellites) as their images are passed on, see docs/dataset.md.
     ///
     /// # Errors
     ///
-    /// As [`detector`](Self::detector).
+    /// As [`satellites`](Self::satellites).
+    pub fn detector() -> Result<Self> {
+        Self::satellites()?.merged(DETECTOR)
+    }
+
+    /// The recipe of the wake model that ships: the scenes of `ranges` and those of [`satellites`](Self::satellites) in turn, one
+    /// as often as the other, in one mapping to grey and without speckle.
+    ///
+    /// # Errors
+    ///
+    /// As [`satellites`](Self::satellites).
     pub fn model() -> Result<Self> {
-        let mut detector = parsed(DETECTOR)?;
-        let mut draw = table_of(&mut detector, "draw");
+        let mut satellites = parsed(SATELLITES)?;
+        let mut draw = table_of(&mut satellites, "draw");
         let cases = match draw.remove("together") {
             Some(toml::Value::Array(cases)) => cases,
             _ => Vec::new(),
@@ -164,9 +175,9 @@ impl Recipe {
         let weight = |case: &toml::Table| case.get("weight").and_then(number).unwrap_or(1.0);
         let cases: Vec<toml::Table> = cases.into_iter().filter_map(table).collect();
         let total: f64 = cases.iter().map(weight).sum();
-        // What the detector's scenes share is theirs alone here.
+        // What the satellites' scenes share is theirs alone here.
         let mut shared = toml::Table::new();
-        flatten("", table_of(&mut detector, "scene"), &mut shared);
+        flatten("", table_of(&mut satellites, "scene"), &mut shared);
         shared.extend(draw);
         shared.retain(|key, _| !OF_A_SET.iter().any(|prefix| key.starts_with(prefix)));
         let merged = cases.into_iter().map(|case| {
@@ -186,7 +197,7 @@ impl Recipe {
         Self::default().changed(changes, "")
     }
 
-    /// A recipe that is built in, by its name: paper, ranges, detector or model.
+    /// A recipe that is built in, by its name: paper, ranges, satellites, detector or model.
     ///
     /// # Errors
     ///
@@ -195,12 +206,13 @@ impl Recipe {
         match name {
             "paper" => Ok(Self::paper()),
             "ranges" => Ok(Self::default()),
+            "satellites" => Self::satellites(),
             "detector" => Self::detector(),
             "model" => Self::model(),
             _ => Err(Error::Value(wake_nn::Error::InvalidOption {
                 option: "recipe".to_owned(),
                 value: sentence(name),
-                expected: "paper, ranges, detector or model".to_owned(),
+                expected: "paper, ranges, satellites, detector or model".to_owned(),
             })),
         }
     }

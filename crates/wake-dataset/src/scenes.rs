@@ -1,5 +1,6 @@
 //! Scene number `index` of a recipe: a pure function.
 
+use super::delivery::Delivery;
 use super::recipe::{Draw, Recipe};
 use crate::error::Result;
 use crate::sea::Sea;
@@ -105,6 +106,14 @@ impl Simulated {
         }
     }
 
+    /// How image number `index` is passed on; `None` where it is the product's own.
+    pub fn delivery(&self, index: u64) -> Option<Delivery> {
+        match &self.recipe.draw {
+            Draw::PaperGrid => None,
+            Draw::Values(draws) => draws.delivery(NoiseSource::new(self.seed), index),
+        }
+    }
+
     /// The words for scene number `index`.
     pub(super) fn wording(&self, index: u64) -> Wording {
         if !self.recipe.paraphrase {
@@ -130,6 +139,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
+    use wake_physics::scene::Recovery;
 
     fn simulated(changes: &[String], seed: u64) -> Simulated {
         let recipe = Recipe::default().with_assignments(changes).unwrap();
@@ -513,8 +523,11 @@ mod tests {
         for (text, word) in [
             ("speckles = true", "speckles"),
             ("draw = \"papers\"", "papers"),
-            ("base = \"papers\"", "paper, ranges, detector or model"),
-            ("base = 3", "paper, ranges, detector or model"),
+            (
+                "base = \"papers\"",
+                "paper, ranges, satellites, detector or model",
+            ),
+            ("base = 3", "paper, ranges, satellites, detector or model"),
             ("[draw.ship]\nsped = [1, 2]", "sped"),
             ("[draw]\nseed = [1, 2]", "seed of its own"),
             ("[draw.grid]\nrows = [16, 32]", "one size"),
@@ -584,11 +597,11 @@ mod tests {
             assert!((3.0..=7.0).contains(&scene.sea.wind_speed));
             assert_eq!(scene.radar.nesz, None);
         }
-        let detector = Recipe::detector().unwrap().scene;
+        let satellites = Recipe::satellites().unwrap().scene;
         let mut sensors = BTreeSet::new();
         for scene in wide {
             assert_eq!((scene.grid.rows, scene.grid.oversampling), (256, Some(2)));
-            assert_eq!(scene.model, detector.model);
+            assert_eq!(scene.model, satellites.model);
             assert!(scene.sea.breaking && scene.ships.iter().all(|ship| ship.echo && ship.edge));
             assert!(scene.radar.nesz.is_some());
             sensors.insert(format!("{:?}", scene.radar.sensor));
@@ -597,8 +610,9 @@ mod tests {
     }
 
     #[test]
-    fn the_recipe_of_a_detector_covers_what_satellites_deliver() {
-        let source = Simulated::new(Recipe::detector().unwrap(), 9).unwrap();
+    fn the_recipe_of_satellites_covers_what_they_deliver() {
+        let source = Simulated::new(Recipe::satellites().unwrap(), 9).unwrap();
+        assert!((0..300).all(|i| source.delivery(i).is_none()));
         let scenes: Vec<Scene> = (0..300).map(|i| source.scene(i).unwrap()).collect();
         let sensors: BTreeSet<String> = scenes
             .iter()
@@ -622,6 +636,77 @@ mod tests {
             some(&|s| s.ships.iter().any(|ship| ship.length > 200.0)),
         ] {
             assert!(count > 3, "{count}");
+        }
+    }
+
+    /// A recipe that delivers has the scenes of one that does not, but for the spacing: so many pixels a resolution cell.
+    #[test]
+    fn the_recipe_of_a_detector_delivers_the_satellites() {
+        let source = Simulated::new(Recipe::detector().unwrap(), 9).unwrap();
+        let plain = Simulated::new(Recipe::satellites().unwrap(), 9).unwrap();
+        let count = 400;
+        let (mut fine, mut turning, mut hardly_dark, mut mottled) = (0, 0, 0, 0);
+        for index in 0..count {
+            let (scene, other) = (source.scene(index).unwrap(), plain.scene(index).unwrap());
+            assert_eq!(scene.radar, other.radar);
+            assert_eq!(scene.ships.len(), other.ships.len());
+            let cell = |scene: &Scene| {
+                let range = scene.radar.range_resolution.unwrap();
+                (range * scene.radar.azimuth_resolution).sqrt() / scene.grid.spacing
+            };
+            if scene.grid.spacing.to_bits() != other.grid.spacing.to_bits() {
+                fine += 1;
+                // Steps of 1 cm in pixels of 1.5 m and more.
+                assert!((0.99..=3.83).contains(&cell(&scene)), "{}", cell(&scene));
+            }
+            let ships = || scene.ships.iter();
+            assert!(
+                ships().all(|ship| ship.recovery == Recovery::Wind && ship.steepness.is_some())
+            );
+            turning += usize::from(ships().any(|ship| ship.turn_rate != 0.0));
+            hardly_dark += usize::from(ships().any(|ship| ship.damping < 0.21));
+            mottled += usize::from(scene.sea.mottle_strength > 0.0);
+        }
+        // Five standard deviations of a binomial count.
+        let share = |found: usize, share: f64| {
+            let error = (share * (1.0 - share) / count as f64).sqrt();
+            assert!(
+                (found as f64 / count as f64 - share).abs() < 5.0 * error,
+                "{found}"
+            );
+        };
+        share(fine, 0.75);
+        share(mottled, 0.5);
+        // Of eight in ten images with ships, some with several.
+        assert!(turning > count as usize / 8 && hardly_dark > count as usize / 8);
+        let deliveries: Vec<_> = (0..count).map(|index| source.delivery(index)).collect();
+        let some = deliveries.iter().flatten();
+        // A sixteenth is neither resized nor compressed.
+        share(some.clone().count(), 15.0 / 16.0);
+        share(some.clone().filter(|d| d.quality.is_some()).count(), 0.75);
+        for delivery in some {
+            assert!((0.8..=1.6).contains(&delivery.resize));
+            assert!(delivery.quality.is_none_or(|q| (80..=95).contains(&q)));
+            assert!(delivery.phase.iter().all(|&phase| phase < 8));
+        }
+    }
+
+    #[test]
+    fn pixels_of_a_cell_need_a_resolution() {
+        let refused = |text: &str| Recipe::from_toml(text).unwrap_err().to_string();
+        let message = refused("[draw]\n\"delivery.pixels\" = [1, 3]");
+        assert!(message.contains("radar.range_resolution"), "{message}");
+        for (key, value) in [
+            ("pixels", "17"),
+            ("resize", "0.2"),
+            ("quality", "101"),
+            ("quality", "0.5"),
+        ] {
+            let message = refused(&format!("[draw]\n\"delivery.{key}\" = {value}"));
+            assert!(
+                message.contains(&format!("draw.delivery.{key}")),
+                "{message}"
+            );
         }
     }
 }

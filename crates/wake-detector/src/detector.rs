@@ -3,9 +3,12 @@
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use wake_nn::weights::{Layout, load};
+use wake_nn::check_range;
+use wake_nn::weights::{Layout, load, load_bytes};
+use whole_files::{checksum, file_checksum};
 
-use crate::error::{Result, check_range};
+use crate::calibration::{Calibration, Probabilities};
+use crate::error::{Error, Result};
 use crate::image::GreyImage;
 use crate::maps::Maps;
 use crate::network::{INPUTS, Network, STRIDE};
@@ -22,16 +25,31 @@ use crate::wake::Detection;
 /// # References
 ///
 /// Zhou, Wang & Krähenbühl (2019), "Objects as Points" (maps of centres); Ronneberger, Fischer & Brox (2015), "U-Net".
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Detector {
     network: Network,
     device: Device,
+    /// CRC-32 of the file.
+    weights: String,
+    calibration: Option<Calibration>,
     search: Search,
 }
 
+/// The weights that ship and their calibration.
+const NAME: &str = "detector.safetensors";
+const WEIGHTS: &[u8] = include_bytes!("../assets/detector.safetensors");
+const CALIBRATION: &str = include_str!("../assets/detector.calibration.json");
+/// Detections with lower scores are not told, unless they are asked for.
+const LEAST_SCORE: f32 = 0.03;
+/// Score from which on a detection counts as found where no calibration says one.
+const UNCALIBRATED: f32 = 0.25;
+
 impl Detector {
-    /// The score from which on a wake is likely one: half a false alarm an image on real tiles.
-    pub const OPERATING_POINT: f32 = 0.25;
+    /// The weights of this crate: the content of a safetensors file.
+    #[must_use]
+    pub fn pretrained_weights() -> &'static [u8] {
+        WEIGHTS
+    }
 
     /// The network of this crate on a device.
     ///
@@ -40,52 +58,119 @@ impl Detector {
     /// [`Error::Model`](crate::Error::Model) where the weights do not fit in memory, and for a device that is no CPU and fails
     /// [`check_device`](crate::self_check::check_device).
     pub fn pretrained(device: &Device) -> Result<Self> {
-        check_once(device)?;
-        Ok(Self::of(Network::pretrained(device)?, device))
+        let mut detector = Self::uncalibrated(None, device)?;
+        let name = Calibration::path_beside(Path::new(NAME));
+        detector.calibration = Some(Calibration::read(&name, CALIBRATION, &detector.weights)?);
+        Ok(detector)
     }
 
-    /// The network of a file, as training writes it, after a check on one fixed image.
+    /// The network of a file, as training writes it, after a check on one fixed image; with the calibration that lies beside the
+    /// file, if there is one ([`Calibration::path_beside`]).
     ///
     /// # Errors
     ///
     /// [`Error::Model`](crate::Error::Model) for a file that is not there or does not fit,
-    /// [`Error::WrongMaps`](crate::Error::WrongMaps) for weights that find nothing in any image, such as equal or huge ones.
+    /// [`Error::WrongMaps`](crate::Error::WrongMaps) for weights that find nothing in any image, such as equal or huge ones,
+    /// [`Error::Calibration`](crate::Error::Calibration) for a calibration of other weights.
     pub fn load(file: &Path, device: &Device) -> Result<Self> {
-        check_once(device)?;
-        let network = load(Network::new(device), Layout::Diffusers, file)?;
-        self_check(&network, file, device)?;
-        Ok(Self::of(network, device))
+        let mut detector = Self::uncalibrated(Some(file), device)?;
+        let beside = Calibration::path_beside(file);
+        if beside.exists() {
+            let text = whole_files::read_text(&beside)?;
+            detector.calibration = Some(Calibration::read(&beside, &text, &detector.weights)?);
+        }
+        Ok(detector)
     }
 
-    fn of(network: Network, device: &Device) -> Self {
-        Self {
+    /// The network, which turns normalised pixels into maps.
+    #[must_use]
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// The network of a file, by default of this crate, without probabilities.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`](Self::load), for the weights alone.
+    pub fn uncalibrated(file: Option<&Path>, device: &Device) -> Result<Self> {
+        check_once(device)?;
+        let network = Network::new(device);
+        let (network, weights) = match file {
+            None => (
+                load_bytes(network, Layout::Diffusers, NAME, WEIGHTS)?,
+                checksum(WEIGHTS),
+            ),
+            Some(file) => {
+                let network = load(network, Layout::Diffusers, file)?;
+                self_check(&network, file, device)?;
+                let sum = file_checksum(file).map_err(|source| Error::Io {
+                    path: file.to_owned(),
+                    source,
+                })?;
+                (network, sum)
+            }
+        };
+        Ok(Self {
             network,
             device: device.clone(),
+            weights,
+            calibration: None,
             search: Search {
                 spacing: None,
-                least_score: Self::OPERATING_POINT,
+                least_score: LEAST_SCORE,
             },
-        }
+        })
+    }
+
+    /// The same detector with another calibration; `None` for none.
+    #[must_use]
+    pub fn with_calibration(mut self, calibration: Option<Calibration>) -> Self {
+        self.calibration = calibration;
+        self
+    }
+
+    /// CRC-32 of the file of weights.
+    #[must_use]
+    pub fn weights_checksum(&self) -> &str {
+        &self.weights
+    }
+
+    /// Score from which on a detection is sure: that of the calibration, 0.25 without one.
+    #[must_use]
+    pub fn sure_from(&self) -> f32 {
+        self.probabilities()
+            .map_or(UNCALIBRATED, |found| found.sure_from)
+    }
+
+    /// The probabilities of the detections, by whether the pixel spacing is known; `None` without a calibration.
+    #[must_use]
+    pub fn probabilities(&self) -> Option<&Probabilities> {
+        let calibration = self.calibration.as_ref()?;
+        Some(match self.search.spacing {
+            Some(_) => &calibration.known_spacing,
+            None => &calibration.unknown_spacing,
+        })
     }
 
     /// The same detector for images whose pixels are so far apart \[m\], 0.5 to 100; without it the scale comes from the image.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for another number.
+    /// [`OutOfRange`](wake_nn::Error::OutOfRange) for another number.
     pub fn with_spacing(mut self, spacing: f32) -> Result<Self> {
-        check_range("spacing", spacing, 0.5, 100.0)?;
+        check_range("spacing", spacing.into(), 0.5, 100.0)?;
         self.search.spacing = Some(spacing);
         Ok(self)
     }
 
-    /// The same detector with another least score that is told, 0 to 1, by default [`OPERATING_POINT`](Self::OPERATING_POINT).
+    /// The same detector with another least score that is told, 0 to 1, by default 0.03.
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for another number.
+    /// [`OutOfRange`](wake_nn::Error::OutOfRange) for another number.
     pub fn with_least_score(mut self, least_score: f32) -> Result<Self> {
-        check_range("least_score", least_score, 0.0, 1.0)?;
+        check_range("least_score", least_score.into(), 0.0, 1.0)?;
         self.search.least_score = least_score;
         Ok(self)
     }
@@ -94,11 +179,11 @@ impl Detector {
     #[must_use]
     pub fn find(&self, image: &GreyImage) -> Vec<Detection> {
         let Ok(found) = find(image, self, self.search);
-        found
+        self.rated(found)
     }
 
-    /// The wakes of one of the [`Tile`]s of an image that is read window by window; [`merged`](Self::merged) puts those of all
-    /// tiles together.
+    /// The wakes of one of the [`Tile`]s of an image that is read window by window, without probabilities;
+    /// [`merged`](Self::merged) puts those of all tiles together.
     ///
     /// # Errors
     ///
@@ -107,10 +192,21 @@ impl Detector {
         in_tile(image, tile, self, self.search)
     }
 
-    /// The wakes of all tiles, each told once, the surest first.
+    /// The wakes of all tiles with their probabilities, each told once, the surest first.
     #[must_use]
-    pub fn merged(found: Vec<Detection>) -> Vec<Detection> {
-        merged(found)
+    pub fn merged(&self, found: Vec<Detection>) -> Vec<Detection> {
+        self.rated(merged(found))
+    }
+
+    /// Detections with their probabilities, and whether they are sure.
+    fn rated(&self, mut found: Vec<Detection>) -> Vec<Detection> {
+        for one in &mut found {
+            one.sure = one.score >= self.sure_from();
+            if let Some(probabilities) = self.probabilities() {
+                probabilities.rate(one);
+            }
+        }
+        found
     }
 }
 

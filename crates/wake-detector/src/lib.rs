@@ -10,7 +10,10 @@ mod scaling;
 mod wake;
 
 pub mod network;
+mod onnx;
 pub mod self_check;
+
+pub mod calibration;
 
 mod maps;
 mod missing;
@@ -25,11 +28,13 @@ pub mod score;
 mod finder;
 
 pub use burn;
+pub use calibration::Calibration;
 pub use detector::Detector;
 pub use error::{Error, Result};
 pub use files::{image_files, image_name, picture_name};
 pub use finder::{Finder, Radon};
 pub use image::GreyImage;
+pub use onnx::onnx;
 pub use raster::Raster;
 pub use search::Tile;
 pub use wake::{Detection, Wake, angle_of, direction};

@@ -114,22 +114,51 @@ impl Maps {
         }
         let centre = 0.5 * (STRIDE as f32 - 1.0);
         let length = LENGTH_UNIT * self.map(Map::Length)[at].clamp(-3.0, 2.5).exp();
+        let axis_deg = (first + pull / total).rem_euclid(360.0);
+        let wake = Wake {
+            tip: cell.map(|x| STRIDE as f32 * x + centre),
+            axis_deg,
+            half_angle_deg: (ANGLE_UNIT * self.map(Map::HalfAngle)[at]).clamp(0.0, 30.0),
+            length,
+            snr: f32::INFINITY,
+            contrast_db: None,
+        };
+        let score = self.map(Map::Tip)[at] * support;
         Detection {
-            score: self.map(Map::Tip)[at] * support,
-            wake: Wake {
-                tip: cell.map(|x| STRIDE as f32 * x + centre),
-                axis_deg: (first + pull / total).rem_euclid(360.0),
-                half_angle_deg: (ANGLE_UNIT * self.map(Map::HalfAngle)[at]).clamp(0.0, 30.0),
-                length,
-                snr: f32::INFINITY,
-                contrast_db: None,
-            },
+            forward: Some(self.forward(cell, axis_deg)),
+            ..Detection::new(score, wake)
         }
+    }
+
+    /// Mean agreement of the lines on a ray with its direction, weighted with how much line there is.
+    fn forward(&self, cell: [f32; 2], angle: f32) -> f32 {
+        let [right, down] = direction(angle);
+        let (mut sum, mut total) = (0.0, 1e-6);
+        for i in self.cells(cell, angle) {
+            let (dx, dy) = (self.map(Map::LineRight)[i], self.map(Map::LineDown)[i]);
+            sum += self.map(Map::Line)[i] * (dx * right + dy * down).clamp(-1.0, 1.0);
+            total += self.map(Map::Line)[i];
+        }
+        sum / total
+    }
+
+    /// The cells of a ray from behind its tip to the border.
+    fn cells(&self, [x, y]: [f32; 2], angle: f32) -> impl Iterator<Item = usize> + use<> {
+        let [right, down] = direction(angle);
+        let (rows, columns) = (self.rows, self.columns);
+        let cell = move |k: usize| {
+            let column = (x + k as f32 * right).round();
+            let row = (y + k as f32 * down).round();
+            let inside =
+                column >= 0.0 && row >= 0.0 && column < columns as f32 && row < rows as f32;
+            inside.then(|| row as usize * columns + column as usize)
+        };
+        (SKIPPED..LONGEST).map_while(cell)
     }
 
     /// How much of a ray is a line that runs its way: the best mean over its first part, short ones at a loss; and the
     /// sum over all of it.
-    fn support(&self, [x, y]: [f32; 2], angle: f32) -> [f32; 2] {
+    fn support(&self, cell: [f32; 2], angle: f32) -> [f32; 2] {
         let [right, down] = direction(angle);
         let (line, to_right, to_down) = (
             self.map(Map::Line),
@@ -137,16 +166,7 @@ impl Maps {
             self.map(Map::LineDown),
         );
         let (mut sum, mut best, mut count) = (0.0, 0.0f32, 0.0);
-        for k in SKIPPED..LONGEST {
-            let (column, row) = (
-                (x + k as f32 * right).round(),
-                (y + k as f32 * down).round(),
-            );
-            if column < 0.0 || row < 0.0 || column >= self.columns as f32 || row >= self.rows as f32
-            {
-                break;
-            }
-            let i = row as usize * self.columns + column as usize;
+        for i in self.cells(cell, angle) {
             let (dx, dy) = (to_right[i], to_down[i]);
             let agreement = (dx * right + dy * down) / dx.hypot(dy).max(0.3);
             sum += line[i] * agreement;
@@ -171,7 +191,10 @@ pub(crate) fn without_repeats(mut found: Vec<Detection>, near: f32) -> Vec<Detec
     });
     let mut kept: Vec<Detection> = Vec::new();
     for one in found {
-        if !kept.iter().any(|other| same(&other.wake, &one.wake, near)) {
+        let is_repeat = |other: &Detection| {
+            same(&other.wake, &one.wake, near) || reversed(&other.wake, &one.wake, near)
+        };
+        if !kept.iter().any(is_repeat) {
             kept.push(one);
         }
     }
@@ -186,6 +209,20 @@ const SAME_LINE: f32 = 16.0;
 /// follow.
 const HIDDEN: f32 = 2.5;
 const FOLLOWING: f32 = 5.0;
+
+/// The axis of a wake that is followed from its end differs from the opposite one by less \[deg\].
+const OPPOSITE: f32 = 15.0;
+
+/// Whether a weaker wake is a stronger one, followed from its end to its tip: a line begins once.
+fn reversed(strong: &Wake, weak: &Wake, near: f32) -> bool {
+    let turn = (strong.axis_deg - weak.axis_deg).rem_euclid(360.0) - 180.0;
+    let (dx, dy) = (weak.tip[0] - strong.tip[0], weak.tip[1] - strong.tip[1]);
+    let [right, down] = strong.direction();
+    let (along, across) = (dx * right + dy * down, dy * right - dx * down);
+    turn.abs() < OPPOSITE
+        && across.abs() < SAME_LINE
+        && (0.0..strong.length + HIDDEN * near).contains(&along)
+}
 
 /// Whether a weaker wake is a stronger one again.
 pub(crate) fn same(strong: &Wake, weak: &Wake, near: f32) -> bool {
@@ -284,6 +321,23 @@ mod tests {
         assert!(before > 0.6 && after < 0.05, "{before} {after}");
     }
 
+    /// A wake from (100, 100) to the right for 120 pixels: from its end back it is the same line; a ship that comes the other way on
+    /// another line, or beyond the end, is another one.
+    #[test]
+    fn a_line_that_is_followed_both_ways_is_told_once() {
+        let kept = |tip: [f32; 2], axis_deg: f32| {
+            let both = vec![
+                Detection::new(0.9, wake([100.0, 100.0], 90.0)),
+                Detection::new(0.5, wake(tip, axis_deg)),
+            ];
+            without_repeats(both, 40.0).len()
+        };
+        assert_eq!(kept([225.0, 104.0], 265.0), 1);
+        assert_eq!(kept([225.0, 104.0], 240.0), 2);
+        assert_eq!(kept([225.0, 140.0], 270.0), 2);
+        assert_eq!(kept([400.0, 100.0], 270.0), 2);
+    }
+
     #[test]
     fn ties_are_told_in_the_order_of_the_image() {
         let tied = vec![
@@ -294,7 +348,7 @@ mod tests {
         let found = |wakes: Vec<Wake>| {
             let all = wakes
                 .into_iter()
-                .map(|wake| Detection { score: 0.5, wake })
+                .map(|wake| Detection::new(0.5, wake))
                 .collect();
             without_repeats(all, 40.0)
         };

@@ -20,16 +20,16 @@ pub(crate) struct Missing {
 ///
 /// `None` for a window of which next to nothing is there.
 pub(crate) fn filled(pixels: &mut [f32], columns: usize) -> Option<Missing> {
-    let missing: Vec<bool> = pixels.iter().map(|x| !x.is_finite()).collect();
-    let mut there: Vec<f32> = pixels.iter().copied().filter(|x| x.is_finite()).collect();
-    if there.is_empty() || (there.len() as f32) < LEAST * pixels.len() as f32 {
-        return None;
-    }
-    if there.len() == pixels.len() {
+    if !pixels.is_empty() && pixels.iter().all(|x| x.is_finite()) {
         return Some(Missing {
             columns,
             missing: Vec::new(),
         });
+    }
+    let missing: Vec<bool> = pixels.iter().map(|x| !x.is_finite()).collect();
+    let mut there: Vec<f32> = pixels.iter().copied().filter(|x| x.is_finite()).collect();
+    if there.is_empty() || (there.len() as f32) < LEAST * pixels.len() as f32 {
+        return None;
     }
     let middle = there.len() / 2;
     let median = *there.select_nth_unstable_by(middle, f32::total_cmp).1;

@@ -21,7 +21,7 @@ use crate::image::GreyImage;
 use crate::maps::without_repeats;
 use crate::normalize;
 use crate::scaling::rescaled;
-use crate::search::Tile;
+use crate::search::{Tile, unscaled};
 use crate::wake::{Detection, Wake, direction};
 
 /// Expected false alarms an image, from the rays around targets and from all others each, at the threshold.
@@ -186,7 +186,7 @@ pub fn find(image: &GreyImage) -> Vec<Detection> {
         let found = in_sea(&Sea::of(&pixels, rows, columns), tiles.len());
         found.into_iter().filter_map(|one| {
             Some(Detection {
-                wake: tile.placed(one.wake, FACTOR)?,
+                wake: tile.placed(unscaled(one.wake, FACTOR))?,
                 ..one
             })
         })
@@ -284,7 +284,7 @@ fn in_sea(sea: &Sea, tiles: usize) -> Vec<Detection> {
                     let at_end = |on: f32| near_target(&wake.at(wake.length + on));
                     let backward = !near && onward.into_iter().any(at_end);
                     let score = score as f32;
-                    (score > 0.0 && !backward).then_some(Detection { score, wake })
+                    (score > 0.0 && !backward).then(|| Detection::new(score, wake))
                 })
                 .collect();
             peaks

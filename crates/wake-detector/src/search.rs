@@ -20,9 +20,19 @@ pub(crate) trait Mapper: Sync {
 
 /// Pixels of the image between which tips are taken from one tile, and what a tile sees beyond them.
 const TILE: usize = 1024;
+const LARGE_TILE: usize = 2048;
 const MARGIN: usize = 384;
 /// Scales at which an image is searched, when its own fits the network.
 const SCALES: [f32; 5] = [0.35, 0.5, 0.7, 1.0, 1.4];
+/// Where the pixel spacing is known: the scale at which everything is searched, the score from which on other scales look, too, those
+/// scales, how far around a wake and how far along it they look, and the longest side of what they look at together
+/// \[pixels at scale 1\].
+const FIRST: f32 = 0.7;
+const CANDIDATE: f32 = 0.02;
+const OTHERS: [f32; 4] = [0.35, 0.5, 1.0, 1.4];
+const AROUND: f32 = 128.0;
+const ALONG: f32 = 400.0;
+const TOGETHER: f32 = 1024.0;
 /// Tips closer than this are one, at scale 1 \[pixels\].
 const NEAR: f32 = 40.0;
 /// No more pixels a side are given to the network at once.
@@ -70,11 +80,15 @@ fn agreed(by_scale: Vec<Vec<Detection>>) -> Vec<Detection> {
             let same = scale
                 .iter()
                 .filter(|other| same(&one.wake, &other.wake, NEAR));
-            same.map(|other| other.score).fold(0.0, f32::max)
+            same.max_by(|a, b| a.score.total_cmp(&b.score)).copied()
         };
-        let mean = by_scale.iter().map(at).sum::<f32>() / count;
+        let seen: Vec<Detection> = by_scale.iter().filter_map(at).collect();
+        let sum: f32 = seen.iter().map(|other| other.score).sum();
+        let forward = |other: &Detection| Some(other.score * other.forward?);
+        let forward = seen.iter().map(forward).sum::<Option<f32>>();
         Detection {
-            score: 0.5 * (one.score + mean),
+            score: 0.5 * (one.score + sum / count),
+            forward: forward.filter(|_| sum > 0.0).map(|total| total / sum),
             ..one
         }
     };
@@ -96,9 +110,19 @@ impl Tile {
     /// The tiles of an image; a small one is one tile.
     #[must_use]
     pub fn all(rows: usize, columns: usize) -> Vec<Self> {
+        Self::of(rows, columns, TILE)
+    }
+
+    /// Larger tiles, of which less is seen twice: for images of known pixel spacing, most of which is searched at a coarse scale.
+    #[must_use]
+    pub fn large(rows: usize, columns: usize) -> Vec<Self> {
+        Self::of(rows, columns, LARGE_TILE)
+    }
+
+    fn of(rows: usize, columns: usize, tile: usize) -> Vec<Self> {
         let sides = [rows, columns];
-        let columns = tiles(columns);
-        let places = tiles(rows)
+        let columns = tiles(columns, tile);
+        let places = tiles(rows, tile)
             .into_iter()
             .flat_map(|r| columns.iter().map(move |&c| [r, c]));
         let tile = |[(top, rows), (left, columns)]: [(usize, usize); 2]| {
@@ -126,9 +150,8 @@ impl Tile {
         Ok((rows, columns, pixels))
     }
 
-    /// A wake found in the scaled pixels as it lies in the image; `None` where its tip lies in another tile.
-    pub(crate) fn placed(&self, wake: Wake, factor: f32) -> Option<Wake> {
-        let mut wake = unscaled(wake, factor);
+    /// A wake found in what is seen, as it lies in the image; `None` where its tip lies in another tile.
+    pub(crate) fn placed(&self, mut wake: Wake) -> Option<Wake> {
         wake.tip = [0, 1].map(|a| wake.tip[a] + self.seen[0][1 - a] as f32);
         let inside = |a: usize| {
             let [begin, end] = [self.part[0][a], self.part[1][a]];
@@ -145,18 +168,18 @@ impl Tile {
 }
 
 /// A wake found in scaled pixels, in those of the window.
-fn unscaled(mut wake: Wake, factor: f32) -> Wake {
+pub(crate) fn unscaled(mut wake: Wake, factor: f32) -> Wake {
     wake.tip = wake.tip.map(|x| (x + 0.5) / factor - 0.5);
     wake.length /= factor;
     wake
 }
 
 /// First pixels of the tiles and their sizes: few enough pixels are one tile.
-fn tiles(size: usize) -> Vec<(usize, usize)> {
-    if size <= TILE + 2 * MARGIN {
+fn tiles(size: usize, tile: usize) -> Vec<(usize, usize)> {
+    if size <= tile + 2 * MARGIN {
         return vec![(0, size)];
     }
-    let count = size.div_ceil(TILE);
+    let count = size.div_ceil(tile);
     let edge = |k: usize| k * size / count;
     (0..count)
         .map(|k| (edge(k), edge(k + 1) - edge(k)))
@@ -174,39 +197,147 @@ pub(crate) fn in_tile<R: Raster>(
     let Some(missing) = filled(&mut pixels, columns) else {
         return Ok(Vec::new());
     };
-    let at = |factor: f32| -> Vec<Detection> {
-        let maps = at_scale(&pixels, rows, columns, factor, mapper);
-        let sure = maps
-            .detections()
-            .into_iter()
-            .filter(|one| one.score >= search.least_score);
-        sure.filter(|one| missing.leaves(&unscaled(one.wake, factor)))
-            .filter_map(|one| {
-                Some(Detection {
-                    wake: tile.placed(one.wake, factor)?,
-                    ..one
-                })
-            })
-            .collect()
+    let view = View {
+        pixels: &pixels,
+        rows,
+        columns,
     };
-    let scales = scales(&pixels, rows, columns, search.spacing);
-    Ok(agreed(scales.into_iter().map(at).collect()))
+    let by_scale = match search.spacing {
+        Some(metres) => {
+            // The images that the network learned from have pixels of about ten metres.
+            let native = (metres / 10.0).clamp(0.25, 1.0);
+            view.around_candidates(native, mapper)
+        }
+        None => view.at_all_scales(mapper),
+    };
+    let told = |one: Detection| -> Option<Detection> {
+        let is_told = one.score >= search.least_score && missing.leaves(&one.wake);
+        let wake = is_told.then(|| tile.placed(one.wake)).flatten()?;
+        Some(Detection { wake, ..one })
+    };
+    let by_scale = by_scale
+        .into_iter()
+        .map(|found| found.into_iter().filter_map(told).collect());
+    Ok(agreed(by_scale.collect()))
 }
 
-/// The factors by which an image is scaled before the network sees it.
-fn scales(pixels: &[f32], rows: usize, columns: usize, spacing: Option<f32>) -> Vec<f32> {
-    let native = match spacing {
-        // The images that the network learned from have pixels of about ten metres.
-        Some(metres) => (metres / 10.0).clamp(0.25, 1.0),
-        None => native_scale(pixels, rows, columns),
+/// Pixels that are searched.
+#[derive(Debug, Clone, Copy)]
+struct View<'a> {
+    pixels: &'a [f32],
+    rows: usize,
+    columns: usize,
+}
+
+impl View<'_> {
+    /// The wakes at each of the scales that are searched where nothing is known of the pixels.
+    fn at_all_scales(&self, mapper: &dyn Mapper) -> Vec<Vec<Detection>> {
+        let native = native_scale(self.pixels, self.rows, self.columns);
+        let longest = self.rows.max(self.columns) as f32;
+        let scales = SCALES.iter().map(|scale| native * scale);
+        scales
+            .filter(|factor| longest * factor <= LARGEST)
+            .map(|factor| self.at(factor, mapper))
+            .collect()
+    }
+
+    /// The wakes at one scale, and at the others around them.
+    fn around_candidates(&self, native: f32, mapper: &dyn Mapper) -> Vec<Vec<Detection>> {
+        let mut first = self.at(FIRST * native, mapper);
+        first.retain(|one| one.score >= CANDIDATE);
+        let windows = windows(&first, [self.rows, self.columns], native);
+        let mut by_scale = vec![first];
+        for scale in OTHERS {
+            let windows = windows.iter();
+            let found = windows.flat_map(|&window| self.in_window(window, scale * native, mapper));
+            by_scale.push(found.collect());
+        }
+        by_scale
+    }
+
+    /// The wakes of a part, in pixels of the whole.
+    fn in_window(
+        &self,
+        [from, to]: [[usize; 2]; 2],
+        factor: f32,
+        mapper: &dyn Mapper,
+    ) -> Vec<Detection> {
+        let [rows, columns] = [0, 1].map(|axis| to[axis] - from[axis]);
+        let lines = self
+            .pixels
+            .chunks_exact(self.columns)
+            .skip(from[0])
+            .take(rows);
+        let pixels: Vec<f32> = lines
+            .flat_map(|line| &line[from[1]..to[1]])
+            .copied()
+            .collect();
+        let part = View {
+            pixels: &pixels,
+            rows,
+            columns,
+        };
+        let mut found = part.at(factor, mapper);
+        for one in &mut found {
+            one.wake.tip[0] += from[1] as f32;
+            one.wake.tip[1] += from[0] as f32;
+        }
+        found
+    }
+
+    /// The wakes at a scale.
+    fn at(&self, factor: f32, mapper: &dyn Mapper) -> Vec<Detection> {
+        let maps = at_scale(self.pixels, self.rows, self.columns, factor, mapper);
+        let mut found = maps.detections();
+        for one in &mut found {
+            one.wake = unscaled(one.wake, factor);
+        }
+        found
+    }
+}
+
+/// The windows around some wakes; those that overlap become one, unless it grows too large.
+///
+/// - `native`: the scale of the image
+///
+/// # Shapes
+///
+/// First row and column of each, and the ones behind its last.
+fn windows(found: &[Detection], size: [usize; 2], native: f32) -> Vec<[[usize; 2]; 2]> {
+    let around = (AROUND / native) as usize;
+    let window = |one: &Detection| {
+        let ends = [0.0, one.wake.length.min(ALONG / native)].map(|along| one.wake.at(along));
+        let side = |axis: usize| {
+            let [a, b] = ends.map(|end| end[1 - axis].clamp(0.0, size[axis] as f32 - 1.0));
+            let from = (a.min(b) as usize).saturating_sub(around);
+            let to = (a.max(b) as usize + around).min(size[axis]);
+            [from, to]
+        };
+        let [rows, columns] = [side(0), side(1)];
+        [[rows[0], columns[0]], [rows[1], columns[1]]]
     };
-    let longest = rows.max(columns) as f32;
-    let fits = |factor: &f32| longest * factor <= LARGEST;
-    SCALES
-        .iter()
-        .map(|scale| native * scale)
-        .filter(fits)
-        .collect()
+    let union = |a: &[[usize; 2]; 2], b: &[[usize; 2]; 2]| {
+        let both = [0, 1].map(|axis| [a[0][axis].min(b[0][axis]), a[1][axis].max(b[1][axis])]);
+        let longest = both.map(|[from, to]| to - from).into_iter().max();
+        let fits = longest.is_some_and(|side| side as f32 <= TOGETHER / native);
+        (fits && overlap(a, b)).then_some([[both[0][0], both[1][0]], [both[0][1], both[1][1]]])
+    };
+    let mut all: Vec<[[usize; 2]; 2]> = Vec::new();
+    for mut one in found.iter().map(window) {
+        // What a union covers may touch further windows.
+        while let Some((at, both)) =
+            (0..all.len()).find_map(|at| Some((at, union(&all[at], &one)?)))
+        {
+            all.swap_remove(at);
+            one = both;
+        }
+        all.push(one);
+    }
+    all
+}
+
+fn overlap(a: &[[usize; 2]; 2], b: &[[usize; 2]; 2]) -> bool {
+    (0..2).all(|axis| a[0][axis] < b[1][axis] && b[0][axis] < a[1][axis])
 }
 
 /// The scale at which the speckle is correlated as in most of what the network learned from, ½ to 1.
@@ -352,7 +483,7 @@ mod tests {
                 levels[(y - 6 + r) * columns + x - 6 + c] = 255.0;
             }
         }
-        assert!(tiles(columns).len() > 1 && tiles(rows).len() > 1);
+        assert!(tiles(columns, TILE).len() > 1 && tiles(rows, TILE).len() > 1);
         let Ok(found) = find(
             &GreyImage::from_levels(rows, columns, &levels),
             &Bright,
@@ -369,7 +500,7 @@ mod tests {
     #[test]
     fn tiles_cover_every_size_once() {
         for size in [1, 17, 1792, 1793, 4096, 20_000] {
-            let tiles = tiles(size);
+            let tiles = tiles(size, TILE);
             assert_eq!(tiles.iter().map(|t| t.1).sum::<usize>(), size);
             assert!(tiles.windows(2).all(|t| t[0].0 + t[0].1 == t[1].0));
             assert!(tiles.len() == 1 || tiles.iter().all(|t| t.1 <= TILE));
@@ -391,5 +522,92 @@ mod tests {
                 SEARCH,
             );
         }
+    }
+
+    /// A bright spot and the line behind it, found at the first scale, are looked at again at the others, where they are; sea is not.
+    #[test]
+    fn other_scales_look_where_the_first_found_something() {
+        struct Counted(std::sync::Mutex<Vec<[usize; 2]>>);
+        impl Mapper for Counted {
+            fn maps(&self, inputs: Vec<f32>, rows: usize, columns: usize) -> Maps {
+                self.0.lock().expect("sizes").push([rows, columns]);
+                Bright.maps(inputs, rows, columns)
+            }
+        }
+        let (rows, columns) = (900, 1100);
+        let noise = |i: usize| ((i * 2_654_435_761) % 1009) as f32 / 1009.0;
+        let sea: Vec<f32> = (0..rows * columns)
+            .map(|i| 100.0 + 20.0 * noise(i))
+            .collect();
+        let mut levels = sea.clone();
+        for (r, c) in (0..12).flat_map(|r| (0..12).map(move |c| (r, c))) {
+            levels[(394 + r) * columns + 694 + c] = 255.0;
+        }
+        let known = Search {
+            spacing: Some(10.0),
+            ..SEARCH
+        };
+        let searched = |levels: &[f32]| {
+            let mapper = Counted(std::sync::Mutex::default());
+            let image = GreyImage::from_levels(rows, columns, levels);
+            let Ok(found) = find(&image, &mapper, known);
+            (found, mapper.0.into_inner().expect("sizes"))
+        };
+        let (found, sizes) = searched(&levels);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let [x, y] = found[0].wake.tip;
+        assert!((x - 700.0).hypot(y - 400.0) < 14.0, "{found:?}");
+        // The whole image, and windows that are smaller.
+        assert_eq!(sizes.len(), 1 + OTHERS.len(), "{sizes:?}");
+        assert_eq!(
+            sizes[0],
+            [630, 770].map(|n: usize| n.next_multiple_of(MULTIPLE))
+        );
+        for (size, scale) in sizes[1..].iter().zip(OTHERS) {
+            let [height, width] = [rows, columns].map(|n| 0.8 * scale * n as f32);
+            assert!(
+                (size[0] as f32) < height && (size[1] as f32) < width,
+                "{sizes:?}"
+            );
+        }
+        // Seen at all scales, with the line to the right.
+        assert!(found[0].score > 0.5 && found[0].forward.is_some_and(|f| f > 0.9));
+        assert_eq!(searched(&sea).1.len(), 1);
+    }
+
+    #[test]
+    fn windows_hold_all_tips_and_stay_small() {
+        let draws = NoiseSource::new(3).normal(0, 400);
+        let wakes: Vec<Detection> = draws
+            .chunks_exact(4)
+            .map(|x| {
+                let wake = Wake {
+                    tip: [600.0 + 900.0 * x[0], 500.0 + 900.0 * x[1]],
+                    axis_deg: 180.0 * x[2],
+                    half_angle_deg: 0.0,
+                    length: 80.0 * x[3].abs(),
+                    snr: f32::INFINITY,
+                    contrast_db: None,
+                };
+                Detection::new(0.5, wake)
+            })
+            .collect();
+        for some in [&wakes[..7], &wakes[..40], &wakes[..]] {
+            let found = windows(some, [1000, 1200], 1.0);
+            assert!(found.len() < some.len());
+            for [from, to] in &found {
+                assert!(from[0] < to[0] && to[0] <= 1000 && from[1] < to[1] && to[1] <= 1200);
+                assert!(to[0] - from[0] <= 1024 && to[1] - from[1] <= 1024);
+            }
+            for wake in some.iter().map(|one| one.wake.tip) {
+                let [x, y] =
+                    [wake[0].clamp(0.0, 1199.0), wake[1].clamp(0.0, 999.0)].map(|x| x as usize);
+                let holds = |w: &[[usize; 2]; 2]| {
+                    (w[0][0]..w[1][0]).contains(&y) && (w[0][1]..w[1][1]).contains(&x)
+                };
+                assert!(found.iter().any(holds));
+            }
+        }
+        assert!(windows(&[], [10, 10], 1.0).is_empty());
     }
 }

@@ -58,10 +58,33 @@ impl Wake {
 /// A wake that was found, in pixels of the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
-    /// Near 0: sea; near 1: a wake.
+    /// Near 0: sea; near 1: a wake. An order, not a probability.
     pub score: f32,
     /// Tip, axis, half-angle and visible length; its signal-to-noise is unknown, so infinite.
     pub wake: Wake,
+    /// Agreement of the line's direction with the axis: 1 from tip to end, −1 from end to tip; `None` where the method gives none.
+    pub forward: Option<f32>,
+    /// Probability of a wake in either direction; `None` without a calibration.
+    pub probability: Option<f32>,
+    /// Probability that tip and end are not taken for each other, if it is a wake; `None` without a calibration.
+    pub direction_probability: Option<f32>,
+    /// Whether it counts as found. Pictures, tables and summaries show these detections.
+    pub sure: bool,
+}
+
+impl Detection {
+    /// A sure detection of a method without probabilities.
+    #[must_use]
+    pub fn new(score: f32, wake: Wake) -> Self {
+        Self {
+            score,
+            wake,
+            forward: None,
+            probability: None,
+            direction_probability: None,
+            sure: true,
+        }
+    }
 }
 
 /// The unit vector (right, down) of an angle clockwise from the image's up.

@@ -18,7 +18,7 @@ impl Sea for SeaTexture {
 
 /// The scenes of a recipe, drawn by the wake model; a batch is sampled at once.
 ///
-/// The model draws what it was trained for alone: the one in the crate all scenes of the recipes `ranges`, `detector` and `model`.
+/// The model draws what it was trained for alone: the one in the crate all scenes of the recipes `ranges`, `satellites` and `model`.
 #[derive(Debug, Clone)]
 pub struct Sampled {
     sampler: WakeSampler,
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn batches_of_a_resumed_run_are_the_same() {
         let sampler = WakeSampler::pretrained(&Device::flex()).unwrap();
-        let recipe = Recipe::detector().unwrap();
+        let recipe = Recipe::satellites().unwrap();
         let scenes = Simulated::new(recipe, 3).unwrap();
         let source = Sampled::new(sampler.with_steps(1).unwrap(), scenes).unwrap();
         let second = |start: u64| -> Vec<u32> {
@@ -142,11 +142,11 @@ mod tests {
         assert!(message.contains("grid.spacing"), "{message}");
     }
 
-    /// All that the recipe of a detector draws: sensors, ships, gusts; every image is near its scene's mean, as it is simulated.
+    /// All that the recipe of satellites draws: sensors, ships, gusts; every image is near its scene's mean, as it is simulated.
     #[test]
-    fn the_recipe_of_a_detector_is_drawn() {
+    fn the_recipe_of_satellites_is_drawn() {
         let sampler = WakeSampler::pretrained(&Device::flex()).unwrap();
-        let recipe = Recipe::detector().unwrap();
+        let recipe = Recipe::satellites().unwrap();
         let recipe = recipe
             .with_assignments(&["draw.quick_look.gain=0.2", "draw.quick_look.offset=0.0"])
             .unwrap();

@@ -15,10 +15,13 @@ pub struct Echo {
     pub latitude: f64,
     /// Longitude of the place where it is imaged \[degrees\].
     pub longitude: f64,
-    /// How far it lies from the wake along azimuth, in the direction of flight \[m\]; `None` for a wake along azimuth.
+    /// How far it lies from the wake along azimuth, in the direction of flight \[m\]; `None` where the axis of the wake does not
+    /// tell it to [`MOST_DEVIATION`] of velocity.
     pub displacement: Option<f64>,
     /// Velocity toward the radar that the displacement means \[m/s\].
     pub radial_velocity: Option<f64>,
+    /// Standard deviation of that velocity, by how well the axis is known \[m/s\].
+    pub radial_velocity_deviation: Option<f64>,
 }
 
 /// Fastest ship that is looked for \[m/s\].
@@ -29,11 +32,65 @@ const ASIDE: i64 = 24;
 const BRIGHT: f32 = 8.0;
 /// Pixels around the brightest one that belong to it.
 const REACH: i64 = 12;
-/// Axes closer to azimuth than this say nothing about displacements: sine of the angle.
-const ALONG_AZIMUTH: f64 = 0.25;
+/// Standard deviation across the axis of a line that stands out, and of one that does not \[pixels\]: the steps in which lines are
+/// fitted, and the cells of the detector's maps.
+const ACROSS: [f64; 2] = [1.5, 4.0];
+/// A velocity that is known less well is not told \[m/s\].
+pub(crate) const MOST_DEVIATION: f64 = 0.25;
+
+/// How a displacement becomes a velocity.
+#[derive(Debug, Clone, Copy)]
+struct Displacements {
+    /// Tip of the wake (pixel, line), and the direction from it to its end (right, down).
+    tip: [f64; 2],
+    direction: [f64; 2],
+    /// Distance between lines \[m\], and R/V \[s\].
+    line_spacing: f64,
+    ratio: f64,
+    /// Sine of the incidence angle.
+    slant: f64,
+    /// Standard deviation of the place of the axis, across it \[pixels\].
+    across: f64,
+}
+
+impl Displacements {
+    /// Distance of a place from the axis along azimuth \[m\].
+    ///
+    /// ```text
+    /// d = Δy (line − line of the axis at the same range),    v = d/(R/V)
+    /// ```
+    fn of(&self, [pixel, line]: [f64; 2]) -> f64 {
+        let [right, down] = self.direction;
+        let on_axis = self.tip[1] + (pixel - self.tip[0]) * down / right;
+        (line - on_axis) * self.line_spacing
+    }
+
+    /// Standard deviation of the velocity \[m/s\]: that of the axis, as it is seen along azimuth.
+    fn deviation(&self) -> f64 {
+        self.across / self.direction[0].abs() * self.line_spacing / self.ratio
+    }
+
+    /// Whether a ship that leaves the wake astern can be there: its speed, toward the tip, is none that ships do not have.
+    ///
+    /// ```text
+    /// u = v/(sin θ · right),    right = the share of the wake's direction that leads away from the radar
+    /// ```
+    fn is_possible(&self, place: [f64; 2]) -> bool {
+        let deviation = self.deviation();
+        if !deviation.is_finite() || deviation > MOST_DEVIATION {
+            return true;
+        }
+        let along = self.slant * self.direction[0];
+        let speed = self.of(place) / self.ratio / along;
+        let doubt = 3.0 * deviation / along.abs();
+        (-doubt..FASTEST + doubt).contains(&speed)
+    }
+}
 
 /// The echo that belongs to a wake, if there is one.
-pub(crate) fn echo(product: &Product, wake: &Wake) -> Option<Echo> {
+///
+/// - `is_clear`: whether the line stands out where it was fitted
+pub(crate) fn echo(product: &Product, wake: &Wake, is_clear: bool) -> Option<Echo> {
     if product.values() != Values::SigmaNought {
         return None;
     }
@@ -44,7 +101,16 @@ pub(crate) fn echo(product: &Product, wake: &Wake) -> Option<Echo> {
     let ratio = product.range_to_velocity(at_line, at_pixel).ok()??;
     let axes = product.axes(at_line, at_pixel).ok()?;
     let place = product.place(at_line, at_pixel).ok()?;
-    let fastest = FASTEST * place.incidence?.to_radians().sin();
+    let slant = place.incidence?.to_radians().sin();
+    let fastest = FASTEST * slant;
+    let displacements = Displacements {
+        tip: [tip_pixel, tip_line],
+        direction: wake.direction().map(f64::from),
+        line_spacing: axes.line_spacing,
+        ratio,
+        slant,
+        across: ACROSS[usize::from(!is_clear)],
+    };
     let along = (ratio * fastest / axes.line_spacing).ceil() as i64;
     let range = |middle: f64, reach: i64, size: usize| {
         let middle = middle as i64;
@@ -72,7 +138,12 @@ pub(crate) fn echo(product: &Product, wake: &Wake) -> Option<Echo> {
         let away = (row + rows.start as f64 - tip_line) / along as f64;
         f64::from(value) / (1.0 + aside * aside + away * away)
     };
+    let is_possible = |n: &usize| {
+        let [row, column] = [n / width, n % width];
+        displacements.is_possible([(column + columns.start) as f64, (row + rows.start) as f64])
+    };
     let bright = (0..window.values.len()).filter(|&n| window.values[n] > BRIGHT * sea);
+    let bright = bright.filter(is_possible);
     let peak = bright.max_by(|&a, &b| score(a).total_cmp(&score(b)))?;
     // The middle of what is bright around it.
     let (row, column) = ((peak / width) as i64, (peak % width) as i64);
@@ -90,12 +161,9 @@ pub(crate) fn echo(product: &Product, wake: &Wake) -> Option<Echo> {
     }
     let (line, pixel) = (line / total, pixel / total);
     let there = product.place(line, pixel).ok()?;
-    let [right, down] = wake.direction().map(f64::from);
-    // Where the axis of the wake crosses the echo's range.
-    let displacement = (right.abs() > ALONG_AZIMUTH).then(|| {
-        let on_axis = tip_line + (pixel - tip_pixel) * down / right;
-        (line - on_axis) * axes.line_spacing
-    });
+    let deviation = displacements.deviation();
+    let is_known = deviation.is_finite() && deviation <= MOST_DEVIATION;
+    let displacement = is_known.then(|| displacements.of([pixel, line]));
     Some(Echo {
         line,
         pixel,
@@ -103,5 +171,48 @@ pub(crate) fn echo(product: &Product, wake: &Wake) -> Option<Echo> {
         longitude: there.longitude,
         displacement,
         radial_velocity: displacement.map(|metres| metres / ratio),
+        radial_velocity_deviation: displacement.map(|_| deviation),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wake toward larger range and larger lines: the ship comes toward the radar, and its echo lies further along the flight.
+    #[test]
+    fn echoes_lie_where_a_ship_that_leaves_the_wake_is_imaged() {
+        let across = |direction: [f64; 2], across: f64| Displacements {
+            tip: [500.0, 800.0],
+            direction,
+            line_spacing: 10.0,
+            ratio: 115.0,
+            slant: 0.6,
+            across,
+        };
+        let wake = across([0.8, 0.6], 1.5);
+        // 8 m/s times 0.8 times 0.6 times 115 s are 441.6 m.
+        let place = [500.0, 800.0 + 44.16];
+        assert!((wake.of(place) - 441.6).abs() < 1e-9);
+        assert!(wake.is_possible(place));
+        // The other way the ship would have to run astern; 40 m/s are too fast.
+        assert!(!wake.is_possible([500.0, 800.0 - 44.16]));
+        assert!(!wake.is_possible([500.0, 800.0 + 220.0]));
+        // At another range the axis lies elsewhere.
+        assert!((wake.of([508.0, 806.0])).abs() < 1e-9);
+        assert!((wake.deviation() - 1.5 / 0.8 * 10.0 / 115.0).abs() < 1e-12);
+        // Along azimuth nothing can be told, and nothing is ruled out.
+        for wake in [
+            across([0.3, 0.954], 1.5),
+            across([0.8, 0.6], 4.0),
+            across([0.0, 1.0], 1.5),
+        ] {
+            assert!(
+                wake.deviation()
+                    .partial_cmp(&MOST_DEVIATION)
+                    .is_none_or(std::cmp::Ordering::is_gt)
+                    && wake.is_possible([500.0, 700.0])
+            );
+        }
+    }
 }

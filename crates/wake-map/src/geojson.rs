@@ -30,6 +30,7 @@ pub fn geojson(wakes: &[MappedWake], image: &str) -> Value {
                 "properties": {
                     "type": "echo", "id": n + 1, "image": image, "line": echo.line, "pixel": echo.pixel,
                     "displacement_m": echo.displacement, "radial_velocity_m_s": echo.radial_velocity,
+                    "radial_velocity_deviation_m_s": echo.radial_velocity_deviation,
                 },
             }));
         }
@@ -41,11 +42,13 @@ pub fn geojson(wakes: &[MappedWake], image: &str) -> Value {
 pub(crate) fn properties(wake: &MappedWake) -> Map<String, Value> {
     let echo = wake.echo.as_ref();
     let properties = json!({
-        "type": "wake", "score": wake.score, "sure": wake.sure, "heading_deg": wake.heading, "length_m": wake.length,
+        "type": "wake", "probability": wake.probability, "sure": wake.sure, "score": wake.score,
+        "direction_probability": wake.direction_probability, "heading_deg": wake.heading, "length_m": wake.length,
         "contrast_db": wake.contrast_db, "kind": wake.kind, "half_angle_deg": wake.half_angle,
         "incidence_deg": wake.incidence, "time": wake.time, "line": wake.line, "pixel": wake.pixel,
         "displacement_m": echo.and_then(|echo| echo.displacement),
         "radial_velocity_m_s": echo.and_then(|echo| echo.radial_velocity),
+        "radial_velocity_deviation_m_s": echo.and_then(|echo| echo.radial_velocity_deviation),
     });
     match properties {
         Value::Object(properties) => properties,

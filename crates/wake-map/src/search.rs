@@ -40,9 +40,10 @@ pub fn search(
         product,
         land: options.land,
     };
-    let tiles = Tile::all(sea.rows(), sea.columns());
+    let tiles = Tile::large(sea.rows(), sea.columns());
     let identity = json!({
         "product": product.path(), "lines": sea.rows(), "pixels": sea.columns(), "land": options.land.is_some(),
+        "tiles": tiles.len(),
         "settings": options.settings,
     });
     let state = options.state.map(|path| State::open(path, &identity));
@@ -65,5 +66,5 @@ pub fn search(
     };
     let found = tiles.par_iter().enumerate().map(one);
     let found: Vec<Vec<Detection>> = found.collect::<Result<_>>()?;
-    Ok(Detector::merged(found.concat()))
+    Ok(detector.merged(found.concat()))
 }

@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Line {
     score: f32,
+    forward: Option<f32>,
     tip: [f32; 2],
     axis_deg: f32,
     half_angle_deg: f32,
@@ -117,6 +118,7 @@ impl Line {
     fn of(one: &Detection) -> Self {
         Self {
             score: one.score,
+            forward: one.forward,
             tip: one.wake.tip,
             axis_deg: one.wake.axis_deg,
             half_angle_deg: one.wake.half_angle_deg,
@@ -125,16 +127,17 @@ impl Line {
     }
 
     fn detection(&self) -> Detection {
+        let wake = Wake {
+            tip: self.tip,
+            axis_deg: self.axis_deg,
+            half_angle_deg: self.half_angle_deg,
+            length: self.length,
+            snr: f32::INFINITY,
+            contrast_db: None,
+        };
         Detection {
-            score: self.score,
-            wake: Wake {
-                tip: self.tip,
-                axis_deg: self.axis_deg,
-                half_angle_deg: self.half_angle_deg,
-                length: self.length,
-                snr: f32::INFINITY,
-                contrast_db: None,
-            },
+            forward: self.forward,
+            ..Detection::new(self.score, wake)
         }
     }
 }
@@ -152,6 +155,7 @@ mod tests {
         let identity = json!({"product": "a", "least_score": 0.1});
         let wake = Line {
             score: 0.123_456_7,
+            forward: Some(0.9),
             tip: [100.25, 3e4],
             axis_deg: 12.5,
             half_angle_deg: 0.1,

@@ -6,10 +6,12 @@ use crate::geojson::properties;
 use crate::wake::MappedWake;
 
 /// The columns of the table.
-const COLUMNS: [&str; 13] = [
-    "score",
+const COLUMNS: [&str; 16] = [
+    "probability",
     "sure",
+    "score",
     "heading_deg",
+    "direction_probability",
     "length_m",
     "contrast_db",
     "kind",
@@ -20,6 +22,7 @@ const COLUMNS: [&str; 13] = [
     "pixel",
     "displacement_m",
     "radial_velocity_m_s",
+    "radial_velocity_deviation_m_s",
 ];
 
 /// Comma-separated values with a header: a line for each wake, the surest first; what is not known is empty.

@@ -1,7 +1,8 @@
 //! A wake as a place on the map.
 
+use rayon::prelude::*;
 use serde::Serialize;
-use wake_detector::{Detection, Detector};
+use wake_detector::Detection;
 use wake_geo::Product;
 
 use crate::echo::{Echo, echo};
@@ -11,9 +12,13 @@ use crate::profile::{Contrast, Kind, Surroundings};
 /// A wake with all that is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MappedWake {
-    /// How sure the detector is, 0 to 1: an order, not a probability.
+    /// Order of the detections, 0 to 1; not a probability.
     pub score: f64,
-    /// Whether the score is above the detector's operating point.
+    /// Probability of a wake, in either direction; `None` for a detector without calibration.
+    pub probability: Option<f64>,
+    /// Probability that the heading is not wrong by 180°, if it is a wake.
+    pub direction_probability: Option<f64>,
+    /// Whether the detection counts as found ([`Detection::sure`]).
     pub sure: bool,
     /// Line of the tip, where the wake begins.
     pub line: f64,
@@ -23,8 +28,8 @@ pub struct MappedWake {
     pub tip: Option<[f64; 2]>,
     /// (Longitude, latitude) of the end of what is seen \[degrees\].
     pub end: Option<[f64; 2]>,
-    /// Direction of the ship, from the end of the wake to its tip, clockwise from true north \[degrees\]. Ahead and astern may be
-    /// taken for each other.
+    /// Direction of the ship, from the end of the wake to its tip, clockwise from true north \[degrees\]; see
+    /// `direction_probability`.
     pub heading: Option<f64>,
     /// Visible length \[m\].
     pub length: Option<f64>,
@@ -52,7 +57,10 @@ pub struct MappedWake {
 ///
 /// [`Error::Product`](crate::Error::Product) for places that cannot be computed.
 pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>> {
-    found.iter().map(|one| one_mapped(product, one)).collect()
+    found
+        .par_iter()
+        .map(|one| one_mapped(product, one))
+        .collect()
 }
 
 fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
@@ -62,6 +70,7 @@ fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
         Some(pixels) => pixels.refined(&one.wake),
         None => (one.wake, None),
     };
+    let is_clear = measured.is_some_and(|contrast| contrast.kind() != Kind::Arms);
     let wake = &one.wake;
     let (lines, pixels) = product.size();
     let inside = |[x, y]: [f32; 2]| {
@@ -71,7 +80,9 @@ fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
     let (tip, end) = (inside(wake.tip), inside(wake.at(wake.length)));
     let mut mapped = MappedWake {
         score: f64::from(one.score),
-        sure: one.score >= Detector::OPERATING_POINT,
+        probability: one.probability.map(f64::from),
+        direction_probability: one.direction_probability.map(f64::from),
+        sure: one.sure,
         line: f64::from(wake.tip[1]),
         pixel: f64::from(wake.tip[0]),
         tip: None,
@@ -85,7 +96,7 @@ fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
         kind: measured.map(Contrast::kind),
         incidence: None,
         time: None,
-        echo: echo(product, &line),
+        echo: echo(product, &line, is_clear),
     };
     if product.has_places() {
         let [from, to] = [product.place(tip.0, tip.1)?, product.place(end.0, end.1)?];

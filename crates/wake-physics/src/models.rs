@@ -231,7 +231,7 @@ impl Models {
 }
 
 /// The Kelvin wake of a ship.
-fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
+pub(crate) fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
     let (length, beam, draft) = (ship.length, ship.beam, ship.draft);
     KelvinWake {
         hull: match ship.hull {
@@ -250,6 +250,7 @@ fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
         ),
         depth,
         filter_depth: ship.filter_depth,
+        steepness: ship.steepness,
     }
 }
 

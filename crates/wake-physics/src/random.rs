@@ -18,6 +18,8 @@ pub(crate) enum Stream {
     Scatterers,
     /// Gusts, by lines of their lattice.
     Gusts,
+    /// Mottle, by lines of its lattice.
+    Mottle,
     /// Directions and phases of slicks.
     Slicks,
     /// Phases of the swell.
@@ -38,6 +40,7 @@ impl Stream {
             Self::Slicks => 1 << 43,
             Self::Swell => 1 << 44,
             Self::Reflectivity => 1 << 45,
+            Self::Mottle => 1 << 46,
         }
     }
 }

@@ -16,7 +16,7 @@ const THREADS: [usize; 4] = [1, 2, 4, 8];
 const BATCH: usize = 16;
 /// Batches that are timed, after as many as there are threads.
 const BATCHES: usize = 8;
-/// The seed of both sources; the scenes are those of the recipe `detector`.
+/// The seed of both sources; the scenes are those of the recipe `satellites`.
 const SEED: u64 = 3;
 
 /// One source through the loader.
@@ -45,7 +45,7 @@ fn threads() -> impl Iterator<Item = usize> {
 
 /// All rows; `done` hears of each.
 pub(crate) fn measure(device: &str, done: impl Fn()) -> Outcome<Vec<LoaderRow>> {
-    let scenes = Simulated::new(Recipe::detector()?, SEED)?;
+    let scenes = Simulated::new(Recipe::satellites()?, SEED)?;
     let sampler = WakeSampler::pretrained(&device_named(device)?)?;
     let sampled = Sampled::new(sampler, scenes.clone())?;
     let sources: [(_, Arc<dyn Source>); 2] = [

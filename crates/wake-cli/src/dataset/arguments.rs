@@ -33,6 +33,19 @@ pub(crate) struct Arguments {
     /// Join the shards made before
     #[arg(long, conflicts_with_all = ["shard", "count", "set"])]
     pub(crate) merge: bool,
+    /// Also write README.md into the folder, the card of the set with its columns for Hugging Face
+    #[arg(long, conflicts_with = "shard")]
+    pub(crate) card: bool,
+    /// Licence of the images that the card states, by its name on Hugging Face
+    #[arg(long, value_name = "NAME", default_value = "cc0-1.0", value_parser = license)]
+    pub(crate) license: String,
+    /// Also write the set as tar files for the library webdataset (train-000000.tar, …) into this folder; with --card a card
+    /// there, too
+    #[arg(long, value_name = "DIR", conflicts_with = "shard")]
+    pub(crate) webdataset: Option<PathBuf>,
+    /// Most images of such a tar file
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub(crate) per_tar: u64,
     /// Images made at the same time [default: one for each core]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) jobs: Option<u16>,
@@ -42,4 +55,13 @@ pub(crate) struct Arguments {
     /// Print a report as JSON on standard output, and nothing else
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// A name that a card may hold.
+fn license(name: &str) -> Result<String, String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '.' | '+');
+    match !name.is_empty() && name.chars().all(plain) {
+        true => Ok(name.to_owned()),
+        false => Err("give a name such as cc0-1.0, cc-by-4.0 or other".to_owned()),
+    }
 }

@@ -8,7 +8,8 @@ use serde_json::json;
 use std::path::Path;
 use std::time::Instant;
 use wake_dataset::{
-    Manifest, PAPER_SCENES, Progress, Recipe, Simulated, merge, shard_folder, write,
+    CardOf, Manifest, PAPER_SCENES, Progress, Recipe, Simulated, merge, shard_folder, write,
+    write_card, write_webdataset,
 };
 
 use crate::exit::{self, Outcome};
@@ -32,6 +33,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         let made = make(&folder, &manifest, &source, arguments)?;
         (folder, manifest, made)
     };
+    for_others(&folder, &manifest, arguments)?;
     let seconds = start.elapsed().as_secs_f64();
     let there = manifest.indices().end - manifest.indices().start;
     let place = folder.display();
@@ -48,6 +50,21 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     } else {
         let text = format!("{there} images in {place}, {made} of them made in {seconds:.1} s");
         exit::say(&text)?;
+    }
+    Ok(())
+}
+
+/// Writes the card, and the shards of `WebDataset`, where they are asked for.
+fn for_others(folder: &Path, manifest: &Manifest, arguments: &Arguments) -> Outcome<()> {
+    let license = &arguments.license;
+    if arguments.card {
+        write_card(folder, manifest, CardOf::Folder, license)?;
+    }
+    if let Some(out) = &arguments.webdataset {
+        write_webdataset(folder, out, arguments.per_tar)?;
+        if arguments.card {
+            write_card(out, manifest, CardOf::WebDataset, license)?;
+        }
     }
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! `wake detect`: searches images, draws them with their wakes, and tells them as JSON; of products as a map.
 
+mod arguments;
 mod product;
+mod sure;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -8,54 +10,14 @@ use std::path::{Path, PathBuf};
 use indicatif::ProgressBar;
 use serde_json::{Map, Value, json};
 use wake_detector::drawing::Drawing;
-use wake_detector::{
-    Detection, Detector, Finder, GreyImage, Radon, image_files, image_name, picture_name,
-};
+use wake_detector::{Detection, Finder, GreyImage, Radon, image_files, image_name, picture_name};
 use whole_files::make_folder;
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};
-
-/// How wakes are looked for.
-#[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
-enum Method {
-    /// The trained network
-    Network,
-    /// A normalised Radon transform around bright targets and over the whole image
-    Radon,
-}
-
-/// Find ship wakes in radar images.
-#[derive(clap::Args, Debug, Clone)]
-pub(crate) struct Arguments {
-    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them, whose *.wakes.png are left out; or one satellite
-    /// product: a Sentinel-1 .SAFE folder or .zip, or a GeoTIFF
-    #[arg(required = true, value_name = "FILE|DIR")]
-    images: Vec<PathBuf>,
-    /// Pixel spacing [m]; without it the scale comes from the image
-    #[arg(long, value_parser = named::spacing)]
-    spacing: Option<f32>,
-    /// How wakes are looked for
-    #[arg(long, value_enum, default_value_t = Method::Network)]
-    method: Method,
-    /// Weights of the network, by default those in the repository
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
-    /// Least score that is told, 0 to 1; from 0.25 on there are few false alarms
-    #[arg(long, default_value_t = 0.03, value_parser = named::score)]
-    least_score: f32,
-    /// Print the wakes as JSON, and nothing else
-    #[arg(long)]
-    json: bool,
-    /// flex, ndarray, wgpu or cuda, where compiled in
-    #[arg(long, default_value = "flex")]
-    device: String,
-    /// Folder of the pictures, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/detect")]
-    out: PathBuf,
-    #[command(flatten)]
-    product: product::ProductArguments,
-}
+pub(crate) use arguments::Arguments;
+use arguments::Method;
+use sure::how_sure;
 
 /// Prints every wake by tip, axis, half-angle, visible length and score, and draws the wakes of `NAME` into `NAME.wakes.png`
 /// in `--out`. Files of a folder that cannot be read are named, and the others are searched.
@@ -143,29 +105,24 @@ fn search(
 
 fn draw(image: &GreyImage, found: &[Detection], arguments: &Arguments, file: &Path) -> Outcome<()> {
     let mut drawing = Drawing::new(image);
-    // Radon's score has no upper end; all that it tells is above its threshold.
-    let sure = |one: &&Detection| {
-        arguments.method == Method::Radon || one.score >= Detector::OPERATING_POINT
-    };
-    drawing.found(found.iter().filter(sure));
+    drawing.found(found.iter().filter(|one| one.sure));
     let path = arguments.out.join(picture_name(file));
     picture::write(&drawing.into_picture(), &path)
 }
 
 /// The wakes of an image that are likely ones, a line each.
 fn summary(name: &str, found: &[Detection]) -> String {
-    let sure: Vec<&Detection> = found
-        .iter()
-        .filter(|one| one.score >= Detector::OPERATING_POINT)
-        .collect();
+    let sure: Vec<&Detection> = found.iter().filter(|one| one.sure).collect();
     let mut text = format!("{name}: {} wakes", sure.len());
     for one in sure {
         let (wake, [column, row]) = (&one.wake, one.wake.tip);
         // Writing into a string cannot fail.
         let _ = write!(
             text,
-            "\n  score {:.2}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
-            one.score, wake.axis_deg, wake.length
+            "\n  {}, tip ({column:.0}, {row:.0}), axis {:.0} deg, {:.0} px long",
+            how_sure(one.probability.map(f64::from), f64::from(one.score)),
+            wake.axis_deg,
+            wake.length
         );
     }
     text
@@ -174,7 +131,10 @@ fn summary(name: &str, found: &[Detection]) -> String {
 /// A detection as the program prints it.
 fn as_json(one: &Detection) -> Value {
     json!({
+        "probability": one.probability,
+        "sure": one.sure,
         "score": one.score,
+        "direction_probability": one.direction_probability,
         "tip": one.wake.tip,
         "axis_deg": one.wake.axis_deg,
         "half_angle_deg": one.wake.half_angle_deg,

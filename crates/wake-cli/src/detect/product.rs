@@ -1,41 +1,21 @@
 //! `wake detect PRODUCT`: the wakes of a satellite product as places on a map.
 
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use image::{ImageFormat, RgbImage};
 use indicatif::ProgressBar;
 use serde_json::json;
 use wake_detector::drawing::Drawing;
-use wake_detector::{Detection, Detector, GreyImage, Wake};
+use wake_detector::{Detection, GreyImage, Wake};
 use wake_geo::{Land, LandMask, Product, Values};
 use wake_map::{MappedWake, Search, csv, geojson, html, mapped, search};
 use whole_files::{make_folder, write_atomically, write_json};
 
-use super::Arguments;
+use super::arguments::{Arguments, ProductArguments};
+use super::sure::how_sure;
 use crate::exit::{self, Outcome};
 use crate::{named, progress};
-
-/// What is asked for of a product.
-#[derive(clap::Args, Debug, Clone)]
-#[command(next_help_heading = "Products")]
-pub(crate) struct ProductArguments {
-    /// Also write the wakes as GeoJSON to this file
-    #[arg(long, value_name = "FILE")]
-    geojson: Option<PathBuf>,
-    /// Polygons of land (GeoJSON), in the place of the built-in coast of Natural Earth
-    #[arg(long, value_name = "FILE")]
-    land: Option<PathBuf>,
-    /// Search land, too
-    #[arg(long, conflicts_with = "land")]
-    no_land: bool,
-    /// Sea closer to land than this is left out [m]
-    #[arg(long, value_name = "N", default_value_t = 1000.0)]
-    coast: f64,
-    /// VV, HH, VH or HV, by default the first of these that the product has
-    #[arg(long, value_parser = crate::locate::polarization)]
-    polarization: Option<wake_geo::Polarization>,
-}
 
 /// Longest side of the quick-look \[pixels\].
 const LONGEST: usize = 1600;
@@ -224,9 +204,7 @@ fn quick_look(product: &Product, found: &[Detection]) -> Outcome<QuickLook> {
             ..*one
         }
     };
-    let sure = found
-        .iter()
-        .filter(|one| one.score >= Detector::OPERATING_POINT);
+    let sure = found.iter().filter(|one| one.sure);
     let sure: Vec<Detection> = sure.map(scaled).collect();
     let mut drawing = Drawing::new(&small);
     drawing.found(sure.iter());
@@ -251,8 +229,8 @@ fn summary(name: &str, wakes: &[MappedWake], out: &Path) -> String {
         };
         let echo = wake.echo.and_then(|echo| echo.radial_velocity);
         text += &format!(
-            "\n  score {:.2}, {place}, heading {}, {} long, radial velocity {}",
-            wake.score,
+            "\n  {}, {place}, heading {}, {} long, radial velocity {}",
+            how_sure(wake.probability, wake.score),
             number(wake.heading, " deg"),
             number(wake.length, " m"),
             number(echo, " m/s")

@@ -19,8 +19,8 @@ const SEED: u64 = 1 << 40;
 /// Compare the model with the simulator over all scenes of a recipe.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// paper, ranges, detector or model, or a recipe file: the scenes
-    #[arg(long, default_value = "detector")]
+    /// paper, ranges, satellites, detector or model, or a recipe file: the scenes
+    #[arg(long, default_value = "satellites")]
     recipe: String,
     /// Folder of a small model that `wake train` wrote; without it, the model in the crate
     #[arg(long, value_name = "DIR")]

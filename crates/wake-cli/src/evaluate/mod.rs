@@ -1,11 +1,13 @@
 //! `wake evaluate`: every figure beside the simulator's own, on scenes that no training set holds.
 
 mod ablation;
+mod calibration;
 mod curve;
 mod detector;
 mod domain;
 mod domain_report;
 mod effects;
+mod estimate;
 mod judged;
 mod model;
 mod options;
@@ -33,6 +35,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         Some(Task::Domain(options)) => domain::run(options),
         Some(Task::Sea(options)) => sea::run(options),
         Some(Task::Detector(options)) => detector::run(options),
+        Some(Task::Calibration(options)) => calibration::run(options),
+        Some(Task::Estimate(options)) => estimate::run(options),
     }
 }
 

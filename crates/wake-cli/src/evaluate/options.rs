@@ -1,6 +1,6 @@
 //! The command line, and what it names.
 
-use super::{detector, domain, pipeline, sea};
+use super::{calibration, detector, domain, estimate, pipeline, sea};
 use crate::exit::Outcome;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -55,6 +55,8 @@ pub(crate) enum Task {
     Domain(domain::Options),
     Sea(sea::Options),
     Detector(detector::Options),
+    Calibration(calibration::Options),
+    Estimate(estimate::Options),
 }
 
 impl Common {

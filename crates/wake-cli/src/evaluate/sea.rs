@@ -1,17 +1,19 @@
-//! How like the sea of real images a learnt, a simulated and a Gaussian one are.
+//! How like the sea of real images simulated, learnt and Gaussian seas are.
 
 use std::path::{Path, PathBuf};
 
 use crate::sheet::Picture;
 use clap::Args;
-use serde::Serialize;
+use wake_dataset::Recipe;
 use wake_ldm::sea_texture::{SeaTexture, WINDOW};
 use wake_nn::device_named;
 use wake_physics::Field;
-use wake_train::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
-use wake_train::{TwoSampleOptions, classifier_two_sample_test};
+use wake_train::evaluation::sea::{
+    SeaPair, SeaRow, discriminant, gaussian_amplitude, kinds, mean_spectrum, simulated_seas,
+};
+use wake_train::{TwoSample, TwoSampleOptions, classifier_two_sample_test};
 
-use super::sea_report;
+use super::sea_report::{RecipeRow, SeaReport, markdown};
 use crate::exit::{self, Outcome};
 use crate::progress;
 use crate::sea_images::{Half, list};
@@ -21,7 +23,7 @@ const SEED: u64 = 1 << 40;
 /// Styles that are shown.
 const SHOWN: usize = 4;
 
-/// Compare a sea learnt from real images with their other halves.
+/// Compare simulated seas, and one learnt from real images, with the right halves of these images.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of real images, and `NAME_mask.png` of what does not count
@@ -29,7 +31,10 @@ pub(crate) struct Options {
     real: PathBuf,
     /// A sea that `wake train sea --half left` learnt from the left halves of these images
     #[arg(long, value_name = "FILE")]
-    weights: PathBuf,
+    weights: Option<PathBuf>,
+    /// Recipes whose open seas are compared: satellites, detector or a TOML file
+    #[arg(long, value_name = "NAME", default_values = ["satellites", "detector"])]
+    recipe: Vec<String>,
     /// Windows of open sea of each half of an image, at most
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..))]
     windows: u8,
@@ -44,65 +49,101 @@ pub(crate) struct Options {
     json: bool,
 }
 
-/// Everything that `report.json` holds.
-#[derive(Debug, Serialize)]
-pub(crate) struct SeaReport {
-    pub(crate) images: usize,
-    /// Windows of each kind.
-    pub(crate) windows: usize,
-    /// The right halves first.
-    pub(crate) rows: Vec<SeaRow>,
-}
-
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let device = device_named(&options.device)?;
-    let learnt = SeaTexture::load(&options.weights, &device)?;
+    let learnt = options.weights.as_ref();
+    let learnt = learnt
+        .map(|file| SeaTexture::load(file, &device))
+        .transpose()?;
+    let recipes = options
+        .recipe
+        .iter()
+        .map(|name| Ok((name.clone(), Recipe::named_or_read(name)?)));
+    let recipes: Vec<(String, Recipe)> = recipes.collect::<Outcome<_>>()?;
     let files = list(&options.real)?;
-    let mut pairs = Vec::new();
+    let mut images: Vec<Vec<SeaPair>> = Vec::new();
     for file in &files {
-        let halves = [Half::Left, Half::Right].map(|half| file.read(Some(half)));
-        let [left, right] = halves;
-        pairs.extend(SeaPair::of_image(
-            &left?,
-            &right?,
-            usize::from(options.windows),
-        ));
+        let [left, right] = [Half::Left, Half::Right].map(|half| file.read(Some(half)));
+        let most = usize::from(options.windows);
+        images.push(SeaPair::of_image(&left?, &right?, most));
     }
-    if pairs.len() < 4 {
+    images.retain(|pairs| !pairs.is_empty());
+    let pairs = images.concat();
+    if pairs.len() < 4 || images.len() < 2 {
         let (place, found) = (options.real.display(), pairs.len());
         return Err(format!(
-            "--real {place}: {found} windows of open sea in both halves of its images, at least 4 are needed"
+            "--real {place}: {found} windows of open sea in both halves of {} images, at least 4 of 2 images are needed",
+            images.len()
         )
         .into());
     }
     // What cannot be read leaves no folder behind.
     whole_files::make_folder(&options.out)?;
-    let kinds = kinds(&pairs, &learnt, SEED)?;
-    let bar = progress::bar(kinds.len() as u64, "kinds of sea");
-    let right: Vec<Field> = pairs.iter().map(|pair| pair.right.clone()).collect();
-    let spectrum = mean_spectrum(&right);
-    let mut rows = vec![SeaRow::of("real, right halves", &right, &spectrum, None)];
-    for (name, fields) in &kinds {
-        let told =
-            classifier_two_sample_test(&right, fields, &TwoSampleOptions::default(), &device)?;
-        rows.push(SeaRow::of(name, fields, &spectrum, Some(told)));
+    let right =
+        |pairs: &[SeaPair]| -> Vec<Field> { pairs.iter().map(|p| p.right.clone()).collect() };
+    let real: Vec<Vec<Field>> = images.iter().map(|pairs| right(pairs)).collect();
+    let right = right(&pairs);
+    let told = |others: &[Field]| -> Outcome<TwoSample> {
+        let options = TwoSampleOptions::default();
+        Ok(classifier_two_sample_test(
+            &right, others, &options, &device,
+        )?)
+    };
+    let bar = progress::bar(recipes.len() as u64, "recipes");
+    let mut rows = Vec::new();
+    for (name, recipe) in recipes {
+        let others = simulated_seas(&recipe, right.len(), SEED)?;
+        rows.push(RecipeRow {
+            recipe: name,
+            groups: discriminant(&real, &others),
+            network: told(&others)?,
+        });
         bar.inc(1);
     }
     bar.finish_and_clear();
     let report = SeaReport {
         images: files.len(),
+        open_images: images.len(),
         windows: pairs.len(),
-        rows,
+        recipes: rows,
+        rows: match &learnt {
+            Some(learnt) => beside_learnt(&pairs, &right, learnt, &told)?,
+            None => Vec::new(),
+        },
     };
-    let text = sea_report::markdown(&report);
+    let text = markdown(&report);
     whole_files::write_json(&options.out.join("report.json"), &report)?;
     whole_files::write_atomically(&options.out.join("report.md"), text.as_bytes())?;
-    picture(&learnt, &options.out.join("learned_sea.png"))?;
+    if let Some(learnt) = &learnt {
+        picture(learnt, &options.out.join("learned_sea.png"))?;
+    }
     match options.json {
         true => exit::say(&serde_json::to_string_pretty(&report)?)?,
         false => exit::say(&format!("{text}\nwritten to {}", options.out.display()))?,
     }
     Ok(())
+}
+
+/// The kinds of sea beside a learnt one.
+///
+/// - `told`: how often windows are told from the right halves
+fn beside_learnt(
+    pairs: &[SeaPair],
+    right: &[Field],
+    learnt: &SeaTexture,
+    told: &dyn Fn(&[Field]) -> Outcome<TwoSample>,
+) -> Outcome<Vec<SeaRow>> {
+    let kinds = kinds(pairs, learnt, SEED)?;
+    let bar = progress::bar(kinds.len() as u64, "kinds of sea");
+    let spectrum = mean_spectrum(right);
+    let mut rows = vec![SeaRow::of("real, right halves", right, &spectrum, None)];
+    for (name, fields) in &kinds {
+        let told = told(fields)?;
+        rows.push(SeaRow::of(name, fields, &spectrum, Some(told)));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(rows)
 }
 
 /// Seas of the first styles: Gaussian noise above, below it what the flow makes of the same noise.

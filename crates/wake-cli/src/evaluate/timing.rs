@@ -130,6 +130,7 @@ fn harmonic_seconds(scene: &Scene) -> f64 {
         track: Track::new(ship.position, ship.heading, 0.0),
         depth: scene.sea.depth,
         filter_depth: 0.0,
+        steepness: None,
     };
     let wake = wake.waves(&wake.plan(&raster, 1e-6)).strongest(WAVES);
     let mut random = StdRng::seed_from_u64(1);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use wake_train::detector::{DetectorTraining, ImageRecipe};
+use wake_train::detector::{DetectorTraining, ImageRecipe, LabelledImages};
 
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
@@ -28,6 +28,15 @@ pub(crate) struct Options {
     /// Different images, which come again when all were seen; by default all are different
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     distinct: Option<u32>,
+    /// Folder of labelled images (labels.json beside them) to learn from instead of a recipe
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct"])]
+    labelled: Option<PathBuf>,
+    /// Labelled image that is left out
+    #[arg(long, value_name = "NAME", requires = "labelled")]
+    without: Option<String>,
+    /// Labelled images: the next ones by name after the one that is left out
+    #[arg(long, value_name = "COUNT", requires = "labelled", value_parser = clap::value_parser!(u32).range(1..))]
+    tiles: Option<u32>,
     /// Weights to begin with, by default random ones
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
@@ -43,6 +52,11 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let training = DetectorTraining {
         recipe: options.recipe,
+        labelled: options.labelled.as_ref().map(|folder| LabelledImages {
+            folder: folder.clone(),
+            without: options.without.clone(),
+            count: options.tiles.map(|count| count as usize),
+        }),
         distinct: options.distinct.map(|count| count as usize),
         weights: options.weights.clone(),
         options: options.place.paced(&options.pace, &options.thrift)?,

@@ -44,6 +44,8 @@ fn wrong_recipes_shares_and_numbers_are_named() {
         (["--shard", "half"], ["--shard", "half", "such as 0/4"]),
         (["--count", "0"], ["--count", "'0'", "1..="]),
         (["--jobs", "0"], ["--jobs", "'0'", "1..="]),
+        (["--license", "a: b"], ["--license", "a: b", "cc0-1.0"]),
+        (["--per-tar", "0"], ["--per-tar", "'0'", "1..="]),
     ] {
         refused_by("dataset", &arguments, &words);
     }
@@ -238,4 +240,44 @@ fn damage_is_named_and_left_alone() {
     std::fs::write(&lines, changed).expect("a file");
     refused_into("dataset", &arguments, &["metadata.jsonl, line "], &out);
     refused_by("train wake-model", &data, &["metadata.jsonl, line "]);
+}
+
+/// A set is the same with a card and shards beside it, and its shards are all written or refused.
+#[test]
+fn a_card_and_shards_stand_beside_a_set() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [plain, carded, shards] =
+        ["plain", "carded", "shards"].map(|name| folder.path().join(name));
+    make(&["--count", "4"], &plain);
+    let arguments = [
+        "--count",
+        "4",
+        "--card",
+        "--webdataset",
+        text(&shards),
+        "--per-tar",
+        "2",
+    ];
+    make(&arguments, &carded);
+    let mut found = files(&carded);
+    let card = found
+        .remove(Path::new("README.md"))
+        .flatten()
+        .expect("a card");
+    let card = String::from_utf8(card).expect("Unicode");
+    assert!(card.starts_with("---\nlicense: cc0-1.0\n"), "{card}");
+    assert!(found == files(&plain));
+    let expected = ["README.md", "train-000000.tar", "train-000001.tar"];
+    let names: Vec<String> = names(&shards)
+        .into_iter()
+        .filter(|name| !name.starts_with("val"))
+        .collect();
+    assert_eq!(names, expected);
+    let again = [&SMALL[..], &arguments].concat();
+    refused_into(
+        "dataset",
+        &again,
+        &["shards", "holds shards already"],
+        &carded,
+    );
 }

@@ -9,6 +9,8 @@ mod dataset;
 mod detector;
 #[cfg(feature = "train")]
 mod evaluate;
+#[cfg(feature = "export")]
+mod export;
 #[cfg(feature = "simulate")]
 mod faults;
 #[cfg(feature = "generate")]

@@ -12,7 +12,8 @@ fn sets() -> Vec<(String, Manifest)> {
         "draw.quick_look.offset = [-0.05, 0.05]",
     ];
     let small = ["scene.grid.rows = 24", "scene.grid.columns = 20"];
-    let named = ["paper", "ranges", "detector", "model"].map(|name| (name, Vec::new()));
+    let named =
+        ["paper", "ranges", "satellites", "detector", "model"].map(|name| (name, Vec::new()));
     let more = [
         ("ranges", quick_look.to_vec()),
         (

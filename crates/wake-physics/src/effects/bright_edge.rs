@@ -9,9 +9,10 @@ use crate::linear::amplitudes::rms_over;
 use crate::models::Models;
 use crate::raster::Field;
 use crate::scattering::breaking;
-use crate::scene::{Polarization, Radar, Scene, Ship, Term};
+use crate::scene::{Polarization, Radar, Recovery, Scene, Ship, Term};
 use crate::track::direction;
-use crate::turbulent::current::{EdgeResponse, WakeCurrent, WakeEdge};
+use crate::turbulent::REFERENCE_WIND;
+use crate::turbulent::current::{EdgeResponse, LONGEST_RESPONSE, WakeCurrent, WakeEdge};
 use std::f64::consts::TAU;
 
 #[derive(Debug)]
@@ -92,10 +93,20 @@ fn edge(scene: &Scene, models: &Models, ship: &Ship, wake: &KelvinWake) -> Optio
         track: wake.track,
         length: ship.length,
         response: match ship.edge_time {
-            Some(time) => EdgeResponse::Given(time),
+            Some(time) => EdgeResponse::Given(match ship.recovery {
+                Recovery::Constant => time,
+                Recovery::Wind => in_wind(time, &scene.radar, wind),
+            }),
             None => edge_response(&scene.radar, wind, models),
         },
     })
+}
+
+/// A response \[s\] that is given for the reference wind: it follows the wind as the response of breaking waves does.
+fn in_wind(time: f64, radar: &Radar, wind_speed: f64) -> f64 {
+    let k_e = TAU * radar.frequency / SPEED_OF_LIGHT;
+    let of = |wind| breaking::response_time(k_e, wind);
+    (time * (of(wind_speed) / of(REFERENCE_WIND))).min(LONGEST_RESPONSE)
 }
 
 /// Response of σ⁰ to the convergence of a wake: of the Bragg waves `m_B`/μ, and of breaking waves.

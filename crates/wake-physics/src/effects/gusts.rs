@@ -1,7 +1,7 @@
-//! Gusts: a field of wind speed that σ⁰ follows.
+//! Gusts and eddies of the wind: fields of wind speed that σ⁰ follows.
 
 use super::effect::{Effect, NOT_ASKED_FOR, Site, Weight};
-use crate::gusts::{Gusts, wind_exponent};
+use crate::gusts::{GustKind, Gusts, wind_exponent};
 use crate::linear::Amplitudes;
 use crate::models::Models;
 use crate::raster::Field;
@@ -10,25 +10,43 @@ use std::sync::OnceLock;
 
 #[derive(Debug)]
 pub(crate) struct GustField {
-    gusts: Gusts,
+    /// Those of the scene that have a strength, each with its field at every few pixels, drawn for the first strip.
+    gusts: Vec<(Gusts, OnceLock<(Field, usize)>)>,
     /// Exponent of the wind speed in σ⁰.
     exponent: f64,
-    /// The field of the whole scene at every few pixels, drawn for the first strip.
-    drawn: OnceLock<(Field, usize)>,
 }
 
 impl GustField {
     pub(super) fn new(scene: &Scene, _: &Models) -> Self {
         let sea = &scene.sea;
+        let of = |kind, strength, scale| Gusts {
+            kind,
+            strength,
+            scale,
+            wind_toward: sea.wind_toward.rem_euclid(360.0).to_radians(),
+        };
+        let both = [
+            of(GustKind::Gusts, sea.gust_strength, sea.gust_scale),
+            of(GustKind::Mottle, sea.mottle_strength, sea.mottle_scale),
+        ];
+        let drawn = both.into_iter().filter(|gusts| gusts.strength > 0.0);
         Self {
-            gusts: Gusts {
-                strength: sea.gust_strength,
-                scale: sea.gust_scale,
-                wind_toward: sea.wind_toward.rem_euclid(360.0).to_radians(),
-            },
+            gusts: drawn.map(|gusts| (gusts, OnceLock::new())).collect(),
             exponent: wind_exponent(scene.radar.frequency),
-            drawn: OnceLock::new(),
         }
+    }
+}
+
+impl GustField {
+    /// Fields that are interpolated, and those drawn at every pixel, whose FFTs take five times as long and as much memory.
+    ///
+    /// - `spacing` of the computed pixels \[m\]
+    pub(crate) fn patterns(&self, spacing: f64) -> f64 {
+        let of = |gusts: &Gusts| match gusts.kind {
+            GustKind::Mottle => 1.0 + 5.0 / (gusts.step(spacing) as f64).powi(2),
+            _ => 1.0,
+        };
+        self.gusts.iter().map(|(gusts, _)| of(gusts)).sum()
     }
 }
 
@@ -38,16 +56,23 @@ impl Effect for GustField {
     }
 
     fn weigh(&self, _: &Models, amplitudes: &Amplitudes<'_>) -> Weight {
+        let strengths = self.gusts.iter().map(|(gusts, _)| gusts.strength);
+        let strength = strengths.fold(0.0, f64::hypot);
         Weight {
-            absent: (self.gusts.strength <= 0.0).then_some(NOT_ASKED_FOR),
-            estimate: self.exponent * self.gusts.strength * amplitudes.with_contrast(),
+            absent: self.gusts.is_empty().then_some(NOT_ASKED_FOR),
+            estimate: self.exponent * strength * amplitudes.with_contrast(),
         }
     }
 
     fn change_sigma0(&self, site: &Site<'_>, sigma0: &mut Field, _: Option<&Field>) {
-        let draw = || self.gusts.coarse_field(&site.whole, site.scene.seed);
-        let drawn = self.drawn.get_or_init(draw);
-        self.gusts
-            .modulate_strip(sigma0, site.first_row, drawn, self.exponent);
+        for (gusts, drawn) in &self.gusts {
+            let draw = || gusts.coarse_field(&site.whole, site.scene.seed);
+            gusts.modulate_strip(
+                sigma0,
+                site.first_row,
+                drawn.get_or_init(draw),
+                self.exponent,
+            );
+        }
     }
 }

@@ -5,8 +5,8 @@ use crate::linear::Amplitudes;
 use crate::linear::amplitudes::rms_over;
 use crate::models::Models;
 use crate::raster::Field;
-use crate::scene::{Scene, Term};
-use crate::turbulent::TurbulentWake;
+use crate::scene::{Recovery, Scene, Ship, Term};
+use crate::turbulent::{Suppression, TurbulentWake};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
@@ -17,15 +17,19 @@ pub(crate) struct TurbulentWakes {
 }
 
 impl TurbulentWakes {
-    pub(super) fn new(_: &Scene, models: &Models) -> Self {
-        let of_ship = |wake: &crate::kelvin::KelvinWake| TurbulentWake {
+    pub(super) fn new(scene: &Scene, models: &Models) -> Self {
+        let of_ship = |(ship, wake): (&Ship, &crate::kelvin::KelvinWake)| TurbulentWake {
             track: wake.track,
             speed: wake.speed,
             length: wake.hull.length(),
             beam: wake.hull.beam(),
+            suppression: match ship.recovery {
+                Recovery::Constant => Suppression::Given(ship.damping),
+                Recovery::Wind => Suppression::in_wind(ship.damping, scene.sea.wind_speed),
+            },
         };
         Self {
-            wakes: models.wakes.iter().map(of_ship).collect(),
+            wakes: scene.ships.iter().zip(&models.wakes).map(of_ship).collect(),
         }
     }
 

@@ -22,7 +22,7 @@ mod subpixel;
 mod zones;
 
 pub use fade::{fade, fade_field};
-pub(crate) use fade::{fade_at, fill_fade};
+pub(crate) use fade::{fade_at, fade_with_slope, fill_fade};
 pub use panels::{WakePlan, Zone};
 pub(crate) use rays::Ray;
 pub use rays::{KELVIN_ANGLE, half_angle};
@@ -60,7 +60,13 @@ pub struct KelvinWake {
     pub depth: f64,
     /// Weights the spectrum with e^{−kd}, d this depth \[m\], at least 0.
     pub filter_depth: f64,
+    /// Largest slope of a wave one length of the ship astern of midship \[1\], above 0; no limit where absent. See
+    /// [`KelvinWake::unbroken`].
+    pub steepness: Option<f64>,
 }
+
+/// Nodes over a period of the interference of bow and stern: exact for a cosine.
+const INTERFERENCE: usize = 8;
 
 impl KelvinWake {
     /// Wavelength of the transverse waves on the track in deep water, 2πU²/g \[m\].
@@ -106,7 +112,47 @@ impl KelvinWake {
     fn source(&self, along: f64, wavenumber: f64, weight: f64) -> Complex64 {
         let michell = self.hull.michell_integral(along, wavenumber, self.depth);
         let filter = (-wavenumber * self.filter_depth).exp();
-        -michell.conj() * (weight * filter)
+        -michell.conj() * (weight * filter * self.unbroken(along, wavenumber))
+    }
+
+    /// Share of the amplitude of a wave that has not broken.
+    ///
+    /// ```text
+    /// (1 + s²/s_max²)^{−½},     s² = 8 k⁴ ⟨|F|²⟩/(π ν L cosh u),     k = ν cosh² u
+    /// ```
+    ///
+    /// s is the slope amplitude k `a_loc` that stationary phase gives the divergent waves of wavenumber k at the distance L of one
+    /// ship length, ⟨|F|²⟩ the square of Michell's integral averaged over the interference of bow and stern, `s_max` the limit
+    /// [`Self::steepness`]. A thin ship makes divergent waves steeper than water bears (slopes of 0.4 to 0.7 near the track); what is
+    /// steeper becomes turbulence near the hull. Long waves are not steep and stay. Next to the cusp, where stationary phase
+    /// fails, and for transverse waves s is that of a divergent wave of the same length.
+    ///
+    /// - `along` α, `wavenumber` k [rad/m]
+    /// - 1 without a limit
+    ///
+    /// # Validity
+    ///
+    /// Form and distance are chosen. Regular waves break at slopes of 0.44 (Stokes), waves of a wind sea at 0.2 to 0.3.
+    #[must_use]
+    pub fn unbroken(&self, along: f64, wavenumber: f64) -> f64 {
+        let Some(limit) = self.steepness else {
+            return 1.0;
+        };
+        let length = self.hull.length();
+        let shortest = GRAVITY / (self.speed * self.speed);
+        let period = std::f64::consts::TAU / length;
+        let square = |n: usize| {
+            let shift = ((n as f64 + 0.5) / INTERFERENCE as f64 - 0.5) * period;
+            let michell = self
+                .hull
+                .michell_integral(along + shift, wavenumber, self.depth);
+            michell.norm_sqr()
+        };
+        let mean = (0..INTERFERENCE).map(square).sum::<f64>() / INTERFERENCE as f64;
+        let cosh = (wavenumber / shortest).sqrt().max(1.0);
+        let squared =
+            8.0 * wavenumber.powi(4) * mean / (std::f64::consts::PI * shortest * length * cosh);
+        (1.0 + squared / (limit * limit)).powf(-0.5)
     }
 }
 

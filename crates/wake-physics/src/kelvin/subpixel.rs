@@ -10,7 +10,7 @@
 //! with |a|² averaged over the interference of bow and stern and t the age of the wave. In deep water β' |dT/du| d is the
 //! second derivative of the phase, ν d cosh u |1 − 4 sinh²u/cosh 2u|.
 
-use super::{KelvinWake, fade};
+use super::{INTERFERENCE, KelvinWake, fade};
 use crate::track::Track;
 use std::f64::consts::{PI, TAU};
 
@@ -23,9 +23,6 @@ const VISCOSITY: f64 = 1.05e-6;
 
 /// Steps along the curve of steady waves.
 const STEPS: usize = 1024;
-
-/// Nodes over a period of the interference of bow and stern: exact for a cosine.
-const INTERFERENCE: usize = 8;
 
 /// Rays from the track to the outermost one.
 const RAYS: usize = 512;
@@ -272,6 +269,7 @@ mod tests {
             track: Track::new([0.0, 0.0], 0.0, 0.0),
             depth: f64::INFINITY,
             filter_depth: 0.0,
+            steepness: None,
         }
     }
 

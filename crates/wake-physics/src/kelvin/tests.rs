@@ -19,6 +19,7 @@ fn wake(hull: Hull, speed: f64, heading: f64) -> KelvinWake {
         track: Track::new([0.0, 0.0], heading, 0.0),
         depth: f64::INFINITY,
         filter_depth: 0.0,
+        steepness: None,
     }
 }
 
@@ -615,4 +616,42 @@ fn the_plan_names_its_longest_and_shortest_wave() {
             );
         }
     }
+}
+
+/// Steepness k a of the envelope 500 m astern as another programme has it, for 195 × 26 × 10 m at 10 m/s; at one length of the ship
+/// it is √(500/195) times that, less the factor |1 − 4 sinh²u/cosh 2u| that the limit leaves out. What is left of the amplitude
+/// follows; the long waves of the cusp keep most of theirs.
+#[test]
+fn steep_waves_break_and_long_ones_stay() {
+    let limited = KelvinWake {
+        steepness: Some(0.2),
+        ..scene_ship(10.0, 0.0)
+    };
+    let shortest = GRAVITY / 100.0;
+    let left = |length: f64| {
+        let k = std::f64::consts::TAU / length;
+        // α = ν cosh u of the steady wave of wavenumber ν cosh² u.
+        limited.unbroken((shortest * k).sqrt(), k)
+    };
+    for (length, steepness) in [(2.0, 0.207), (1.0, 0.245), (0.2, 0.364)] {
+        let squared = (std::f64::consts::TAU / length) / shortest;
+        let factor = (4.0 * (squared - 1.0) / (2.0 * squared - 1.0) - 1.0f64).abs();
+        let slope = steepness * (500.0f64 / 195.0).sqrt() * factor.sqrt();
+        let expected = (1.0 + (slope / 0.2f64).powi(2)).powf(-0.5);
+        // Three digits of the steepness.
+        assert!(
+            (left(length) / expected - 1.0).abs() < 0.01,
+            "{length}: {} {expected}",
+            left(length)
+        );
+    }
+    // Two thirds of the transverse wavelength of 64 m.
+    assert!(left(42.7) > 0.7, "{}", left(42.7));
+    let free = scene_ship(10.0, 0.0);
+    assert_eq!(free.unbroken(0.3, 1.0), 1.0);
+    let direction = CUSP_ANGLE + 0.3;
+    let ratio = limited.amplitude(direction).norm() / free.amplitude(direction).norm();
+    let u = direction.tan().asinh();
+    let k = shortest * u.cosh().powi(2);
+    assert!((ratio - limited.unbroken(shortest * u.cosh(), k)).abs() < 1e-12);
 }

@@ -92,7 +92,7 @@ impl DarkLine {
     /// What damping takes away at a place.
     fn damping(&self, distance: f64, at: f64) -> f64 {
         let [own, wide] = self.deviations(distance);
-        let centre = crate::turbulent::centre_damping(self.wake.speed, distance);
+        let centre = self.wake.suppression.damping(self.wake.speed, distance);
         self.damped * centre * own / wide * (-0.5 * (at / wide).powi(2)).exp()
     }
 
@@ -136,8 +136,8 @@ impl DarkLine {
 mod tests {
     use super::DarkLine;
     use crate::track::Track;
-    use crate::turbulent::TurbulentWake;
     use crate::turbulent::current::{EdgeResponse, WakeCurrent, WakeEdge};
+    use crate::turbulent::{Suppression, TurbulentWake};
 
     /// The mean square over windows across the track, by sums over the damping itself and a Gaussian smear, at places
     /// ten times closer. The window's 16 places leave a thousandth where it is no wider than the line.
@@ -148,6 +148,7 @@ mod tests {
             speed: 8.0,
             length: 100.0,
             beam: 15.0,
+            suppression: Suppression::Given(0.6),
         };
         let line = DarkLine {
             wake,
@@ -191,6 +192,7 @@ mod tests {
             speed: 8.0,
             length: 100.0,
             beam: 15.0,
+            suppression: Suppression::Given(0.6),
         };
         let edge = WakeEdge {
             current: WakeCurrent::of_wind(wake.speed, wake.beam, 0.1, 4.0),

@@ -1,4 +1,7 @@
-//! How much brighter the sea is where a ship's waves roughen it that the pixels do not carry.
+//! How much brighter the sea is where a ship's waves roughen it.
+//!
+//! σ⁰ is steeper for slopes toward the radar than away from it, so waves of any length raise its mean: those that the pixels do not
+//! carry, and just as much those that they carry but the image smears, such as the divergent waves of a ship along the flight.
 
 use crate::effects::Effects;
 use crate::kelvin::{KelvinWake, SubpixelWake};
@@ -23,8 +26,9 @@ const VARIANCES: [f64; 12] = [
 
 /// What a variance of slopes makes of the mean σ⁰ of a sea.
 #[derive(Debug)]
-pub(super) struct ShortWaves<'a> {
-    effects: &'a Effects,
+pub(super) struct ShortWaves {
+    /// The waves of each ship, of all lengths that are drawn.
+    waves: Vec<Option<SubpixelWake>>,
     /// Averaged over all slopes of the sea.
     backscatter: Backscatter,
     /// The mean σ⁰, Bragg and specular \[1\], above 0.
@@ -33,11 +37,11 @@ pub(super) struct ShortWaves<'a> {
     table: OnceLock<[[f64; VARIANCES.len()]; DIRECTIONS]>,
 }
 
-impl<'a> ShortWaves<'a> {
+impl ShortWaves {
     /// Those of a sea whose models average over all its slopes; `None` if no such waves are drawn.
     pub(super) fn new(
         models: &Models,
-        effects: &'a Effects,
+        effects: &Effects,
         drawn: impl Fn(Term) -> bool,
     ) -> Option<Self> {
         if !effects.subpixel_wake.counted {
@@ -46,8 +50,14 @@ impl<'a> ShortWaves<'a> {
         let backscatter = models.backscatter(drawn(Term::TiltAverage), drawn(Term::Specular));
         let mean = backscatter.mean_over(&SlopeCovariance::NONE);
         let mean = mean[0] + mean[1];
+        let [from, to] = models.subpixel_band();
+        let band = [if drawn(Term::Kelvin) { 0.0 } else { from }, to];
         (mean > 0.0).then(|| Self {
-            effects,
+            waves: models
+                .wakes
+                .iter()
+                .map(|wake| wake.subpixel(band))
+                .collect(),
             backscatter,
             mean,
             table: OnceLock::new(),
@@ -56,7 +66,7 @@ impl<'a> ShortWaves<'a> {
 
     /// The waves of a ship that are steep enough to count.
     pub(super) fn of(&self, ship: usize) -> Option<WavesOfShip<'_>> {
-        let waves = self.effects.subpixel_wake.waves[ship].as_ref()?;
+        let waves = self.waves[ship].as_ref()?;
         let strongest = waves.steepest(0.5 * waves.length());
         (strongest >= LEAST_VARIANCE).then_some(WavesOfShip { sea: self, waves })
     }
@@ -114,7 +124,7 @@ impl<'a> ShortWaves<'a> {
 /// The waves of one ship on a sea.
 #[derive(Debug)]
 pub(super) struct WavesOfShip<'s> {
-    sea: &'s ShortWaves<'s>,
+    sea: &'s ShortWaves,
     waves: &'s SubpixelWake,
 }
 

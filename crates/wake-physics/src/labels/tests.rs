@@ -367,6 +367,7 @@ fn turned(extent: &Extent, curvature: f64) -> WakeLabel {
         track: crate::track::Track::turning([0.0; 2], 0.0, 0.0, curvature),
         depth: f64::INFINITY,
         filter_depth: 0.0,
+        steepness: None,
     };
     Frame::new([0.0; 2], 0.0, &square()).curved_wake(&wake, KELVIN_ANGLE, extent)
 }

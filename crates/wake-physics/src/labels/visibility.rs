@@ -21,9 +21,13 @@ use std::ops::Range;
 /// Side of the windows in which a wake is looked for \[pixels\]: chosen.
 const WINDOW: usize = 16;
 
-/// A window shows the wake from this ratio on, of the root of the summed squares of what the wake changes to the standard
-/// deviation of a pixel: chosen; five deviations of a filter that knows the pattern, about ⅓ of one in each pixel.
+/// A window shows the wake from this ratio on, of the root of the summed squares of what the wake changes over all independent
+/// pixels to the standard deviation of one: chosen; five deviations of a filter that knows the pattern, about ⅓ of one in each
+/// pixel where all are independent.
 const THRESHOLD: f64 = 5.0;
+
+/// Rows of windows in which a part of a wake must be seen: chosen. A line of 16 pixels has no direction that can be measured.
+const LEAST_ROWS: usize = 2;
 
 /// Resolution ρ of a Gaussian exp(−(πy/ρ)²) over its width at half power: π/(2√ln 2).
 const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
@@ -106,11 +110,13 @@ pub(super) struct Background<'a> {
     resolution: f64,
     /// Standard deviation of one pixel over its mean.
     noise: f64,
+    /// Pixels that count as one, since the response correlates them, at least 1.
+    correlated: f64,
     waves_drawn: bool,
     dark_line_drawn: bool,
     edges_drawn: bool,
-    /// What the waves make that the pixels do not carry, if they are drawn.
-    short_waves: Option<ShortWaves<'a>>,
+    /// What the waves change of the mean, if they are drawn on an impulse response.
+    short_waves: Option<ShortWaves>,
     /// Mean velocity toward the radar [m/s].
     pub(super) velocity: f64,
 }
@@ -165,6 +171,10 @@ impl<'a> Background<'a> {
                 _ => 0.0,
             },
             noise: 0.0,
+            correlated: models.response.map_or(1.0, |response| {
+                let pixels = |resolution: f64| (resolution / models.pixels.image.spacing).max(1.0);
+                pixels(response.range.resolution) * pixels(response.azimuth.resolution)
+            }),
             waves_drawn: drawn(Term::Kelvin),
             dark_line_drawn: drawn(Term::Turbulent),
             edges_drawn: drawn(Term::BrightEdge),
@@ -207,6 +217,7 @@ impl<'a> Background<'a> {
         let half_length = 0.5 * wake.hull.length();
         let mut extent = Extent::NOTHING;
         let mut rows = Vec::new();
+        let mut seen_rows = [0; 2];
         for n in rows_in(&wake.track, &self.raster, half_length, step)
             .into_iter()
             .flatten()
@@ -229,15 +240,24 @@ impl<'a> Background<'a> {
             let (rays, local) = tangent.as_ref().map_or((&rays, &band), |(r, b)| (r, b));
             let row = self.row(wake, distance, windows, rays, (local, profile.as_ref()));
             let end = distance + 0.5 * step + 2.0 * half_length;
-            let seen = |square: f64| WINDOW as f64 * square.sqrt() >= THRESHOLD * self.noise;
+            let independent = WINDOW as f64 / self.correlated.sqrt();
+            let seen = |square: f64| independent * square.sqrt() >= THRESHOLD * self.noise;
             if seen(row.largest[0]) {
+                seen_rows[0] += 1;
                 extent.waves = end;
             }
             if seen(row.largest[1]) {
+                seen_rows[1] += 1;
                 extent.dark_line = end;
                 extent.half_width = band.half_width(distance + 0.5 * step);
             }
             rows.push((end, row));
+        }
+        if seen_rows[0] < LEAST_ROWS {
+            extent.waves = 0.0;
+        }
+        if seen_rows[1] < LEAST_ROWS {
+            (extent.dark_line, extent.half_width) = (0.0, 0.0);
         }
         let seen = extent.longest();
         let counted = rows.iter().filter(|(end, _)| seen == 0.0 || *end <= seen);

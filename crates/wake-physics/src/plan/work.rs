@@ -224,7 +224,8 @@ impl Work {
                 when(uses(Term::SubpixelWake)) * subpixel as f64,
             ],
             turning: turning as f64,
-            patterns: when(uses(Term::Slicks)) + when(uses(Term::Gusts)),
+            patterns: when(uses(Term::Slicks))
+                + when(uses(Term::Gusts)) * effects.gusts.patterns(models.pixels.computed.spacing),
             taps,
             table: BackscatterTable::foreseen(
                 &backscatter,

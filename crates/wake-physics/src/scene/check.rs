@@ -64,6 +64,8 @@ impl Sea {
         in_range("sea.salinity", self.salinity, 0.0, 45.0, "psu")?;
         in_range("sea.gust_strength", self.gust_strength, 0.0, 0.5, "")?;
         in_range("sea.gust_scale", self.gust_scale, 100.0, 5e4, "m")?;
+        in_range("sea.mottle_strength", self.mottle_strength, 0.0, 0.5, "")?;
+        in_range("sea.mottle_scale", self.mottle_scale, 20.0, 5e3, "m")?;
         in_range("sea.swell_height", self.swell_height, 0.0, 15.0, "m")?;
         in_range("sea.swell_length", self.swell_length, 30.0, 1000.0, "m")?;
         finite("sea.swell_toward", self.swell_toward, "degrees")?;
@@ -151,6 +153,13 @@ impl Ship {
         number("position[0]", self.position[0], "m")?;
         number("position[1]", self.position[1], "m")?;
         range("filter_depth", self.filter_depth, [0.0, 20.0], "m")?;
+        optional(
+            &format!("{name}.steepness"),
+            self.steepness,
+            [0.02, 1.0],
+            "",
+        )?;
+        range("damping", self.damping, [0.0, 1.0], "")?;
         optional(
             &format!("{name}.edge_time"),
             self.edge_time,
@@ -280,7 +289,7 @@ mod tests {
     use super::*;
 
     /// Key, closed range, and values just outside it.
-    const RANGES: [(&str, f64, f64); 35] = [
+    const RANGES: [(&str, f64, f64); 39] = [
         ("grid.rows", 1.0, 16384.0),
         ("grid.columns", 1.0, 16384.0),
         ("grid.spacing", 0.1, 100.0),
@@ -309,6 +318,10 @@ mod tests {
         ("sea.slick_damping", 0.0, 1.0),
         ("sea.slick_width", 5.0, 1000.0),
         ("sea.slick_scale", 100.0, 5e4),
+        ("sea.mottle_strength", 0.0, 0.5),
+        ("sea.mottle_scale", 20.0, 5e3),
+        ("ship.steepness", 0.02, 1.0),
+        ("ship.damping", 0.0, 1.0),
         ("ship.edge_time", 0.0, 1000.0),
         ("ship.edge_outflow", 0.0, 0.3),
         ("ship.roll", 0.0, 2.0),

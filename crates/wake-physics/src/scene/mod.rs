@@ -114,6 +114,11 @@ pub struct Sea {
     pub gust_strength: f64,
     /// Outer scale of the gusts \[m\], 100 to 50,000.
     pub gust_scale: f64,
+    /// Standard deviation of the logarithm of the wind speed in the eddies of the surface layer \[1\], 0 to 0.5; 0: none. See
+    /// [`crate::gusts`].
+    pub mottle_strength: f64,
+    /// Outer scale of these eddies \[m\], 20 to 5000.
+    pub mottle_scale: f64,
     /// Significant height of a swell \[m\], 0 to 15; 0: none. See [`crate::swell`].
     pub swell_height: f64,
     /// Wavelength of the swell's peak \[m\], 30 to 1000.
@@ -144,6 +149,8 @@ impl Default for Sea {
             salinity: 35.0,
             gust_strength: 0.0,
             gust_scale: 2000.0,
+            mottle_strength: 0.0,
+            mottle_scale: 250.0,
             swell_height: 0.0,
             swell_length: 200.0,
             swell_toward: 0.0,
@@ -210,6 +217,15 @@ pub struct Ship {
     pub echo: bool,
     /// Weights the wake's spectrum with `exp(−k·filter_depth)` \[m\], 0 to 20.
     pub filter_depth: f64,
+    /// Largest slope of a wave of the wake, one length astern of midship \[1\], 0.02 to 1: steeper waves break. No limit where
+    /// absent. See [`crate::kelvin`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steepness: Option<f64>,
+    /// Damping of the Bragg waves at the stern in the middle of the turbulent wake \[1\], 0 to 1; with `recovery = "wind"` in a
+    /// wind of 5 m/s. See [`crate::turbulent`].
+    pub damping: f64,
+    /// How damping and edges of the turbulent wake follow the wind.
+    pub recovery: Recovery,
     /// Whether the turbulent wake has a current and bright edges. See [`crate::turbulent::current`].
     pub edge: bool,
     /// Response of σ⁰ to the convergence of that current \[s\], 0 to 1000; from wind and radar where absent; only with
@@ -237,6 +253,9 @@ impl Default for Ship {
             block_coefficient: None,
             echo: false,
             filter_depth: 0.0,
+            steepness: None,
+            damping: 0.6,
+            recovery: Recovery::Constant,
             edge: false,
             edge_time: None,
             edge_outflow: 0.0,
@@ -258,6 +277,18 @@ impl Ship {
     pub(crate) fn heading_at(&self, time: f64) -> f64 {
         self.heading + self.turn_rate * time
     }
+}
+
+/// How damping and edges of a turbulent wake follow the wind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Recovery {
+    /// Not at all: damping and a given response of the edges are the same in every wind.
+    #[default]
+    Constant,
+    /// The wind restores the damped waves: damping, its length and the response of the edges fall with wind.
+    Wind,
 }
 
 /// Form of the hull.

@@ -92,12 +92,16 @@ sensors! {
     Radarsat2S = "radarsat-2-s" => radarsat_2_s(),
     NovaSar1 = "novasar-1" => novasar_1(),
     Ers2Pri = "ers-2-pri" => ers_2_pri(),
+    CosmoSkyMedDgm = "cosmo-skymed-dgm" => cosmo_skymed_dgm(),
+    AlosFbs = "alos-fbs" => alos_fbs(),
 }
 
-/// Interferometric wide swath, ground range detected, high resolution.
+/// Interferometric wide swath, ground range detected, high resolution; alike on Sentinel-1A to 1D, whose radars and orbits are the same.
 ///
-/// Frequency, windows, looks and overlap (3.5 of 14.1 MHz), noise, pulse rate (of IW1) and resolution: annotation of a
-/// product of 12 June 2022. Azimuth is unwindowed, as its sea was measured.
+/// Frequency, range window, looks and overlap (3.5 of 14.1 MHz), noise, pulse rate (of IW1) and range resolution: annotation of a
+/// product of 12 June 2022. Window and resolution in azimuth: fitted to the correlations 0.43, −0.01 and 0.00 of its sea at lags of
+/// one to three pixels, here 0.435, 0.009 and 0.005. Without a window they are 0.437, 0.002 and 0.047; the annotated Hamming 0.70 at
+/// the annotated bandwidth gives 0.66 at the first.
 fn sentinel_1_iw() -> SensorMode {
     SensorMode {
         frequency: 5.405e9,
@@ -108,8 +112,8 @@ fn sentinel_1_iw() -> SensorMode {
         spacing: 10.0,
         // 14.1 MHz and Hamming 0.70 in the first sub-swath; the bandwidths of the others leave 19.6 and 19.5 m.
         range_resolution: RangeResolution::Ground(20.3),
-        azimuth_resolution: 18.4,
-        windows: [Window::Hamming(0.70), Window::Uniform],
+        azimuth_resolution: 17.2,
+        windows: [Window::Hamming(0.70), Window::Hamming(0.85)],
         looks: (5, 0.25),
         nesz: -25.0,
         prf: 1717.0,
@@ -165,6 +169,37 @@ fn cosmo_skymed_hi() -> SensorMode {
         looks: (1, 0.0),
         nesz: -20.0,
         prf: 3100.0,
+    }
+}
+
+/// Himage stripmap as delivered: detected, multi-looked to 5 m, in ground range (DGM). Resolution, spacing, looks: the mission's product
+/// description, quoted from memory, not verified. The rest as [`cosmo_skymed_hi`].
+fn cosmo_skymed_dgm() -> SensorMode {
+    SensorMode {
+        spacing: 2.5,
+        range_resolution: RangeResolution::Ground(5.0),
+        azimuth_resolution: 5.0,
+        looks: (3, 0.0),
+        ..cosmo_skymed_hi()
+    }
+}
+
+/// Fine beam single of PALSAR on ALOS, level 1.5. Frequency, altitude, incidence, spacing, resolution, looks, noise: the user
+/// handbook of 2008, quoted from memory, not verified. Windows, pulse rate: chosen.
+fn alos_fbs() -> SensorMode {
+    SensorMode {
+        frequency: 1.27e9,
+        polarization: Polarization::HH,
+        altitude: 691.65e3,
+        incidence: 38.7,
+        incidence_range: [8.0, 60.0],
+        spacing: 6.25,
+        range_resolution: slant(10.0, 38.7),
+        azimuth_resolution: 10.0,
+        windows: [Window::Hamming(0.75); 2],
+        looks: (2, 0.0),
+        nesz: -23.0,
+        prf: 2100.0,
     }
 }
 

@@ -4,7 +4,9 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 use wake_physics::Scene;
 use wake_physics::constants::GRAVITY;
-use wake_physics::scene::{Grid, HullForm, Model, Polarization, Radar, Sea, Sensor, Ship};
+use wake_physics::scene::{
+    Grid, HullForm, Model, Polarization, Radar, Recovery, Sea, Sensor, Ship,
+};
 use wake_physics::scene::{SpectrumModel, SpreadingModel, Term, TermRule, Terms};
 use wake_physics::window::Window;
 
@@ -50,6 +52,7 @@ prop_compose! {
         (gust_strength, gust_scale) in (prop_oneof![Just(0.0), ends(0.0, 0.5)], decades(100.0, 5e4)),
         (swell_height, swell_length, swell_toward) in
             (prop_oneof![Just(0.0), ends(0.0, 15.0)], decades(30.0, 1000.0), direction()),
+        (mottle_strength, mottle_scale) in (prop_oneof![3 => Just(0.0), 1 => ends(0.0, 0.5)], decades(20.0, 5e3)),
         breaking in any::<bool>(),
         (slick_damping, slick_width, slick_scale) in
             (prop_oneof![Just(0.0), ends(0.0, 1.0)], decades(5.0, 1000.0), decades(100.0, 5e4)),
@@ -57,7 +60,8 @@ prop_compose! {
         let spectra = [SpectrumModel::Elfouhaily, SpectrumModel::Jonswap, SpectrumModel::PiersonMoskowitz];
         let spreads = [SpreadingModel::Hasselmann, SpreadingModel::Mitsuyasu, SpreadingModel::Elfouhaily];
         Sea {
-            wind_speed, wind_toward, fetch, depth, time, temperature, salinity, gust_strength, gust_scale, swell_height,
+            wind_speed, wind_toward, fetch, depth, time, temperature, salinity, gust_strength, gust_scale,
+            mottle_strength, mottle_scale, swell_height,
             swell_length, swell_toward, breaking, slick_damping, slick_width, slick_scale,
             spectrum: spectra[spectrum],
             spreading: spreads[spreading],
@@ -82,6 +86,8 @@ prop_compose! {
         block_coefficient in maybe(ends(0.45, 0.9)),
         (full, echo, edge) in (any::<bool>(), any::<bool>(), any::<bool>()),
         filter_depth in prop_oneof![Just(0.0), ends(0.0, 20.0)],
+        steepness in maybe(ends(0.02, 1.0)),
+        (damping, windy) in (prop_oneof![Just(0.6), ends(0.0, 1.0)], any::<bool>()),
         edge_time in maybe(ends(0.0, 1000.0)),
         (edge_outflow, roll) in (ends(0.0, 0.3), ends(0.0, 2.0)),
     ) -> Ship {
@@ -104,6 +110,9 @@ prop_compose! {
             block_coefficient: block_coefficient.filter(|_| full),
             echo,
             filter_depth,
+            steepness,
+            damping,
+            recovery: if windy { Recovery::Wind } else { Recovery::Constant },
             edge,
             edge_time: edge_time.filter(|_| edge),
             edge_outflow: if edge { edge_outflow } else { 0.0 },

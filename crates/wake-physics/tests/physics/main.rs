@@ -9,6 +9,7 @@
 
 mod any_scene;
 mod attack;
+mod detectability;
 mod expected;
 mod hard_cases;
 mod methods;

@@ -1,5 +1,5 @@
 //! Simulated images for learning: clear wakes more often, and over them what the simulator does not know: land, islets, piers,
-//! streaks, ships at rest, fronts, borders.
+//! streaks, ships at rest, fronts, filaments, borders.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use wake_physics::measure::median;
 
 use super::draw::Draw;
 use super::sample::wakes;
-use super::sea::{Echoes, border, clutter, front};
+use super::sea::{Echoes, border, clutter, filaments, front};
 
 /// Scenes of which the first with a clear wake is simulated, at every other position.
 const OF: u64 = 4;
@@ -19,6 +19,8 @@ const OF: u64 = 4;
 const CLEAR: f32 = 8.0;
 /// Share of images with a front.
 const FRONTS: f32 = 0.12;
+/// Share of images with filaments.
+const FILAMENTS: f32 = 0.15;
 /// Clutter this bright, in medians of the image, hides a wake.
 const HIDES: f32 = 0.5;
 /// Random numbers of the clutter, apart from those of other draws of the same seed.
@@ -58,6 +60,9 @@ impl Cluttered {
         let mut mean = vec![1.0; size * size];
         if draw.chance(FRONTS) {
             front(&mut mean, size, draw);
+        }
+        if draw.chance(FILAMENTS) {
+            filaments(&mut mean, size, draw);
         }
         border(&mut mean, size, draw);
         let mut bright = vec![0.0; size * size];

@@ -8,6 +8,7 @@ pub mod judging;
 
 mod cluttered;
 mod draw;
+mod labelled;
 mod painted;
 mod recipes;
 mod repeated;
@@ -16,6 +17,7 @@ mod sea;
 mod targets;
 mod training;
 
+pub use labelled::LabelledImages;
 pub use painted::Painted;
 pub use recipes::ImageRecipe;
 pub use repeated::Repeated;

@@ -51,7 +51,7 @@ impl Source for Painted {
 }
 
 /// The label of a wake without a ship.
-fn label(wake: &Wake, size: usize) -> LabelledShip {
+pub(super) fn label(wake: &Wake, size: usize) -> LabelledShip {
     let corners = wake.oriented_box().map(|corner| corner.map(f64::from));
     let inside = wake
         .tip

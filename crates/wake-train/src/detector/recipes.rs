@@ -20,11 +20,13 @@ pub enum ImageRecipe {
     Echo,
     /// The same, and the edges of the turbulent wake
     Edge,
-    /// The recipe detector: all that, gusts, swell, slicks, shallow water, several ships
+    /// The recipe satellites: all that, gusts, swell, slicks, shallow water, several ships
+    Satellites,
+    /// The recipe detector: the same as it is passed on, with mottle, breaking waves, turns, and wakes that the wind wipes out
     Detector,
-    /// The same, clear wakes more often, under painted land, piers, streaks, fronts and borders
+    /// The recipe detector, clear wakes more often, under painted land, piers, streaks, fronts, filaments and borders
     Cluttered,
-    /// The recipe detector, drawn by the wake model
+    /// The recipe satellites, drawn by the wake model
     Sampled,
     /// Painted and simulated images (detector) in turn
     #[default]
@@ -33,7 +35,7 @@ pub enum ImageRecipe {
     Full,
 }
 
-/// What the recipe detector is without gusts, swell, slicks, shallow water and a second ship.
+/// What the recipe satellites is without gusts, swell, slicks, shallow water and a second ship.
 const CALM: [&str; 5] = [
     "draw.count = { one_of = [0, 1], weights = [1, 4] }",
     "draw.sea.gust_strength = 0",
@@ -54,11 +56,12 @@ const PLAIN: [&str; 5] = [
 
 impl ImageRecipe {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Painted,
         Self::Plain,
         Self::Echo,
         Self::Edge,
+        Self::Satellites,
         Self::Detector,
         Self::Cluttered,
         Self::Sampled,
@@ -74,6 +77,7 @@ impl ImageRecipe {
             Self::Plain => "plain",
             Self::Echo => "echo",
             Self::Edge => "edge",
+            Self::Satellites => "satellites",
             Self::Detector => "detector",
             Self::Cluttered => "cluttered",
             Self::Sampled => "sampled",
@@ -94,13 +98,16 @@ impl ImageRecipe {
                 "Simulated: several sensors with their response and noise, and the ship's echo"
             }
             Self::Edge => "The same, and the edges of the turbulent wake",
+            Self::Satellites => {
+                "The recipe satellites: all that, gusts, swell, slicks, shallow water, several ships"
+            }
             Self::Detector => {
-                "The recipe detector: all that, gusts, swell, slicks, shallow water, several ships"
+                "The recipe detector: the same as it is passed on, with mottle, breaking waves, turns, and wakes that the wind wipes out"
             }
             Self::Cluttered => {
-                "The same, clear wakes more often, under painted land, piers, streaks, fronts and borders"
+                "The recipe detector, clear wakes more often, under painted land, piers, streaks, fronts, filaments and borders"
             }
-            Self::Sampled => "The recipe detector, drawn by the wake model",
+            Self::Sampled => "The recipe satellites, drawn by the wake model",
             Self::Mixed => "Painted and simulated images (detector) in turn",
             Self::Full => "Painted and simulated images (cluttered) in turn",
         }
@@ -123,20 +130,25 @@ impl ImageRecipe {
             Self::Plain => [&CALM, &NO_EDGE, &PLAIN],
             Self::Echo => [&CALM, &NO_EDGE, &[]],
             Self::Edge => [&CALM, &[], &[]],
-            Self::Detector => [&[]; 3],
+            Self::Satellites => [&[]; 3],
+            Self::Detector => {
+                return Ok(Arc::new(simulated(Recipe::detector()?, &[], seed, size)?));
+            }
             Self::Cluttered => {
-                return Ok(Arc::new(Cluttered::new(simulated(&[], seed, size)?)));
+                let scenes = simulated(Recipe::detector()?, &[], seed, size)?;
+                return Ok(Arc::new(Cluttered::new(scenes)));
             }
             Self::Painted => return Ok(Arc::new(Painted { seed, size })),
             Self::Sampled => {
                 let sampler = WakeSampler::pretrained(device)?;
-                let scenes = simulated(&[], seed, size)?;
+                let scenes = simulated(Recipe::satellites()?, &[], seed, size)?;
                 return Ok(Arc::new(Sampled::new(sampler, scenes)?));
             }
             Self::Mixed => return in_turn([Self::Painted, Self::Detector], seed, size, device),
             Self::Full => return in_turn([Self::Painted, Self::Cluttered], seed, size, device),
         };
-        Ok(Arc::new(simulated(&changes.concat(), seed, size)?))
+        let recipe = Recipe::satellites()?;
+        Ok(Arc::new(simulated(recipe, &changes.concat(), seed, size)?))
     }
 
     /// Images of the open sea of the recipe detector, or of plain pixels: without ships and slicks.
@@ -151,7 +163,27 @@ impl ImageRecipe {
         };
         let empty = ["draw.count = 0", "draw.sea.slick_damping = 0"];
         let changes = [&changes.concat()[..], &empty].concat();
-        Ok(Arc::new(simulated(&changes, seed, size)?))
+        Ok(Arc::new(simulated(
+            Recipe::satellites()?,
+            &changes,
+            seed,
+            size,
+        )?))
+    }
+
+    /// The sea of the recipe detector without ships, with its gusts, swell and slicks.
+    ///
+    /// # Errors
+    ///
+    /// Of the recipe.
+    pub fn empty_sea(seed: u64, size: usize) -> wake_dataset::Result<Arc<dyn Source>> {
+        let recipe = Recipe::detector()?;
+        Ok(Arc::new(simulated(
+            recipe,
+            &["draw.count = 0"],
+            seed,
+            size,
+        )?))
     }
 }
 
@@ -169,9 +201,14 @@ fn in_turn(
     )?))
 }
 
-/// The recipe detector with changes.
-fn simulated(changes: &[&str], seed: u64, size: usize) -> wake_dataset::Result<Simulated> {
+/// A recipe with changes.
+fn simulated(
+    recipe: Recipe,
+    changes: &[&str],
+    seed: u64,
+    size: usize,
+) -> wake_dataset::Result<Simulated> {
     let pixels = ["rows", "columns"].map(|side| format!("scene.grid.{side} = {size}"));
-    let recipe = Recipe::detector()?.with_assignments(&pixels)?;
+    let recipe = recipe.with_assignments(&pixels)?;
     Simulated::new(recipe.with_assignments(changes)?, seed)
 }

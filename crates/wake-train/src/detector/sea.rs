@@ -205,6 +205,30 @@ fn slick(mean: &mut [f32], size: usize, draw: &mut Draw) {
     }
 }
 
+/// Dark filaments that wind around eddies, as films gather in weak wind: level lines of smooth noise, some of them beside
+/// each other. Each is as narrow and as dark as the line of a wake, and none is straight for long.
+pub(crate) fn filaments(mean: &mut [f32], size: usize, draw: &mut Draw) {
+    let (period, width) = (draw.scale(25.0, 110.0), draw.scale(1.0, 3.5));
+    let (depth, count) = (draw.between(0.12, 0.45), 1 + draw.one_of(&[0.3, 0.4, 0.3]));
+    let field = smooth(size, period, draw);
+    let strength = smooth(size, 1.5 * period, draw);
+    let levels: Vec<f32> = (0..count).map(|_| 0.8 * draw.normal()).collect();
+    for i in 0..size * size {
+        let (row, column) = (i / size, i % size);
+        let next = |step: usize, last: bool| match last {
+            true => field[i] - field[i - step],
+            false => field[i + step] - field[i],
+        };
+        let slope = next(1, column + 1 == size).hypot(next(size, row + 1 == size));
+        // Some places of a filament are hardly to be seen.
+        let here = depth / (1.0 + (-2.0 * strength[i]).exp());
+        for level in &levels {
+            let off = (field[i] - level) / (slope.max(0.2 / period) * width);
+            mean[i] *= 1.0 - here * (-0.5 * off * off).exp();
+        }
+    }
+}
+
 /// Calls `f` with every pixel within `radius` of a place, and how far right and down of it the pixel is.
 fn around(size: usize, [x, y]: [f32; 2], radius: f32, mut f: impl FnMut(usize, f32, f32)) {
     let bounds = |centre: f32| {
@@ -417,6 +441,19 @@ pub(crate) fn quick_look(mut amplitude: Vec<f32>, draw: &mut Draw) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Filaments darken, by no more than their depth each, and only near their lines.
+    #[test]
+    fn filaments_are_dark_and_narrow() {
+        let size = 128;
+        for seed in 0..8 {
+            let mut mean = vec![1.0f32; size * size];
+            filaments(&mut mean, size, &mut Draw::new(seed, 1));
+            assert!(mean.iter().all(|m| (0.16..=1.0).contains(m)));
+            let dark = mean.iter().filter(|m| **m < 0.95).count();
+            assert!(dark < size * size / 2, "{seed}: {dark}");
+        }
+    }
 
     /// Variance 1 and the lag-1 correlation exp(−1/4s²) of a Gaussian filter, each within five standard errors.
     #[test]

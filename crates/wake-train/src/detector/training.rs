@@ -12,6 +12,7 @@ use wake_nn::weights::{Layout, Precision, load, save_as};
 use whole_files::fingerprint;
 
 use super::draw::Draw;
+use super::labelled::{self, LabelledImages};
 use super::recipes::ImageRecipe;
 use super::repeated::Repeated;
 use super::sample::Sample;
@@ -114,6 +115,8 @@ impl Task<Network> for DetectorTask {
 pub struct DetectorTraining {
     /// What the images show.
     pub recipe: ImageRecipe,
+    /// Labelled images instead of those of the recipe.
+    pub labelled: Option<LabelledImages>,
     /// Different images, which come again when all were seen; `None`: all are different.
     pub distinct: Option<usize>,
     /// Weights to begin with; `None`: random ones.
@@ -135,7 +138,10 @@ impl DetectorTraining {
         let options = &self.options;
         let constants = self.constants()?;
         let device = options.device();
-        let source = self.recipe.source(options.seed, SIZE, &device)?;
+        let source: Arc<dyn Source> = match &self.labelled {
+            Some(images) => Arc::new(labelled::source(images, options.seed, SIZE)?),
+            None => self.recipe.source(options.seed, SIZE, &device)?,
+        };
         let source: Arc<dyn Source> = match self.distinct {
             Some(count) => Arc::new(Repeated::new(source, count)),
             None => source,
@@ -188,6 +194,9 @@ impl DetectorTraining {
         constants.identity = json!({
             "recipe": self.recipe.name(), "distinct": self.distinct, "weights": weights,
         });
+        if let Some(LabelledImages { without, count, .. }) = &self.labelled {
+            constants.identity["labelled"] = json!({"without": without, "count": count});
+        }
         Ok(constants)
     }
 }

@@ -1,7 +1,6 @@
 //! Sums of plane waves: sea, swell and wake.
 
-use super::RUNS;
-use super::oracle::{WHOLE, pixels, row};
+use super::oracle::{RUNS, WHOLE, pixels, row};
 use super::surface::{TRANSFER, spectrum, wake};
 use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use wake_physics::surface::Surface;
@@ -9,7 +8,7 @@ use wake_physics::swell::Swell;
 use wake_physics::waves::{PlaneWaves, Quantity, harmonic_sum};
 use wake_physics::{Field, Raster, reference};
 
-/// Waves of sea and wake: the paper's scale.
+/// Waves of sea and wake that the harmonic sum adds: chosen.
 const WAVES: usize = 10_000;
 /// Rows of a matrix product on a large raster, scaled up.
 const PRODUCT_ROWS: usize = 48;

@@ -1,7 +1,7 @@
 //! `wake evaluate detector`: how well wakes are found in simulated images that were held out, and in real tiles.
 
-mod real;
-mod real_sea;
+pub(crate) mod real;
+pub(crate) mod real_sea;
 mod recall;
 mod report;
 
@@ -11,10 +11,11 @@ use image::RgbImage;
 use wake_detector::drawing::sheet;
 use wake_detector::{Finder, Radon};
 use wake_train::detector::ImageRecipe;
-use wake_train::detector::judging::{Searched, compared};
+use wake_train::detector::judging::{Searched, Tile, compared};
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};
+use real_sea::HELD_OUT;
 use recall::{by_scene, by_visibility};
 use report::Report;
 
@@ -33,6 +34,9 @@ pub(crate) struct Options {
     /// Weights of another run, as a row of the table of what transfer needs; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = rung)]
     rung: Vec<(String, PathBuf)>,
+    /// Runs that each left a tile out, as rows of the real tiles: TILE by DIR/TILE/detector.safetensors; may be repeated
+    #[arg(long, value_name = "NAME=DIR", value_parser = rung, requires = "real")]
+    left_out: Vec<(String, PathBuf)>,
     /// flex, ndarray, wgpu or cuda, where compiled in
     #[arg(long, default_value = "flex")]
     device: String,
@@ -53,8 +57,6 @@ fn rung(text: &str) -> Result<(String, PathBuf), String> {
     }
 }
 
-/// Seed of held-out images: no run trains on it.
-pub(crate) const HELD_OUT: u64 = 900_001;
 /// Rows and columns of a simulated image.
 pub(crate) const SIZE: usize = 512;
 /// Scores below this are no part of any curve.
@@ -98,13 +100,26 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         ..Report::default()
     };
     let mut speeds = String::new();
-    for recipe in [ImageRecipe::Detector, ImageRecipe::Painted] {
+    for recipe in [
+        ImageRecipe::Satellites,
+        ImageRecipe::Detector,
+        ImageRecipe::Painted,
+    ] {
         speeds.push_str(&simulated(&finders, recipe, options, &mut report)?);
     }
     for (name, finder) in &finders {
         if !tiles.is_empty() {
-            real::judge(name, finder.as_ref(), &tiles, &options.out, &mut report)?;
+            real::judge(name, |_| finder.as_ref(), &tiles, &options.out, &mut report)?;
         }
+    }
+    for (name, runs) in &options.left_out {
+        let of_tile = |tile: &Tile| {
+            let folder = runs.join(Path::new(&tile.name).with_extension(""));
+            network(Some(&folder.join("detector.safetensors")))
+        };
+        let finders: Vec<Box<dyn Finder>> = tiles.iter().map(of_tile).collect::<Outcome<_>>()?;
+        let finder = |n: usize| finders[n].as_ref();
+        real::judge(name, finder, &tiles, &options.out, &mut report)?;
     }
     if !sea.is_empty() {
         report.sea = real_sea::told_apart(&sea)?;
@@ -134,7 +149,7 @@ fn simulated(
     bar.finish_and_clear();
     for (number, (name, _)) in finders.iter().enumerate() {
         report.add(recipe.name(), name, &searched.judged[number]);
-        if recipe == ImageRecipe::Detector {
+        if recipe != ImageRecipe::Painted {
             let set = format!("{}, above {CLEAR:.0} dB", recipe.name());
             report.add(&set, name, &searched.clear(number, CLEAR));
         }

@@ -21,15 +21,18 @@ pub(crate) fn tiles(folder: &Path) -> Outcome<Vec<Tile>> {
     })
 }
 
-/// Adds the rows of a finder, and draws every tile into the folder.
-pub(crate) fn judge(
+/// Adds the rows of a finder, or of one for each tile, and draws every tile into the folder.
+///
+/// - `finder`: of a tile by its number
+pub(crate) fn judge<'a>(
     name: &str,
-    finder: &dyn Finder,
+    finder: impl Fn(usize) -> &'a (dyn Finder + 'a) + Sync,
     tiles: &[Tile],
     out: &Path,
     report: &mut Report,
 ) -> Outcome<()> {
-    let found: Vec<Vec<Detection>> = tiles.par_iter().map(|t| finder.find(&t.image)).collect();
+    let search = |(n, tile): (usize, &Tile)| finder(n).find(&tile.image);
+    let found: Vec<Vec<Detection>> = tiles.par_iter().enumerate().map(search).collect();
     let searched = || tiles.iter().zip(&found);
     let clear: Vec<_> = searched()
         .map(|(t, found)| t.clear.with_found(found))

@@ -1,50 +1,13 @@
-//! What `report.json` holds, and the same as text.
+//! The report as text.
 
+mod contents;
 mod images;
 mod values;
 
 use super::options::Common;
-use super::schedulers::SchedulerRow;
-use super::timing::TimingRow;
 use crate::exit::{self, Outcome};
-use serde::Serialize;
-use wake_train::evaluation::Figures;
-
-/// Everything that `report.json` holds.
-#[derive(Debug, Serialize)]
-pub(crate) struct Report {
-    #[serde(flatten)]
-    pub(crate) figures: Figures,
-    /// Pixels along a side of the images, and their size [m].
-    pub(crate) pixels_along: usize,
-    pub(crate) spacing: f64,
-    /// Whether images are compared with speckle.
-    pub(crate) speckle: bool,
-    /// Ways of drawing with a text-to-image model.
-    pub(crate) schedulers: Vec<SchedulerRow>,
-    pub(crate) seconds: Vec<TimingRow>,
-    pub(crate) paper: Paper,
-}
-
-/// What the paper reports of its model.
-#[derive(Debug, Serialize)]
-pub(crate) struct Paper {
-    pub(crate) ssim: f64,
-    pub(crate) psnr_db: f64,
-    pub(crate) lpips: f64,
-    /// Seconds of an image of 256 × 256 pixels on an RTX 3090.
-    pub(crate) seconds_256: f64,
-    /// Times faster than its simulator, at most.
-    pub(crate) speed_up: f64,
-}
-
-pub(crate) const PAPER: Paper = Paper {
-    ssim: 0.17,
-    psnr_db: 12.57,
-    lpips: 0.57,
-    seconds_256: 1.49,
-    speed_up: 11.0,
-};
+use contents::{Paper, number};
+pub(crate) use contents::{PAPER, Report};
 
 /// The report in Markdown.
 fn markdown(report: &Report) -> String {
@@ -69,11 +32,6 @@ fn markdown(report: &Report) -> String {
     ];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
     parts.join("\n")
-}
-
-/// A number, or a dash.
-fn number(value: Option<f64>, digits: usize) -> String {
-    value.map_or("–".to_owned(), |v| format!("{v:.digits$}"))
 }
 
 fn seconds(report: &Report) -> String {

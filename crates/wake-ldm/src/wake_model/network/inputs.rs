@@ -132,7 +132,8 @@ fn is_even(scene: &Scene) -> bool {
 /// Whether the image expected of a scene depends on its seed: gusts, slicks and the points that echo are drawn.
 fn is_drawn(scene: &Scene) -> bool {
     let echoes = scene.ships.iter().any(|ship| ship.echo);
-    echoes || scene.sea.gust_strength > 0.0 || scene.sea.slick_damping > 0.0
+    let sea = &scene.sea;
+    echoes || sea.gust_strength > 0.0 || sea.mottle_strength > 0.0 || sea.slick_damping > 0.0
 }
 
 /// [`expected_grey`] of some scenes, on all cores; scenes that follow on their equal are imaged once.
@@ -218,6 +219,7 @@ mod tests {
         for (assignments, drawn) in [
             (vec![], false),
             (vec!["sea.gust_strength=0.1"], true),
+            (vec!["sea.mottle_strength=0.1"], true),
             (
                 vec![
                     "sea.slick_damping=0.5",

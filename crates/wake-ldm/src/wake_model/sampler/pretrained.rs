@@ -27,7 +27,23 @@ const fn weights(part: Part) -> &'static [u8] {
     }
 }
 
+/// The configuration of the model in this crate.
+const CONFIG: &str = include_str!("../../../assets/config.json");
+
 impl WakeSampler {
+    /// The files of the model in this crate, by their names; a folder of them is one for [`from_folder`](Self::from_folder).
+    #[must_use]
+    pub fn pretrained_files() -> [(&'static str, &'static [u8]); 5] {
+        let file = |part: Part| (part.file(), weights(part));
+        [
+            (WakeModelConfig::FILE, CONFIG.as_bytes()),
+            file(Part::Patches),
+            file(Part::Parser),
+            file(Part::Prior),
+            file(Part::Flow),
+        ]
+    }
+
     /// The model that lies in this crate.
     ///
     /// # Errors
@@ -60,8 +76,7 @@ impl WakeSampler {
 
 /// The model in this crate.
 pub(super) fn shipped(device: &Device) -> Result<(WakeModel, WakeModelConfig)> {
-    let config = include_str!("../../../assets/config.json");
-    let config = WakeModelConfig::from_json(config, Path::new(WakeModelConfig::FILE))?;
+    let config = WakeModelConfig::from_json(CONFIG, Path::new(WakeModelConfig::FILE))?;
     let model = config.init(device);
     let model = WakeModel {
         patches: embedded(model.patches, Part::Patches)?,

@@ -13,6 +13,7 @@ fn boat(heading: f64, radius: f64) -> KelvinWake {
         track: Track::turning([20.0, 40.0], heading, 0.0, radius.recip()),
         depth: f64::INFINITY,
         filter_depth: 4.0,
+        steepness: None,
     }
 }
 

@@ -3,7 +3,6 @@
 use image::RgbImage;
 
 use crate::detector::FOUND;
-use wake_detector::Detector;
 use wake_detector::GreyImage;
 use wake_detector::drawing::Drawing;
 use wake_detector::{Detection, Wake};
@@ -11,15 +10,14 @@ use wake_detector::{Detection, Wake};
 /// The colour of wakes that are known.
 const KNOWN: [u8; 3] = [0, 200, 0];
 
-/// An image with the wakes that are to be found in green, and in red and yellow what was found from
-/// [`Detector::OPERATING_POINT`] on.
+/// An image with the wakes that are to be found in green, and in red and yellow what was found with certainty
+/// ([`Detection::sure`]).
 #[must_use]
 pub fn compared(image: &GreyImage, wakes: &[Wake], found: &[Detection]) -> RgbImage {
     let mut drawing = Drawing::new(image);
     for wake in wakes.iter().filter(|wake| wake.snr >= FOUND) {
         drawing.ray(wake, KNOWN);
     }
-    let sure = |one: &&Detection| one.score >= Detector::OPERATING_POINT;
-    drawing.found(found.iter().filter(sure));
+    drawing.found(found.iter().filter(|one| one.sure));
     drawing.into_picture()
 }

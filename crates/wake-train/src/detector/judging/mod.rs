@@ -3,16 +3,24 @@
 //! ```text
 //! recipe ─► images with their wakes ─┐
 //! labels.json ─► tiles ──────────────┴─► finders ─► detections ─► judged images ─► curves
+//! sea without ships ─► detector ─► false alarms per 1,000 km²
+//! detections and what they turned out to be ─► probabilities and their reliability
 //! ```
 //!
 //! The rules and the curves are those of [`score`](wake_detector::score).
 
 mod compared;
+mod empty_sea;
 mod open_sea;
+mod outcomes;
+mod reliability;
 mod simulated;
 mod tiles;
 
 pub use compared::compared;
+pub use empty_sea::{EmptySea, score_for};
 pub use open_sea::{open_windows, paired_windows};
+pub use outcomes::{DetectionOutcome, KnownImages, Spacing, outcomes};
+pub use reliability::{Reliability, ReliabilityBin, bootstrap};
 pub use simulated::{Searched, known};
 pub use tiles::Tile;

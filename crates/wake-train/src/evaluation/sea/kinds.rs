@@ -12,7 +12,7 @@ use wake_dataset::{Grey, Recipe, Simulated};
 use wake_ldm::sea_texture::{SeaStyle, SeaTexture, WINDOW};
 use wake_nn::noise::NoiseSource;
 
-/// The open sea of the recipe detector.
+/// The open sea of a recipe.
 const OPEN_SEA: [&str; 4] = [
     "scene.grid.rows = 128",
     "scene.grid.columns = 128",
@@ -24,7 +24,7 @@ const LINEAR_GREY: f64 = 0.3;
 
 /// Every kind of sea by name, as many windows as there are pairs, in levels of 8 bits: the left windows themselves, the
 /// learnt sea of their styles and of its own, Gaussian noise of their correlations, white speckle of their looks, the
-/// simulated open sea of the recipe `detector`, and a linear sea under that recipe's speckle. What is drawn like a left
+/// simulated open sea of the recipe `satellites`, and a linear sea under that recipe's speckle. What is drawn like a left
 /// window has its median.
 ///
 /// - `seed`: of the first window of each kind
@@ -47,15 +47,10 @@ pub fn kinds(
     let told = draw(&|pair, seed| Ok(learnt.amplitude(&pair.style, seed, WINDOW, WINDOW)?))?;
     let gaussian = draw(&|pair, seed| Ok(gaussian_amplitude(&pair.style, seed)))?;
     let white = draw(&|pair, seed| Ok(white_speckle(&pair.left, seed)))?;
-    let recipe = Recipe::detector()?.with_assignments(&OPEN_SEA)?;
-    let source = Simulated::new(recipe, seed)?;
-    let indices = 0..pairs.len() as u64;
-    let simulated = indices
-        .clone()
-        .into_par_iter()
-        .map(|index| Ok(levels_of(&source.pair(index)?.image)));
-    let simulated: Vec<Field> = simulated.collect::<Result<_>>()?;
-    let linear = indices
+    let recipe = Recipe::satellites()?;
+    let simulated = simulated_seas(&recipe, pairs.len(), seed)?;
+    let source = Simulated::new(recipe.with_assignments(&OPEN_SEA)?, seed)?;
+    let linear = (0..pairs.len() as u64)
         .into_par_iter()
         .map(|index| linear(&source.scene(index)?));
     let linear: Vec<Field> = linear.collect::<Result<_>>()?;
@@ -66,9 +61,20 @@ pub fn kinds(
         ("learnt, its own styles", own),
         ("Gaussian noise, correlations of the left windows", gaussian),
         ("white speckle, looks of the left windows", white),
-        ("simulated (recipe detector)", simulated),
+        ("simulated (recipe satellites)", simulated),
         ("linear sea and the sensor's speckle", linear),
     ])
+}
+
+/// Windows of the open sea of a recipe, without ships and slicks, in levels of 8 bits as its images have them.
+///
+/// # Errors
+///
+/// As [`Simulated::pair`].
+pub fn simulated_seas(recipe: &Recipe, count: usize, seed: u64) -> Result<Vec<Field>> {
+    let source = Simulated::new(recipe.with_assignments(&OPEN_SEA)?, seed)?;
+    let window = |index| Ok(levels_of(&source.pair(index)?.image));
+    (0..count as u64).into_par_iter().map(window).collect()
 }
 
 /// Gaussian amplitude over its median, with the mean, the spread and the correlations of a style, cut at 0:

@@ -2,13 +2,17 @@
 //!
 //! ```text
 //! left half ─► what is learnt, styles and levels ─► kinds of sea ─┐
-//! right half ─► what all kinds stand against ─────────────────────┴─► rows
+//! right half ─► what all kinds stand against ─────────────────────┴─► rows, and a discriminant by groups of features
 //! ```
 
+mod discriminant;
+mod features;
 mod kinds;
 mod pair;
 mod row;
 
-pub use kinds::{gaussian_amplitude, kinds};
+pub use discriminant::{GroupAccuracy, discriminant};
+pub use features::{FeatureGroup, feature_groups, features};
+pub use kinds::{gaussian_amplitude, kinds, simulated_seas};
 pub use pair::SeaPair;
 pub use row::{SeaRow, mean_spectrum};

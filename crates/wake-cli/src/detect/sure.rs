@@ -1,0 +1,9 @@
+//! How sure a detection is, in words.
+
+/// The probability of a detection, or its score where none is known.
+pub(super) fn how_sure(probability: Option<f64>, score: f64) -> String {
+    match probability {
+        Some(probability) => format!("probability {probability:.2}"),
+        None => format!("score {score:.2}"),
+    }
+}

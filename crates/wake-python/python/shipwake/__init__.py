@@ -1,0 +1,50 @@
+"""Ship wakes in radar (SAR) images: simulated by physics, drawn from sentences by a small model, found by a small detector.
+
+>>> import shipwake
+>>> scene = shipwake.Scene(ship={"speed": 8}, sea={"wind_speed": 3}, grid={"rows": 128, "columns": 128})
+>>> image = shipwake.simulate(scene)
+>>> image.speckled.shape
+(128, 128)
+
+Numbers are in SI units, angles in degrees. x is ground range, away from the radar; y is azimuth, along the flight.
+Directions are clockwise from azimuth and say where a thing goes to.
+
+Long calls release the interpreter's lock and work on a pool of threads of their own (``threads=``). The package may be used
+after ``fork`` and ``spawn``.
+"""
+
+from . import errors
+from ._core import __version__
+from .dataset import CLASSES, Batch, Dataset, Item, merge_shards
+from .detector import Detection, Detector
+from .labels import Labels, Object
+from .plan import Plan, PlannedTerm
+from .product import Product
+from .sampler import Sample, Sampler
+from .scene import Scene
+from .simulation import FIELDS, Simulation, expected_intensity, simulate, simulate_batch
+
+__all__ = [
+    "CLASSES",
+    "FIELDS",
+    "Batch",
+    "Dataset",
+    "Detection",
+    "Detector",
+    "Item",
+    "Labels",
+    "Object",
+    "Plan",
+    "PlannedTerm",
+    "Product",
+    "Sample",
+    "Sampler",
+    "Scene",
+    "Simulation",
+    "__version__",
+    "errors",
+    "expected_intensity",
+    "merge_shards",
+    "simulate",
+    "simulate_batch",
+]

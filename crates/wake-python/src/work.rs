@@ -1,0 +1,71 @@
+//! Long calls: without the interpreter's lock, on a pool of this process, with panics as exceptions.
+
+use crate::error::{Fault, Outcome};
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// No pool has more threads.
+const MOST_THREADS: usize = 1024;
+
+/// The pools that one process made.
+struct Pools {
+    process: u32,
+    pools: Vec<Arc<ThreadPool>>,
+}
+
+static POOLS: Mutex<Pools> = Mutex::new(Pools {
+    process: 0,
+    pools: Vec::new(),
+});
+
+/// A pool of that many threads, one for each core where `None`, made once a process.
+///
+/// Called with the interpreter's lock, which a fork holds too: no child inherits the mutex locked. Of the pools that it inherits the
+/// threads do not exist; they are forgotten, since to drop them would speak to their threads.
+fn pool(_: Python<'_>, threads: Option<usize>) -> Outcome<Arc<ThreadPool>> {
+    let threads = match threads {
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+        Some(threads) => threads,
+    };
+    if !(1..=MOST_THREADS).contains(&threads) {
+        return Err(Fault::option(format!(
+            "threads is {threads}, outside [1, {MOST_THREADS}]"
+        )));
+    }
+    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if pools.process != process {
+        std::mem::forget(std::mem::take(&mut pools.pools));
+        pools.process = process;
+    }
+    let fits = |pool: &&Arc<ThreadPool>| pool.current_num_threads() == threads;
+    if let Some(pool) = pools.pools.iter().find(fits) {
+        return Ok(Arc::clone(pool));
+    }
+    let pool = ThreadPoolBuilder::new().num_threads(threads);
+    let pool = pool.thread_name(|n| format!("shipwake-{n}")).build();
+    let pool = Arc::new(pool.map_err(|error| {
+        Fault::option(format!(
+            "cannot start {threads} threads: {error}; use fewer threads"
+        ))
+    })?);
+    pools.pools.push(Arc::clone(&pool));
+    Ok(pool)
+}
+
+/// Runs work on a pool of `threads` threads, while other threads of Python go on.
+pub(crate) fn run<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    work: impl FnOnce() -> Outcome<T> + Send,
+) -> PyResult<T> {
+    let pool = pool(py, threads)?;
+    Ok(py.detach(|| caught(|| pool.install(work)))?)
+}
+
+/// Runs short work, with its panics as exceptions.
+pub(crate) fn caught<T>(work: impl FnOnce() -> Outcome<T>) -> Outcome<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(Fault::of_panic(&*panic)))
+}
