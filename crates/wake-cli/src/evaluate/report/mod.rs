@@ -6,8 +6,8 @@ mod values;
 
 use super::options::Common;
 use crate::exit::{self, Outcome};
-use contents::{Paper, number};
 pub(crate) use contents::{PAPER, Report};
+use contents::{Paper, number};
 
 /// The report in Markdown.
 fn markdown(report: &Report) -> String {
