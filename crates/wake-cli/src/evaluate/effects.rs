@@ -2,7 +2,7 @@
 //! drawn by a model.
 
 use crate::exit::Outcome;
-use wake_physics::picture::Picture;
+use crate::sheet::Picture;
 use wake_physics::{Field, Scene};
 use wake_train::evaluation::{Baseline, Evaluation, ImageSource, Told};
 
