@@ -14,8 +14,6 @@ mod sheet;
 mod simulate;
 
 #[cfg(feature = "prompt")]
-mod estimate;
-#[cfg(feature = "prompt")]
 mod prompt;
 
 #[cfg(feature = "dataset")]
@@ -66,8 +64,6 @@ enum Command {
     Simulate(simulate::Arguments),
     #[cfg(feature = "prompt")]
     Prompt(prompt::Arguments),
-    #[cfg(feature = "prompt")]
-    Estimate(estimate::Arguments),
     #[cfg(feature = "generate")]
     Generate(generate::Arguments),
     #[cfg(feature = "dataset")]
@@ -97,8 +93,6 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         #[cfg(feature = "prompt")]
         Command::Prompt(arguments) => prompt::run(&arguments),
-        #[cfg(feature = "prompt")]
-        Command::Estimate(arguments) => estimate::run(&arguments),
         #[cfg(feature = "generate")]
         Command::Generate(arguments) => generate::run(&arguments),
         #[cfg(feature = "dataset")]

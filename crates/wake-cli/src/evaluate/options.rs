@@ -1,6 +1,6 @@
 //! The command line, and what it names.
 
-use super::{calibration, detector, domain, estimate, pipeline, sea};
+use super::{calibration, detector, domain, pipeline, sea};
 use crate::exit::Outcome;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -56,7 +56,6 @@ pub(crate) enum Task {
     Sea(sea::Options),
     Detector(detector::Options),
     Calibration(calibration::Options),
-    Estimate(estimate::Options),
 }
 
 impl Common {

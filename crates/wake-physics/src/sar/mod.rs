@@ -17,7 +17,6 @@ pub mod scatterers;
 pub mod speckle;
 
 mod imaging;
-pub(crate) mod smooth;
 mod taps;
 
 pub use coherence::AzimuthResolution;
