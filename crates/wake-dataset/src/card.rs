@@ -121,11 +121,14 @@ fn front(manifest: &Manifest, of: CardOf, license: &str) -> String {
         "---\nlicense: {license}\nlanguage:\n- en\npretty_name: Ship wakes in simulated radar images\ntask_categories:\n\
          - object-detection\n- text-to-image\ntags:\n- sar\n- radar\n- ship-wake\n- synthetic\nsize_categories:\n- {size}\n"
     );
-    if of == CardOf::WebDataset {
-        text += "configs:\n- config_name: default\n  data_files:\n  - split: train\n    path: train-*.tar\n";
-        if manifest.split_sizes()[1] > 0 {
-            text += "  - split: validation\n    path: validation-*.tar\n";
-        }
+    // Of a folder only these: more of its files are texts than images, which `datasets` would take it for.
+    text += "configs:\n- config_name: default\n  data_files:\n  - split: train\n";
+    text += match of {
+        CardOf::Folder => "    path:\n    - images/*.png\n    - metadata.jsonl\n",
+        CardOf::WebDataset => "    path: train-*.tar\n",
+    };
+    if of == CardOf::WebDataset && manifest.split_sizes()[1] > 0 {
+        text += "  - split: validation\n    path: validation-*.tar\n";
     }
     text += "dataset_info:\n  features:\n";
     text += &features(of);
@@ -144,7 +147,10 @@ fn features(of: CardOf) -> String {
         text.lines().map(|line| format!("{by}{line}\n")).collect()
     };
     match of {
-        CardOf::Folder => indented(&(field(("image", "image")) + &row), "  "),
+        CardOf::Folder => {
+            let checksum = field(("crc32", "string"));
+            indented(&(field(("image", "image")) + &row + &checksum), "  ")
+        }
         CardOf::WebDataset => {
             let row = field(("file_name", "string")) + &row;
             let outer = [
@@ -184,7 +190,7 @@ mod tests {
         for (of, extra) in [
             (
                 CardOf::Folder,
-                vec!["image", "bbox", "oriented", "categories"],
+                vec!["image", "crc32", "bbox", "oriented", "categories"],
             ),
             (
                 CardOf::WebDataset,
