@@ -42,7 +42,7 @@ impl Crate {
                 .collect();
             let stem = path.file_stem().map(text).expect("a name");
             module.pop();
-            if stem != "mod" && stem != "lib" {
+            if !["mod", "lib", "main"].contains(&stem.as_str()) {
                 module.push(stem);
             }
             (module, File::read(path))

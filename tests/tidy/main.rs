@@ -139,7 +139,7 @@ fn imports_point_up_the_lists() {
 #[test]
 fn no_files_import_each_other_in_a_circle() {
     let mut wrong = Vec::new();
-    for name in CRATES {
+    for name in CRATES.into_iter().chain(["wake-cli"]) {
         for circle in read(name).circles() {
             let files: Vec<String> = circle.iter().map(|module| module.join("/")).collect();
             wrong.push(format!("{name}: {}", files.join(", ")));

@@ -44,7 +44,7 @@ mod gallery;
 
 mod shell;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Simulate, generate and find ship wakes in radar images.
@@ -104,7 +104,7 @@ fn main() -> ExitCode {
         Command::Bench(arguments) => bench::run(&arguments),
         #[cfg(feature = "bench")]
         Command::Gallery(arguments) => gallery::run(&arguments),
-        Command::Completions(arguments) => shell::completions(&arguments),
-        Command::Man(arguments) => shell::man(&arguments),
+        Command::Completions(arguments) => shell::completions(&arguments, Program::command()),
+        Command::Man(arguments) => shell::man(&arguments, Program::command()),
     })
 }

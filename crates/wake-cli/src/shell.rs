@@ -1,6 +1,6 @@
 //! `wake completions` and `wake man`: what a shell and a manual reader need of the command line.
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use std::path::PathBuf;
 
@@ -24,22 +24,17 @@ pub(crate) struct Man {
     out: PathBuf,
 }
 
-pub(crate) fn completions(arguments: &Completions) -> Outcome<()> {
+pub(crate) fn completions(arguments: &Completions, mut program: Command) -> Outcome<()> {
     let mut text = Vec::new();
-    clap_complete::generate(
-        arguments.shell,
-        &mut crate::Program::command(),
-        "wake",
-        &mut text,
-    );
+    clap_complete::generate(arguments.shell, &mut program, "wake", &mut text);
     exit::say(String::from_utf8(text)?.trim_end())?;
     Ok(())
 }
 
-pub(crate) fn man(arguments: &Man) -> Outcome<()> {
+pub(crate) fn man(arguments: &Man, program: Command) -> Outcome<()> {
     let out = &arguments.out;
     whole_files::make_folder(out)?;
-    clap_mangen::generate_to(crate::Program::command(), out)
+    clap_mangen::generate_to(program, out)
         .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     exit::say(&format!(
         "manual pages in {}; man -l {}/wake.1",

@@ -1,19 +1,15 @@
 //! The model: steps, batch size and rounded weights against many steps from the same noise.
 
-use super::model_row::ModelRow;
-use super::reference::Reference;
+use super::model_row::{ModelRow, REFERENCE, STEPS};
+use super::reference::{Reference, draw};
 use super::rounding::{Rounding, rounded};
 use super::row::seconds;
 use wake_ldm::WakeSampler;
 use wake_nn::burn::tensor::Device;
-use wake_physics::{Field, Scene};
+use wake_physics::Scene;
 
 use crate::exit::Outcome;
 
-/// Steps of the reference.
-pub(crate) const REFERENCE: usize = 100;
-/// Numbers of steps; each image alone, weights as they ship.
-pub(crate) const STEPS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 /// Images at a time, at the sampler's own number of steps.
 const BATCHES: [usize; 2] = [4, 16];
 
@@ -70,27 +66,4 @@ fn scenes(sampler: &WakeSampler) -> Vec<Scene> {
         scene
     };
     values.map(scene).to_vec()
-}
-
-/// Draws the scenes, again from the first where a batch has more; image k has the seed k, whatever the batch.
-pub(crate) fn draw(
-    sampler: &WakeSampler,
-    scenes: &[Scene],
-    batch: usize,
-) -> wake_ldm::Result<Vec<Field>> {
-    let count = scenes.len().max(batch);
-    let seeded = |(seed, scene): (u64, &Scene)| Scene {
-        seed,
-        ..scene.clone()
-    };
-    let all: Vec<Scene> = (0..)
-        .zip(scenes.iter().cycle().take(count))
-        .map(seeded)
-        .collect();
-    let mut images = Vec::with_capacity(count);
-    for scenes in all.chunks(batch) {
-        let drawn = sampler.sample_scenes(scenes)?;
-        images.extend(drawn.into_iter().map(|image| image.grey));
-    }
-    Ok(images)
 }

@@ -1,8 +1,12 @@
 //! What is told of the model: one row for each way to draw.
 
-use super::model::{REFERENCE, STEPS};
 use super::row::Row;
 use serde::Serialize;
+
+/// Steps of the reference.
+pub(crate) const REFERENCE: usize = 100;
+/// Numbers of steps; each image alone, weights as they ship.
+pub(crate) const STEPS: [usize; 6] = [1, 2, 3, 4, 8, 16];
 
 /// One way to draw images against the reference.
 #[derive(Debug, Clone, Serialize)]

@@ -1,6 +1,5 @@
 //! Images that the model draws in many steps, and others of the same noise beside them.
 
-use super::model::draw;
 use super::model_row::ModelRow;
 use super::row::{Errors, Row, median_seconds};
 use wake_ldm::WakeSampler;
@@ -92,4 +91,27 @@ impl Reference {
             .iter()
             .fold(0.0, |most, d| most.max(d.abs()))
     }
+}
+
+/// Draws the scenes, again from the first where a batch has more; image k has the seed k, whatever the batch.
+pub(crate) fn draw(
+    sampler: &WakeSampler,
+    scenes: &[Scene],
+    batch: usize,
+) -> wake_ldm::Result<Vec<Field>> {
+    let count = scenes.len().max(batch);
+    let seeded = |(seed, scene): (u64, &Scene)| Scene {
+        seed,
+        ..scene.clone()
+    };
+    let all: Vec<Scene> = (0..)
+        .zip(scenes.iter().cycle().take(count))
+        .map(seeded)
+        .collect();
+    let mut images = Vec::with_capacity(count);
+    for scenes in all.chunks(batch) {
+        let drawn = sampler.sample_scenes(scenes)?;
+        images.extend(drawn.into_iter().map(|image| image.grey));
+    }
+    Ok(images)
 }

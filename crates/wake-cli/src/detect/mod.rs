@@ -1,5 +1,6 @@
 //! `wake detect`: searches images, draws them with their wakes, and tells them as JSON; of products as a map.
 
+mod arguments;
 mod product;
 
 use std::fmt::Write;
@@ -15,47 +16,8 @@ use whole_files::make_folder;
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};
-
-/// How wakes are looked for.
-#[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
-enum Method {
-    /// The trained network
-    Network,
-    /// A normalised Radon transform around bright targets and over the whole image
-    Radon,
-}
-
-/// Find ship wakes in radar images.
-#[derive(clap::Args, Debug, Clone)]
-pub(crate) struct Arguments {
-    /// Images (PNG, JPEG or TIFF, grey, 8 or 16 bits) or folders of them, whose *.wakes.png are left out; or one satellite
-    /// product: a Sentinel-1 .SAFE folder or .zip, or a GeoTIFF
-    #[arg(required = true, value_name = "FILE|DIR")]
-    images: Vec<PathBuf>,
-    /// Pixel spacing [m]; without it the scale comes from the image
-    #[arg(long, value_parser = named::spacing)]
-    spacing: Option<f32>,
-    /// How wakes are looked for
-    #[arg(long, value_enum, default_value_t = Method::Network)]
-    method: Method,
-    /// Weights of the network, by default those in the repository
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
-    /// Least score that is told, 0 to 1; from 0.25 on there are few false alarms
-    #[arg(long, default_value_t = 0.03, value_parser = named::score)]
-    least_score: f32,
-    /// Print the wakes as JSON, and nothing else
-    #[arg(long)]
-    json: bool,
-    /// flex, ndarray, wgpu or cuda, where compiled in
-    #[arg(long, default_value = "flex")]
-    device: String,
-    /// Folder of the pictures, made if absent
-    #[arg(long, value_name = "DIR", default_value = "out/detect")]
-    out: PathBuf,
-    #[command(flatten)]
-    product: product::ProductArguments,
-}
+pub(crate) use arguments::Arguments;
+use arguments::Method;
 
 /// Prints every wake by tip, axis, half-angle, visible length and score, and draws the wakes of `NAME` into `NAME.wakes.png`
 /// in `--out`. Files of a folder that cannot be read are named, and the others are searched.

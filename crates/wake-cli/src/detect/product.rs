@@ -12,30 +12,9 @@ use wake_geo::{Land, LandMask, Product, Values};
 use wake_map::{MappedWake, Search, csv, geojson, html, mapped, search};
 use whole_files::{make_folder, write_atomically, write_json};
 
-use super::Arguments;
+use super::arguments::{Arguments, ProductArguments};
 use crate::exit::{self, Outcome};
 use crate::{named, progress};
-
-/// What is asked for of a product.
-#[derive(clap::Args, Debug, Clone)]
-#[command(next_help_heading = "Products")]
-pub(crate) struct ProductArguments {
-    /// Also write the wakes as GeoJSON to this file
-    #[arg(long, value_name = "FILE")]
-    geojson: Option<PathBuf>,
-    /// Polygons of land (GeoJSON), in the place of the built-in coast of Natural Earth
-    #[arg(long, value_name = "FILE")]
-    land: Option<PathBuf>,
-    /// Search land, too
-    #[arg(long, conflicts_with = "land")]
-    no_land: bool,
-    /// Sea closer to land than this is left out [m]
-    #[arg(long, value_name = "N", default_value_t = 1000.0)]
-    coast: f64,
-    /// VV, HH, VH or HV, by default the first of these that the product has
-    #[arg(long, value_parser = crate::locate::polarization)]
-    polarization: Option<wake_geo::Polarization>,
-}
 
 /// Longest side of the quick-look \[pixels\].
 const LONGEST: usize = 1600;

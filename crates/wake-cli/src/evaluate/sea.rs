@@ -4,14 +4,13 @@ use std::path::{Path, PathBuf};
 
 use crate::sheet::Picture;
 use clap::Args;
-use serde::Serialize;
 use wake_ldm::sea_texture::{SeaTexture, WINDOW};
 use wake_nn::device_named;
 use wake_physics::Field;
 use wake_train::evaluation::sea::{SeaPair, SeaRow, gaussian_amplitude, kinds, mean_spectrum};
 use wake_train::{TwoSampleOptions, classifier_two_sample_test};
 
-use super::sea_report;
+use super::sea_report::{SeaReport, markdown};
 use crate::exit::{self, Outcome};
 use crate::progress;
 use crate::sea_images::{Half, list};
@@ -42,16 +41,6 @@ pub(crate) struct Options {
     /// Print the report as JSON on standard output, and nothing else
     #[arg(long)]
     json: bool,
-}
-
-/// Everything that `report.json` holds.
-#[derive(Debug, Serialize)]
-pub(crate) struct SeaReport {
-    pub(crate) images: usize,
-    /// Windows of each kind.
-    pub(crate) windows: usize,
-    /// The right halves first.
-    pub(crate) rows: Vec<SeaRow>,
 }
 
 pub(crate) fn run(options: &Options) -> Outcome<()> {
@@ -94,7 +83,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         windows: pairs.len(),
         rows,
     };
-    let text = sea_report::markdown(&report);
+    let text = markdown(&report);
     whole_files::write_json(&options.out.join("report.json"), &report)?;
     whole_files::write_atomically(&options.out.join("report.md"), text.as_bytes())?;
     picture(&learnt, &options.out.join("learned_sea.png"))?;

@@ -1,8 +1,18 @@
 //! The report of seas as text.
 
-use super::sea::SeaReport;
+use serde::Serialize;
 use wake_train::TwoSample;
 use wake_train::evaluation::sea::SeaRow;
+
+/// Everything that `report.json` holds.
+#[derive(Debug, Serialize)]
+pub(crate) struct SeaReport {
+    pub(crate) images: usize,
+    /// Windows of each kind.
+    pub(crate) windows: usize,
+    /// The right halves first.
+    pub(crate) rows: Vec<SeaRow>,
+}
 
 /// The report in Markdown.
 pub(crate) fn markdown(report: &SeaReport) -> String {

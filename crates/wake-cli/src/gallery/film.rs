@@ -1,6 +1,6 @@
 //! Twenty seconds of a wake: the water beside its radar image.
 
-use super::stages::signed;
+use super::levels::signed;
 use crate::exit::Outcome;
 use crate::sheet::Picture;
 use gif::{Encoder, EncodingError, Frame, Repeat};

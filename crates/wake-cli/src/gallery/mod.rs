@@ -1,6 +1,7 @@
 //! `wake gallery`: the pictures of the documentation: the gallery, the stages from hull to image, and twenty seconds of a wake.
 
 mod film;
+mod levels;
 mod stages;
 
 use crate::sheet::Picture;
@@ -10,11 +11,11 @@ use wake_detector::drawing::Drawing;
 use wake_detector::{Detector, GreyImage};
 use wake_ldm::WakeSampler;
 use wake_nn::device_named;
-use wake_physics::grey::GreyScale;
-use wake_physics::{Field, Scene, Simulation, simulate};
+use wake_physics::{Scene, Simulation, simulate};
 
 use crate::exit::{self, Outcome};
 use crate::progress;
+use levels::filling;
 
 /// Draw the pictures of the documentation.
 #[derive(Args)]
@@ -101,13 +102,6 @@ fn labelled(simulation: &Simulation) -> Picture {
         Picture::from_levels(&filling(&simulation.speckled), simulation.raster.columns);
     picture.draw_labels(&simulation.labels);
     picture
-}
-
-/// Levels that fill their range.
-fn filling(field: &Field) -> Vec<u8> {
-    let grey = GreyScale::filling(field);
-    let level = |&value: &f32| grey.level(f64::from(value));
-    field.values.iter().map(level).collect()
 }
 
 /// What the detector finds in a simulated image.

@@ -1,15 +1,8 @@
 //! The stages from hull to image, a panel each.
 
-use super::filling;
+use super::levels::{filling, signed};
 use crate::sheet::Picture;
 use wake_physics::{Field, Result, Scene, simulate};
-
-/// Levels of a field with sign: grey is zero, black and white are three standard deviations.
-pub(crate) fn signed(field: &Field) -> Vec<u8> {
-    let scale = 3.0 * field.rms().max(1e-9);
-    let level = |&value: &f32| (127.5 * (1.0 + f64::from(value) / scale)).clamp(0.0, 255.0) as u8;
-    field.values.iter().map(level).collect()
-}
 
 /// Eight panels, four in a row.
 pub(crate) fn sheet() -> Result<Picture> {

@@ -12,7 +12,8 @@ use wake_nn::burn::tensor::Tensor;
 use wake_nn::device_named;
 use wake_physics::Scene;
 
-use super::{Arguments, finish, numbered, prompt, scene};
+use super::arguments::Arguments;
+use super::results::{finish, numbered};
 use crate::exit::Outcome;
 use crate::progress;
 
@@ -22,8 +23,8 @@ const STEPS: usize = 50;
 const GUIDANCE: f64 = 7.5;
 
 pub(crate) fn run(arguments: &Arguments, weights: &Path) -> Outcome<()> {
-    let scene = scene(arguments, Scene::default)?;
-    let prompt = prompt(arguments, scene.as_ref())?;
+    let scene = arguments.scene(Scene::default)?;
+    let prompt = arguments.prompt(scene.as_ref())?;
     let device = device_named(&arguments.device)?;
     let begin = Instant::now();
     let pipeline = Pipeline::load(weights, &device)?;

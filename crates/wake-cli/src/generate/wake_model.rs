@@ -12,7 +12,8 @@ use wake_nn::device_named;
 use wake_physics::{Scene, output};
 use wake_text::Reading;
 
-use super::{Arguments, finish, numbered, prompt, scene};
+use super::arguments::Arguments;
+use super::results::{finish, numbered};
 use crate::exit::{self, Outcome};
 
 /// Images in a row of the contact sheet.
@@ -33,8 +34,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         sampler = sampler.with_sea(SeaTexture::load(file, &device)?)?;
     }
     let load = begin.elapsed().as_secs_f64();
-    let scene = scene(arguments, || sampler.base_scene())?;
-    let prompt = prompt(arguments, scene.as_ref())?;
+    let scene = arguments.scene(|| sampler.base_scene())?;
+    let prompt = arguments.prompt(scene.as_ref())?;
     let reading = Reading::of(&prompt)?;
     let (count, seed) = (arguments.count, arguments.seed);
     // All images as one batch.

@@ -1,53 +1,66 @@
 //! Pairs to learn from, on disk or simulated.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
 use wake_dataset::{Folder, Recipe};
 use wake_ldm::network::WakeModelConfig;
 use wake_physics::available_memory;
 use wake_train::TrainingPairs;
 
-use super::wake_model::Options;
 use crate::exit::Outcome;
 
-/// The pairs of --data, or those of --recipe.
-pub(crate) fn pairs(options: &Options) -> Outcome<TrainingPairs> {
-    if let Some(path) = &options.data {
-        return Ok(TrainingPairs::folder(folder(path)?));
-    }
-    let recipe = Recipe::named_or_read(&options.recipe)?;
-    Ok(TrainingPairs::simulated(
-        recipe,
-        options.place.seed,
-        options.count,
-    )?)
+/// Where pairs come from.
+#[derive(Args, Clone)]
+pub(crate) struct Pairs {
+    /// Folder that `wake dataset` wrote; without it, pairs are simulated first
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// paper, ranges, detector or model, or a recipe file: the pairs to simulate where there is no --data
+    #[arg(long, default_value = "model", conflicts_with = "data")]
+    recipe: String,
+    /// Pairs to simulate where there is no --data
+    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
+    count: u64,
 }
 
-/// The same for a model: of --data every scene must fit it, and what is simulated has its size and grey.
-pub(crate) fn fitting(options: &Options, config: &WakeModelConfig) -> Outcome<TrainingPairs> {
-    let Some(path) = &options.data else {
-        let mut recipe = Recipe::named_or_read(&options.recipe)?;
-        recipe.scene.grid.rows = config.image_size;
-        recipe.scene.grid.columns = config.image_size;
-        recipe.grey = config.grey;
-        let (seed, count) = (options.place.seed, options.count);
-        return Ok(TrainingPairs::simulated(recipe, seed, count)?);
-    };
-    let folder = folder(path)?;
-    let (found, grey) = (folder.manifest().grey, config.grey);
-    if found != grey {
-        return Err(format!(
-            "--data {}: grey is {found:?}, but the model's is {grey:?}; make the set with the recipe's grey, or train \
-             another model in another --out",
-            path.display()
-        )
-        .into());
+impl Pairs {
+    /// The pairs of --data, or those of --recipe.
+    pub(crate) fn of(&self, seed: u64) -> Outcome<TrainingPairs> {
+        match &self.data {
+            Some(path) => Ok(TrainingPairs::folder(folder(path)?)),
+            None => {
+                let recipe = Recipe::named_or_read(&self.recipe)?;
+                Ok(TrainingPairs::simulated(recipe, seed, self.count)?)
+            }
+        }
     }
-    for (number, scene) in folder.scenes().enumerate() {
-        let told = |error| format!("--data {}: pair {number}: {error}", path.display());
-        config.check_scene(scene).map_err(told)?;
+
+    /// The same for a model: of --data every scene must fit it, and what is simulated has its size and grey.
+    pub(crate) fn fitting(&self, config: &WakeModelConfig, seed: u64) -> Outcome<TrainingPairs> {
+        let Some(path) = &self.data else {
+            let mut recipe = Recipe::named_or_read(&self.recipe)?;
+            recipe.scene.grid.rows = config.image_size;
+            recipe.scene.grid.columns = config.image_size;
+            recipe.grey = config.grey;
+            return Ok(TrainingPairs::simulated(recipe, seed, self.count)?);
+        };
+        let folder = folder(path)?;
+        let (found, grey) = (folder.manifest().grey, config.grey);
+        if found != grey {
+            return Err(format!(
+                "--data {}: grey is {found:?}, but the model's is {grey:?}; make the set with the recipe's grey, or train \
+                 another model in another --out",
+                path.display()
+            )
+            .into());
+        }
+        for (number, scene) in folder.scenes().enumerate() {
+            let told = |error| format!("--data {}: pair {number}: {error}", path.display());
+            config.check_scene(scene).map_err(told)?;
+        }
+        Ok(TrainingPairs::folder(folder))
     }
-    Ok(TrainingPairs::folder(folder))
 }
 
 /// A folder with pairs in it.

@@ -8,7 +8,7 @@ use wake_train::{StageOptions, WakeTraining};
 
 use super::options::{Place, Thrift};
 use super::screen::Screen;
-use super::source::{check_memory, fitting, pairs};
+use super::source::{Pairs, check_memory};
 use crate::exit::Outcome;
 
 /// Defaults of the options that all runs have.
@@ -37,15 +37,8 @@ pub(crate) struct Options {
     /// The part to train
     #[arg(value_enum, default_value_t = Trained::Flow)]
     part: Trained,
-    /// Folder that `wake dataset` wrote; without it, pairs are simulated first
-    #[arg(long, value_name = "DIR")]
-    pub(crate) data: Option<PathBuf>,
-    /// paper, ranges, detector or model, or a recipe file: the pairs to simulate where there is no --data
-    #[arg(long, default_value = "model", conflicts_with = "data")]
-    pub(crate) recipe: String,
-    /// Pairs to simulate where there is no --data
-    #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
-    pub(crate) count: u64,
+    #[command(flatten)]
+    pairs: Pairs,
     /// JSON file with the widths of the model [default: those of the model that ships]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -59,7 +52,7 @@ pub(crate) struct Options {
     #[arg(long)]
     rate: Option<f64>,
     #[command(flatten)]
-    pub(crate) place: Place,
+    place: Place,
     #[command(flatten)]
     thrift: Thrift,
 }
@@ -81,7 +74,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     let config = config(options)?;
     let pairs = match part {
         Part::Parser => None,
-        _ => Some(fitting(options, &config)?),
+        _ => Some(options.pairs.fitting(&config, options.place.seed)?),
     };
     if let (Some(pairs), Part::Prior | Part::Flow) = (&pairs, part) {
         check_memory(pairs.len(), WakeTraining::memory(&config, pairs.len()))?;
@@ -102,6 +95,6 @@ fn config(options: &Options) -> Outcome<WakeModelConfig> {
     };
     Ok(match file {
         Some(file) => WakeModelConfig::read(file)?,
-        None => pairs(options)?.model()?,
+        None => options.pairs.of(options.place.seed)?.model()?,
     })
 }

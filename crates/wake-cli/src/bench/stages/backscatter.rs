@@ -1,10 +1,9 @@
 //! σ⁰ of facets: a table against quadrature.
 
-use super::RUNS;
 use super::memo::Memo;
-use super::oracle::{QUADRATURES, row, sample};
+use super::oracle::{QUADRATURES, RUNS, at_pixels, sample};
 use super::surface::{INCIDENCE, fields, wake};
-use crate::bench::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Row, median_seconds, seconds};
 use wake_physics::scattering::{
     Backscatter, BackscatterTable, FacetFields, SlopeCovariance, Specular, TwoScale,
 };
@@ -43,29 +42,9 @@ fn backscatter_model(spacing: f64) -> Backscatter {
 pub(crate) fn backscatter(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Row {
     let slopes = fields(raster, &[Quantity::SlopeX, Quantity::SlopeY]);
     let facets = FacetFields::of_slopes(&slopes[0], &slopes[1]);
-    let model = backscatter_model(raster.spacing);
-    let mean: f64 = model.parts([0.0, 0.0]).iter().sum();
-    let (fast_seconds, sigma0) = median_seconds(RUNS, || {
-        let table = BackscatterTable::covering(model.clone(), &facets, tolerance * mean);
-        table.sigma0_field(&facets)
-    });
     // A sample on every raster, and the same for every tolerance.
     let pixels = sample(raster, QUADRATURES);
-    let scale = raster.len() as f64 / pixels.len() as f64;
-    let oracle = memo.at_size("backscatter", raster.rows, || {
-        let (seconds, exact) = seconds(|| model.sigma0_pixels(&facets, &pixels));
-        (seconds, exact.into_iter().map(f64::from).collect())
-    });
-    let values = pixels.iter().map(|&[i, j]| f64::from(sigma0.at(i, j)));
-    let errors = Errors::of(values, &oracle.1, sigma0.mean());
-    row(
-        "backscatter",
-        raster,
-        Some(tolerance),
-        fast_seconds,
-        (oracle.0 * scale, pixels.len()),
-        errors,
-    )
+    by_quadrature("backscatter", (raster, tolerance), &facets, &pixels, memo)
 }
 
 /// σ⁰ where waves of a ship roughen the sea that pixels do not carry: means over nodes of the table against quadrature over
@@ -89,28 +68,36 @@ pub(crate) fn unresolved(raster: &Raster, tolerance: f64, memo: &mut Memo) -> Ro
         subpixel_variances: Some(&variances),
         ..FacetFields::of_slopes(&slopes[0], &slopes[1])
     };
-    let model = backscatter_model(raster.spacing);
-    let mean: f64 = model.parts([0.0, 0.0]).iter().sum();
-    let (fast_seconds, sigma0) = median_seconds(RUNS, || {
-        BackscatterTable::covering(model.clone(), &facets, tolerance * mean).sigma0_field(&facets)
-    });
     let rough = |&[i, j]: &[usize; 2]| variances[0].at(i, j) + variances[2].at(i, j) > 0.0;
     let all = sample(raster, 16 * QUADRATURES);
     let pixels: Vec<_> = all.into_iter().filter(rough).take(QUADRATURES).collect();
-    let oracle = memo.at_size("unresolved", raster.rows, || {
-        let (seconds, exact) = seconds(|| model.sigma0_pixels(&facets, &pixels));
+    by_quadrature("unresolved", (raster, tolerance), &facets, &pixels, memo)
+}
+
+/// The table of some facets against quadrature at some pixels.
+fn by_quadrature(
+    stage: &'static str,
+    (raster, tolerance): (&Raster, f64),
+    facets: &FacetFields<'_>,
+    pixels: &[[usize; 2]],
+    memo: &mut Memo,
+) -> Row {
+    let model = backscatter_model(raster.spacing);
+    let mean: f64 = model.parts([0.0, 0.0]).iter().sum();
+    let (fast_seconds, sigma0) = median_seconds(RUNS, || {
+        BackscatterTable::covering(model.clone(), facets, tolerance * mean).sigma0_field(facets)
+    });
+    let known = memo.backscatter.entry((stage, raster.rows));
+    let (oracle, exact) = known.or_insert_with(|| {
+        let (seconds, exact) = seconds(|| model.sigma0_pixels(facets, pixels));
         (seconds, exact.into_iter().map(f64::from).collect())
     });
-    let values = pixels.iter().map(|&[i, j]| f64::from(sigma0.at(i, j)));
-    let errors = Errors::of(values, &oracle.1, sigma0.mean());
-    let scale = raster.len() as f64 / pixels.len() as f64;
-    let oracle = (oracle.0 * scale, pixels.len());
-    row(
-        "unresolved",
-        raster,
-        Some(tolerance),
-        fast_seconds,
-        oracle,
-        errors,
+    let fast = (fast_seconds, &sigma0);
+    at_pixels(
+        stage,
+        (raster, Some(tolerance)),
+        fast,
+        (*oracle, exact),
+        pixels,
     )
 }

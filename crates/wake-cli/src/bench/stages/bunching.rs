@@ -1,9 +1,8 @@
 //! Imaging of a moving sea: scattered kernels against the dense integral.
 
-use super::RUNS;
-use super::oracle::{pixels, row};
+use super::oracle::{RUNS, at_pixels, pixels};
 use super::surface::{INCIDENCE, fields};
-use crate::bench::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Row, median_seconds, seconds};
 use rayon::prelude::*;
 use wake_physics::Raster;
 use wake_physics::reference::DirectImage;
@@ -43,7 +42,7 @@ pub(crate) fn bunching(raster: &Raster, tolerance: f64) -> Row {
         resolution: AzimuthResolution::of_moving_sea(0.0312, 78.0, 3.0, 1, 0.2),
     };
     let (fast_seconds, image) = median_seconds(RUNS, || imaging.image(&sources, raster, tolerance));
-    let (pixels, scale) = pixels(raster);
+    let (pixels, _) = pixels(raster);
     let direct = DirectImage::new(&imaging, &sources, raster);
     let (oracle, exact) = seconds(|| {
         pixels
@@ -51,14 +50,6 @@ pub(crate) fn bunching(raster: &Raster, tolerance: f64) -> Row {
             .map(|&[i, j]| direct.at(i, j))
             .collect::<Vec<f64>>()
     });
-    let values = pixels.iter().map(|&[i, j]| f64::from(image.at(i, j)));
-    let errors = Errors::of(values, &exact, image.mean());
-    row(
-        "bunching",
-        raster,
-        Some(tolerance),
-        fast_seconds,
-        (oracle * scale, pixels.len()),
-        errors,
-    )
+    let (fast, place) = ((fast_seconds, &image), (raster, Some(tolerance)));
+    at_pixels("bunching", place, fast, (oracle, &exact), &pixels)
 }

@@ -1,7 +1,6 @@
 //! The edges of a turbulent wake against the integral over what their waves met.
 
-use super::RUNS;
-use super::oracle::{QUADRATURES, row, sample};
+use super::oracle::{QUADRATURES, RUNS, row, sample};
 use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use rayon::prelude::*;
 use wake_physics::scattering::breaking;

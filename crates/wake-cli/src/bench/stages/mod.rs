@@ -32,9 +32,6 @@ pub(crate) fn has_tolerance(stage: &str) -> bool {
     !["edge", "response"].contains(&stage)
 }
 
-/// Runs of a fast method, and of a short matrix product.
-pub(crate) const RUNS: usize = 5;
-
 /// Measures one stage.
 pub(crate) fn measure(
     stage: &'static str,

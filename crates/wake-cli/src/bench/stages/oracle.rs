@@ -3,8 +3,10 @@
 use crate::bench::row::{Errors, Row};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use wake_physics::Raster;
+use wake_physics::{Field, Raster};
 
+/// Runs of a fast method, and of a short matrix product.
+pub(crate) const RUNS: usize = 5;
 /// Pixels of the oracle where the whole raster takes too long.
 const SAMPLE: usize = 4_096;
 /// Pixels of the quadrature of σ⁰, which takes a millisecond each.
@@ -49,4 +51,19 @@ pub(crate) fn row(
         max_error: errors.max,
         rms_error: errors.rms,
     }
+}
+
+/// A row of a field against exact values at some of its pixels, relative to its mean.
+pub(crate) fn at_pixels(
+    stage: &'static str,
+    (raster, tolerance): (&Raster, Option<f64>),
+    (fast_seconds, fast): (f64, &Field),
+    (seconds, exact): (f64, &[f64]),
+    pixels: &[[usize; 2]],
+) -> Row {
+    let values = pixels.iter().map(|&[i, j]| f64::from(fast.at(i, j)));
+    let errors = Errors::of(values, exact, fast.mean());
+    let scale = raster.len() as f64 / pixels.len() as f64;
+    let oracle = (seconds * scale, pixels.len());
+    row(stage, raster, tolerance, fast_seconds, oracle, errors)
 }

@@ -1,9 +1,8 @@
 //! The image as a satellite delivers it: through its impulse response.
 
-use super::RUNS;
-use super::oracle::{QUADRATURES, row, sample};
+use super::oracle::{QUADRATURES, RUNS, at_pixels, sample};
 use super::surface::fields;
-use crate::bench::row::{Errors, Row, median_seconds, seconds};
+use crate::bench::row::{Row, median_seconds, seconds};
 use rayon::prelude::*;
 use wake_physics::sar::ImpulseResponse;
 use wake_physics::sar::impulse::{Axis, PointTarget, Reflectivity};
@@ -71,9 +70,6 @@ pub(crate) fn response(size: usize) -> Row {
         };
         pixels.par_iter().map(of_pixel).collect()
     });
-    let values = pixels.iter().map(|&[i, j]| f64::from(mean.at(i, j)));
-    let errors = Errors::of(values, &exact, mean.mean());
-    let scale = image.len() as f64 / pixels.len() as f64;
-    let oracle = (oracle * scale, pixels.len());
-    row("response", &image, None, fast_seconds, oracle, errors)
+    let (fast, place) = ((fast_seconds, &mean), (&image, None));
+    at_pixels("response", place, fast, (oracle, &exact), &pixels)
 }

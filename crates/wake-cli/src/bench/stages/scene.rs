@@ -1,8 +1,9 @@
 //! The whole simulation against the oracles of all stages.
 
-use super::RUNS;
+use std::collections::btree_map::Entry;
+
 use super::memo::Memo;
-use super::oracle::{row, sample};
+use super::oracle::{RUNS, row, sample};
 use crate::bench::row::{Errors, Row, median_seconds};
 use wake_physics::{Scene, direct_intensity, simulate};
 
@@ -21,7 +22,10 @@ pub(crate) fn scene(size: usize, tolerance: f64, memo: &mut Memo) -> wake_physic
     scene.model.tolerance = STRICTEST;
     let raster = fast.raster;
     let pixels = sample(&raster, scene_pixels(size));
-    let direct = memo.scene_at(size, || direct_intensity(&scene, &pixels))?;
+    let direct = match memo.scene.entry(size) {
+        Entry::Occupied(known) => known.into_mut(),
+        Entry::Vacant(new) => new.insert(direct_intensity(&scene, &pixels)?),
+    };
 
     let values = pixels.iter().map(|&[i, j]| fast.intensity.at(i, j).into());
     let errors = Errors::of(values, &direct.intensity, fast.intensity.mean());

@@ -1,7 +1,6 @@
 //! Sums of plane waves: sea, swell and wake.
 
-use super::RUNS;
-use super::oracle::{WHOLE, pixels, row};
+use super::oracle::{RUNS, WHOLE, pixels, row};
 use super::surface::{TRANSFER, spectrum, wake};
 use crate::bench::row::{Errors, Row, median_seconds, seconds};
 use wake_physics::surface::Surface;

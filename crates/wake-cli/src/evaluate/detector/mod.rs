@@ -15,6 +15,7 @@ use wake_train::detector::judging::{Searched, compared};
 
 use crate::exit::{self, Outcome};
 use crate::{named, picture, progress};
+use real_sea::HELD_OUT;
 use recall::{by_scene, by_visibility};
 use report::Report;
 
@@ -53,8 +54,6 @@ fn rung(text: &str) -> Result<(String, PathBuf), String> {
     }
 }
 
-/// Seed of held-out images: no run trains on it.
-pub(crate) const HELD_OUT: u64 = 900_001;
 /// Rows and columns of a simulated image.
 pub(crate) const SIZE: usize = 512;
 /// Scores below this are no part of any curve.

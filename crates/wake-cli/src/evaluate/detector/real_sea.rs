@@ -13,9 +13,10 @@ use wake_train::detector::ImageRecipe;
 use wake_train::detector::judging::{Tile, paired_windows};
 use wake_train::{TwoSampleOptions, classifier_two_sample_test};
 
-use super::HELD_OUT;
 use crate::exit::Outcome;
 
+/// Seed of held-out images: no run trains on it.
+pub(crate) const HELD_OUT: u64 = 900_001;
 /// Rows and columns of a window of open sea.
 const WINDOW: usize = 128;
 /// Windows of each half of a tile, at most.

@@ -1,6 +1,6 @@
 //! Figures of images: ablation, pixels, wake correlation.
 
-use super::{Report, number};
+use super::contents::{Report, number};
 
 /// Model over simulator.
 fn ratio(model: Option<f64>, simulator: Option<f64>) -> String {

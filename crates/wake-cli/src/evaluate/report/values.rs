@@ -1,6 +1,6 @@
 //! Figures of values that are read from the images.
 
-use super::{Report, number};
+use super::contents::{Report, number};
 use wake_train::evaluation::{AbsoluteErrors, MeasurementRow};
 
 fn errors(errors: &AbsoluteErrors) -> String {
