@@ -32,12 +32,22 @@ impl Options {
         self.left.remove(key).filter(|value| !value.is_null())
     }
 
+    /// Takes a value that `read` understands and that may be absent.
+    pub(crate) fn read<T>(
+        &mut self,
+        key: &str,
+        expected: &str,
+        read: impl Fn(&Value) -> Option<T>,
+    ) -> Result<Option<T>> {
+        let value = self.take(key);
+        let found =
+            value.map(|value| read(&value).ok_or_else(|| self.invalid(key, &value, expected)));
+        found.transpose()
+    }
+
     /// Takes a whole number, or the default where it is absent.
     pub(crate) fn usize(&mut self, key: &str, default: usize) -> Result<usize> {
-        match self.take(key) {
-            None => Ok(default),
-            Some(value) => as_usize(&value).ok_or_else(|| self.invalid(key, &value, "a count")),
-        }
+        Ok(self.read(key, "a count", count)?.unwrap_or(default))
     }
 
     /// Takes a number, or the default where it is absent.
@@ -47,32 +57,29 @@ impl Options {
 
     /// Takes a number that may be absent.
     pub(crate) fn optional_f64(&mut self, key: &str) -> Result<Option<f64>> {
-        match self.take(key) {
-            None => Ok(None),
-            Some(value) => match value.as_f64() {
-                Some(number) => Ok(Some(number)),
-                None => Err(self.invalid(key, &value, "a number")),
-            },
-        }
+        self.read(key, "a number", Value::as_f64)
     }
 
     /// Takes a truth value, or the default where it is absent.
     pub(crate) fn bool(&mut self, key: &str, default: bool) -> Result<bool> {
-        match self.take(key) {
-            None => Ok(default),
-            Some(value) => value
-                .as_bool()
-                .ok_or_else(|| self.invalid(key, &value, "true or false")),
-        }
+        let found = self.read(key, "true or false", Value::as_bool)?;
+        Ok(found.unwrap_or(default))
     }
 
-    /// Takes a text, or the default where it is absent.
-    pub(crate) fn string(&mut self, key: &str, default: &str) -> Result<String> {
-        match self.take(key) {
-            None => Ok(default.to_owned()),
-            Some(Value::String(text)) => Ok(text),
-            Some(value) => Err(self.invalid(key, &value, "a text")),
-        }
+    /// Takes one of some names, or the default where it is absent: what stands beside the name.
+    pub(crate) fn choice<T: Clone>(
+        &mut self,
+        key: &str,
+        default: &str,
+        known: &[(&str, T)],
+    ) -> Result<T> {
+        let name = self.read(key, "a text", text)?;
+        let name = name.unwrap_or_else(|| default.to_owned());
+        let found = known.iter().find(|(known, _)| *known == name);
+        found.map(|(_, value)| value.clone()).ok_or_else(|| {
+            let known: Vec<&str> = known.iter().map(|(known, _)| *known).collect();
+            self.unsupported(key, &name.into(), &known.join(", "))
+        })
     }
 
     /// Takes a list of counts; a single count stands for `length` equal ones.
@@ -82,36 +89,32 @@ impl Options {
         length: usize,
         default: usize,
     ) -> Result<Vec<usize>> {
-        let Some(value) = self.take(key) else {
-            return Ok(vec![default; length]);
+        let counts = |value: &Value| match count(value) {
+            Some(count) => Some(vec![count; length]),
+            None => list(value, count),
         };
-        if let Some(count) = as_usize(&value) {
-            return Ok(vec![count; length]);
-        }
-        let counts = value
-            .as_array()
-            .and_then(|list| list.iter().map(as_usize).collect());
-        counts.ok_or_else(|| self.invalid(key, &value, "a count or a list of counts"))
+        let found = self.read(key, "a count or a list of counts", counts)?;
+        Ok(found.unwrap_or_else(|| vec![default; length]))
     }
 
     /// Takes a list of counts that must be there.
     pub(crate) fn required_usizes(&mut self, key: &str) -> Result<Vec<usize>> {
-        let value = self.take(key).unwrap_or(Value::Null);
-        let counts = value
-            .as_array()
-            .and_then(|list| list.iter().map(as_usize).collect());
-        counts.ok_or_else(|| self.invalid(key, &value, "a list of counts"))
+        self.required(key, "a list of counts", |value| list(value, count))
     }
 
     /// Takes a list of texts that must be there.
     pub(crate) fn required_strings(&mut self, key: &str) -> Result<Vec<String>> {
-        let value = self.take(key).unwrap_or(Value::Null);
-        let texts = value.as_array().and_then(|list| {
-            list.iter()
-                .map(|text| text.as_str().map(str::to_owned))
-                .collect::<Option<Vec<_>>>()
-        });
-        texts.ok_or_else(|| self.invalid(key, &value, "a list of texts"))
+        self.required(key, "a list of texts", |value| list(value, text))
+    }
+
+    fn required<T>(
+        &mut self,
+        key: &str,
+        expected: &str,
+        read: impl Fn(&Value) -> Option<T>,
+    ) -> Result<T> {
+        let found = self.read(key, expected, read)?;
+        found.ok_or_else(|| self.invalid(key, &Value::Null, expected))
     }
 
     /// Takes an option that must be absent or have one of the values that we implement.
@@ -171,8 +174,17 @@ impl Options {
     }
 }
 
-fn as_usize(value: &Value) -> Option<usize> {
+pub(crate) fn count(value: &Value) -> Option<usize> {
     value.as_u64().and_then(|count| usize::try_from(count).ok())
+}
+
+fn text(value: &Value) -> Option<String> {
+    value.as_str().map(str::to_owned)
+}
+
+/// A list whose entries `read` understands.
+pub(crate) fn list<T>(value: &Value, read: impl Fn(&Value) -> Option<T>) -> Option<Vec<T>> {
+    value.as_array()?.iter().map(read).collect()
 }
 
 /// Equality that takes 0 and 0.0 for the same number.
@@ -222,7 +234,7 @@ mod tests {
         assert!(options(text).f64("c", 0.0).is_err());
         assert!(options(text).usizes("d", 2, 0).is_err());
         assert!(options(text).bool("e", true).is_err());
-        assert!(options(text).string("e", "").is_err());
+        assert!(options(text).choice("e", "", &[("", ())]).is_err());
         assert!(options(text).required_strings("d").is_err());
         assert!(options(text).required_usizes("absent").is_err());
         let deep = "[".repeat(100_000);

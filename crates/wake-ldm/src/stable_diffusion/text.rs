@@ -73,6 +73,10 @@ impl ClipTextConfig {
         let mut options = Options::parse(COMPONENT, text, path)?;
         options.only("model_type", &["clip_text_model"])?;
         options.only("attention_dropout", &[0.0])?;
+        let activations = [
+            ("quick_gelu", Activation::QuickGelu),
+            ("gelu", Activation::Gelu),
+        ];
         let config = Self {
             vocab_size: options.usize("vocab_size", 49408)?,
             hidden_size: options.usize("hidden_size", 512)?,
@@ -80,7 +84,7 @@ impl ClipTextConfig {
             layers: options.usize("num_hidden_layers", 12)?,
             heads: options.usize("num_attention_heads", 8)?,
             max_tokens: options.usize("max_position_embeddings", 77)?,
-            activation: take_activation(&mut options)?,
+            activation: options.choice("hidden_act", "quick_gelu", &activations)?,
             norm_epsilon: options.f64("layer_norm_eps", 1e-5)?,
             end_token: i64::try_from(options.usize("eos_token_id", 49407)?).unwrap_or(i64::MAX),
         };
@@ -173,14 +177,6 @@ impl ClipTextConfig {
         LayerNormConfig::new(self.hidden_size)
             .with_epsilon(self.norm_epsilon)
             .init(device)
-    }
-}
-
-fn take_activation(options: &mut Options) -> Result<Activation> {
-    match options.string("hidden_act", "quick_gelu")?.as_str() {
-        "quick_gelu" => Ok(Activation::QuickGelu),
-        "gelu" => Ok(Activation::Gelu),
-        other => Err(options.unsupported("hidden_act", &other.into(), "quick_gelu, gelu")),
     }
 }
 

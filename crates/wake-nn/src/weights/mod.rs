@@ -3,19 +3,20 @@
 pub mod files;
 mod header;
 mod index;
-pub mod names;
+mod names;
 mod precision;
 mod save;
+pub mod visit;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{Tensor, TensorData};
+use burn::module::Module;
+use burn::tensor::TensorData;
 
 use crate::error::{Error, Mismatch, Misshapen, Result};
 use files::{Stored, WeightFiles};
-use names::ModulePath;
+use visit::{Change, map, visit};
 
 pub use names::Layout;
 pub use precision::Precision;
@@ -85,15 +86,14 @@ fn load_files<M: Module>(
             mismatch: Box::new(mismatch),
         });
     }
-    let mut loader = Loader {
-        path: ModulePath::default(),
-        layout,
-        precision,
-        stored: &stored,
-        result: Ok(()),
-    };
-    let model = model.map(&mut loader);
-    loader.result.map(|()| model)
+    map(model, layout, |weight| {
+        let Some(tensor) = stored.get(&weight.name) else {
+            return Ok(Change::Kept);
+        };
+        let shape = tensor.shape()[..weight.shape.len()].to_vec();
+        let values = TensorData::new(tensor.read()?, shape);
+        Ok(Change::Replaced(values, precision.dtype()))
+    })
 }
 
 /// Whether a file has tensors below a prefix.
@@ -120,13 +120,11 @@ pub fn save<M: Module>(model: &M, layout: Layout, path: &Path) -> Result<()> {
 
 /// Names and shapes that a model has in a file, without making its weights.
 pub fn shapes<M: Module>(model: &M, layout: Layout) -> BTreeMap<String, Vec<usize>> {
-    let mut lister = Lister {
-        path: ModulePath::default(),
-        layout,
-        shapes: BTreeMap::new(),
-    };
-    model.visit(&mut lister);
-    lister.shapes
+    let mut shapes = BTreeMap::new();
+    visit(model, layout, |weight, _| {
+        shapes.insert(weight.name, weight.shape);
+    });
+    shapes
 }
 
 /// What does not fit between a model and its files.
@@ -156,73 +154,6 @@ fn fits(shape: &[usize], tensor: &Stored<'_>) -> bool {
     let found = tensor.shape();
     let as_convolution = shape.len() == 2 && found.len() == 4 && found[2..] == [1, 1];
     tensor.is_float() && (found == shape || (as_convolution && found[..2] == *shape))
-}
-
-struct Lister {
-    path: ModulePath,
-    layout: Layout,
-    shapes: BTreeMap<String, Vec<usize>>,
-}
-
-impl ModuleVisitor for Lister {
-    fn enter_module(&mut self, name: &str, container: &str) {
-        self.path.enter(name, container);
-    }
-
-    fn exit_module(&mut self, _name: &str, _container: &str) {
-        self.path.exit();
-    }
-
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let mut shape = param.lazy_shape().to_vec();
-        if self.path.is_transposed(D) {
-            shape.reverse();
-        }
-        self.shapes.insert(self.path.file_name(self.layout), shape);
-    }
-}
-
-struct Loader<'a> {
-    path: ModulePath,
-    layout: Layout,
-    precision: Precision,
-    stored: &'a BTreeMap<String, Stored<'a>>,
-    /// The first tensor that could not be read.
-    result: Result<()>,
-}
-
-impl ModuleMapper for Loader<'_> {
-    fn enter_module(&mut self, name: &str, container: &str) {
-        self.path.enter(name, container);
-    }
-
-    fn exit_module(&mut self, _name: &str, _container: &str) {
-        self.path.exit();
-    }
-
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let Some(tensor) = self.stored.get(&self.path.file_name(self.layout)) else {
-            return param;
-        };
-        if self.result.is_err() {
-            return param;
-        }
-        let numbers = match tensor.read() {
-            Ok(numbers) => numbers,
-            Err(error) => {
-                self.result = Err(error);
-                return param;
-            }
-        };
-        let data = TensorData::new(numbers, tensor.shape()[..D].to_vec());
-        let device = param.lazy_device();
-        let mut value = Tensor::from_data(data, (&device, self.precision.dtype()));
-        if self.path.is_transposed(D) {
-            value = value.swap_dims(0, 1);
-        }
-        let id = param.id;
-        param.transform_for_load(value, id)
-    }
 }
 
 #[cfg(all(test, feature = "flex"))]

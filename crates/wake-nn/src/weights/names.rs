@@ -19,23 +19,23 @@ pub enum Layout {
 
 /// Where in a model a parameter lies.
 #[derive(Debug, Default)]
-pub struct ModulePath {
+pub(super) struct ModulePath {
     segments: Vec<(String, String)>,
 }
 
 impl ModulePath {
     /// Goes into a module of this name, which the container holds.
-    pub fn enter(&mut self, name: &str, container: &str) {
+    pub(super) fn enter(&mut self, name: &str, container: &str) {
         self.segments.push((name.to_owned(), container.to_owned()));
     }
 
     /// Leaves the module that was entered last.
-    pub fn exit(&mut self) {
+    pub(super) fn exit(&mut self) {
         self.segments.pop();
     }
 
     /// Whether a file holds the transpose: the matrices of linear layers.
-    pub fn is_transposed(&self, rank: usize) -> bool {
+    pub(super) fn is_transposed(&self, rank: usize) -> bool {
         let owner = self
             .segments
             .iter()
@@ -45,7 +45,7 @@ impl ModulePath {
     }
 
     /// The name in a file.
-    pub fn file_name(&self, layout: Layout) -> String {
+    pub(super) fn file_name(&self, layout: Layout) -> String {
         // The variants of an enum of layers are no level of their own.
         let segments = self.segments.iter().map(|(name, _)| name.as_str());
         let segments: Vec<&str> = segments

@@ -1,16 +1,17 @@
 //! A low-rank adaptation as a module that can be trained, and its file in diffusers' format.
 
 use std::collections::HashMap;
+use std::convert::Infallible;
 use std::io::Write;
 use std::path::Path;
 
-use burn::module::{Initializer, Module, ModuleMapper, ModuleVisitor, Param};
+use burn::module::{Initializer, Module, Param};
 use burn::tensor::{DType, Tensor};
 use safetensors::tensor::{Dtype, TensorView};
 
 use wake_nn::cast_to;
 use wake_nn::weights::Layout;
-use wake_nn::weights::names::ModulePath;
+use wake_nn::weights::visit::{Change, Weight, map, visit};
 use wake_nn::{Result, check_range};
 use whole_files::write_synced;
 
@@ -45,19 +46,26 @@ impl LowRank {
     /// [`Error::OutOfRange`](wake_nn::Error::OutOfRange) for a rank of 0 or above 1024.
     pub fn of_attentions<M: Module>(model: &M, layout: Layout, rank: usize) -> Result<Self> {
         check_range("rank", rank as f64, 1.0, 1024.0)?;
-        let mut finder = Finder {
-            path: ModulePath::default(),
+        let mut found = Self {
+            down: Vec::new(),
+            up: Vec::new(),
+            layers: Vec::new(),
             layout,
-            rank,
-            found: Self {
-                down: Vec::new(),
-                up: Vec::new(),
-                layers: Vec::new(),
-                layout,
-            },
         };
-        model.visit(&mut finder);
-        Ok(finder.found)
+        let normal = Initializer::Normal {
+            mean: 0.0,
+            std: 1.0 / rank as f64,
+        };
+        visit(model, layout, |weight, _| {
+            if let Some(layer) = attention_layer(&weight) {
+                let (shape, device) = (&weight.shape, &weight.device);
+                found.down.push(normal.init([shape[1], rank], device));
+                let up = Initializer::Zeros.init([rank, shape[0]], device);
+                found.up.push(up);
+                found.layers.push(layer.to_owned());
+            }
+        });
+        Ok(found)
     }
 
     /// Names of the changed layers in files.
@@ -67,11 +75,15 @@ impl LowRank {
 
     /// A model with the changes added; gradients flow into the changes.
     pub fn merged<M: Module>(&self, model: M) -> M {
-        model.map(&mut Adder {
-            path: ModulePath::default(),
-            changes: self,
-            next: 0,
-        })
+        let mut factors = self.down.iter().zip(&self.up);
+        let Ok(model) = map(model, self.layout, |weight| {
+            let layer = attention_layer(weight).and_then(|_| factors.next());
+            Ok::<_, Infallible>(match layer {
+                None => Change::Kept,
+                Some((down, up)) => Change::Added(cast_to(down.val().matmul(up.val()), DType::F32)),
+            })
+        });
+        model
     }
 
     /// Writes the file that diffusers' `load_lora_weights` and [`merge_lora`](super::merge_lora) read.
@@ -111,86 +123,15 @@ impl LowRank {
 }
 
 /// The layer that a weight belongs to, if it is one that is changed.
-fn attention_layer(path: &ModulePath, rank: usize, layout: Layout) -> Option<String> {
-    const ENDS: [&str; 4] = ["to_q", "to_k", "to_v", "to_out.0"];
-    let name = path.file_name(layout);
-    let layer = name
-        .strip_suffix(".weight")
-        .filter(|_| path.is_transposed(rank))?;
-    let last = |end: &str| {
-        layer
-            .strip_suffix(end)
-            .is_some_and(|rest| rest.ends_with('.'))
-    };
-    ENDS.into_iter().any(last).then(|| layer.to_owned())
-}
-
-struct Finder {
-    path: ModulePath,
-    layout: Layout,
-    rank: usize,
-    found: LowRank,
-}
-
-impl ModuleVisitor for Finder {
-    fn enter_module(&mut self, name: &str, container: &str) {
-        self.path.enter(name, container);
-    }
-
-    fn exit_module(&mut self, _name: &str, _container: &str) {
-        self.path.exit();
-    }
-
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let Some(layer) = attention_layer(&self.path, D, self.layout) else {
-            return;
-        };
-        let (shape, device) = (param.lazy_shape().to_vec(), param.lazy_device());
-        let normal = Initializer::Normal {
-            mean: 0.0,
-            std: 1.0 / self.rank as f64,
-        };
-        let LowRank {
-            down, up, layers, ..
-        } = &mut self.found;
-        down.push(normal.init([shape[0], self.rank], &device));
-        up.push(Initializer::Zeros.init([self.rank, shape[1]], &device));
-        layers.push(layer);
-    }
-}
-
-struct Adder<'a> {
-    path: ModulePath,
-    changes: &'a LowRank,
-    next: usize,
-}
-
-impl ModuleMapper for Adder<'_> {
-    fn enter_module(&mut self, name: &str, container: &str) {
-        self.path.enter(name, container);
-    }
-
-    fn exit_module(&mut self, _name: &str, _container: &str) {
-        self.path.exit();
-    }
-
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        if attention_layer(&self.path, D, self.changes.layout).is_none() {
-            return param;
-        }
-        let (down, up) = (&self.changes.down[self.next], &self.changes.up[self.next]);
-        self.next += 1;
-        let change = cast_to(down.val().matmul(up.val()), DType::F32);
-        param.map(|weight| {
-            // Summed in f32 and rounded once, whatever weights and factors are held in.
-            let (shape, dtype) = (weight.dims(), weight.dtype());
-            cast_to(cast_to(weight, DType::F32) + change.reshape(shape), dtype)
-        })
-    }
+fn attention_layer(weight: &Weight) -> Option<&str> {
+    const ENDS: [&str; 4] = [".to_q", ".to_k", ".to_v", ".to_out.0"];
+    let layer = weight.name.strip_suffix(".weight");
+    layer.filter(|layer| weight.transposed && ENDS.iter().any(|end| layer.ends_with(end)))
 }
 
 #[cfg(all(test, feature = "flex"))]
 mod tests {
+    use burn::module::{ModuleMapper, ModuleVisitor};
     use burn::tensor::Device;
 
     use super::*;

@@ -6,13 +6,12 @@ mod strength;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use burn::module::{Module, ModuleMapper, Param};
+use burn::module::Module;
 use burn::tensor::{DType, Device, Tensor, TensorData};
 
 use strength::{NOTE, Strength};
-use wake_nn::cast_to;
 use wake_nn::weights::files::{Stored, WeightFiles};
-use wake_nn::weights::names::ModulePath;
+use wake_nn::weights::visit::{Change, map};
 use wake_nn::weights::{Layout, shapes};
 use wake_nn::{Error, Mismatch, Misshapen, Result};
 
@@ -87,135 +86,64 @@ pub fn merge_lora<M: Module>(
     let files = WeightFiles::open(path)?;
     let strength = Strength::read(files.note(NOTE), prefix, path)?;
     let stored = files.tensors()?;
-    let layers = layers(&stored, prefix)
-        .and_then(|layers| checked(layers, &shapes(&model, layout), prefix))
-        .map_err(|mismatch| Error::WeightsMismatch {
-            path: path.to_owned(),
-            mismatch: Box::new(mismatch),
-        })?;
-    let mut merger = Merger {
-        path: ModulePath::default(),
-        layout,
-        layers,
-        strength,
-        scale,
-        result: Ok(()),
-    };
-    let model = model.map(&mut merger);
-    merger.result.map(|()| model)
+    let layers = layers(&stored, &shapes(&model, layout), prefix);
+    let layers = layers.map_err(|mismatch| Error::WeightsMismatch {
+        path: path.to_owned(),
+        mismatch: Box::new(mismatch),
+    })?;
+    map(model, layout, |weight| {
+        let name = &weight.name;
+        let Some(factors) = layers.get(name) else {
+            return Ok(Change::Kept);
+        };
+        let layer = name.strip_suffix(".weight").unwrap_or(name);
+        let factor = scale * strength.factor(layer, factors.rank());
+        let change = factors.product(weight.shape[0], &weight.device)? * factor;
+        Ok(Change::Added(match weight.transposed {
+            true => change.swap_dims(0, 1),
+            false => change,
+        }))
+    })
 }
 
-/// The factors of each weight, by its name in the model.
+/// The factors of each weight, by its name in the model, once all are of the model's layers and fit them.
 fn layers<'a>(
     stored: &'a BTreeMap<String, Stored<'a>>,
+    shapes: &BTreeMap<String, Vec<usize>>,
     prefix: &str,
 ) -> Result<BTreeMap<String, Factors<'a>>, Mismatch> {
     let (mut layers, mut mismatch) = (BTreeMap::new(), Mismatch::default());
+    let below = |name: &'a str| name.strip_prefix(prefix)?.strip_prefix('.');
     for (name, down) in stored {
-        let Some(layer) = name
-            .strip_prefix(prefix)
-            .and_then(|name| name.strip_prefix('.'))
-        else {
+        let Some(layer) = below(name) else { continue };
+        let Some(layer) = layer.strip_suffix(".lora_A.weight") else {
+            let other = name.replace(".lora_B.", ".lora_A.");
+            if !name.contains(".lora_B.") || !stored.contains_key(&other) {
+                mismatch.unexpected.push(name.clone());
+            }
             continue;
         };
-        if let Some(layer) = layer.strip_suffix(".lora_A.weight") {
-            let up = format!("{prefix}.{layer}.lora_B.weight");
-            match stored.get(&up) {
-                Some(up) => drop(layers.insert(format!("{layer}.weight"), Factors { down, up })),
-                None => mismatch.missing.push(up),
-            }
-        } else if !stored.contains_key(&name.replace(".lora_B.", ".lora_A."))
-            || !name.contains(".lora_B.")
-        {
-            mismatch.unexpected.push(name.clone());
+        let up = format!("{prefix}.{layer}.lora_B.weight");
+        let Some(up) = stored.get(&up) else {
+            mismatch.missing.push(up);
+            continue;
+        };
+        let (weight, factors) = (format!("{layer}.weight"), Factors { down, up });
+        match shapes.get(&weight) {
+            None => mismatch.unexpected.push(format!("{prefix}.{weight}")),
+            Some(shape) if factors.fit(shape) => drop(layers.insert(weight, factors)),
+            Some(shape) => mismatch.misshapen.push(Misshapen {
+                name: format!("{prefix}.{weight}"),
+                expected: format!("factors of {shape:?}"),
+                found: format!("{up:?} {down:?}"),
+            }),
         }
     }
     if layers.is_empty() && mismatch.is_empty() {
         mismatch.missing.push(format!("{prefix}.….lora_A.weight"));
     }
-    if mismatch.is_empty() {
-        Ok(layers)
-    } else {
-        Err(mismatch)
-    }
-}
-
-/// The same, once every layer is one of the model's and fits.
-fn checked<'a>(
-    layers: BTreeMap<String, Factors<'a>>,
-    shapes: &BTreeMap<String, Vec<usize>>,
-    prefix: &str,
-) -> Result<BTreeMap<String, Factors<'a>>, Mismatch> {
-    let mut mismatch = Mismatch::default();
-    for (name, factors) in &layers {
-        match shapes.get(name) {
-            None => mismatch.unexpected.push(format!("{prefix}.{name}")),
-            Some(shape) if factors.fit(shape) => {}
-            Some(shape) => mismatch.misshapen.push(Misshapen {
-                name: format!("{prefix}.{name}"),
-                expected: format!("factors of {shape:?}"),
-                found: format!("{:?} {:?}", factors.up, factors.down),
-            }),
-        }
-    }
-    if mismatch.is_empty() {
-        Ok(layers)
-    } else {
-        Err(mismatch)
-    }
-}
-
-struct Merger<'a> {
-    path: ModulePath,
-    layout: Layout,
-    layers: BTreeMap<String, Factors<'a>>,
-    strength: Strength,
-    scale: f64,
-    /// The first factor that could not be read.
-    result: Result<()>,
-}
-
-impl Merger<'_> {
-    /// The change of a layer's weight, as it is stored: `[out, in]`, or flattened to that.
-    fn change(&self, name: &str, rows: usize, device: &Device) -> Result<Option<Tensor<2>>> {
-        let Some(factors) = self.layers.get(name) else {
-            return Ok(None);
-        };
-        let layer = name.strip_suffix(".weight").unwrap_or(name);
-        let factor = self.scale * self.strength.factor(layer, factors.rank());
-        Ok(Some(factors.product(rows, device)? * factor))
-    }
-}
-
-impl ModuleMapper for Merger<'_> {
-    fn enter_module(&mut self, name: &str, container: &str) {
-        self.path.enter(name, container);
-    }
-
-    fn exit_module(&mut self, _name: &str, _container: &str) {
-        self.path.exit();
-    }
-
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let transposed = self.path.is_transposed(D);
-        let dims = param.lazy_shape();
-        let rows = if transposed { dims[1] } else { dims[0] };
-        let name = self.path.file_name(self.layout);
-        let mut change = match self.change(&name, rows, &param.lazy_device()) {
-            Ok(Some(change)) => change,
-            Ok(None) => return param,
-            Err(error) => {
-                self.result = Err(error);
-                return param;
-            }
-        };
-        if transposed {
-            change = change.swap_dims(0, 1);
-        }
-        param.map(|weight| {
-            // Summed in f32 and rounded once, whatever the weights are held in.
-            let (dims, dtype) = (weight.dims(), weight.dtype());
-            cast_to(cast_to(weight, DType::F32) + change.reshape(dims), dtype)
-        })
+    match mismatch.is_empty() {
+        true => Ok(layers),
+        false => Err(mismatch),
     }
 }

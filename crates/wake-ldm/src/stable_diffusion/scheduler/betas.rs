@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::options::Options;
+use crate::options::{Options, list};
 use wake_nn::{Result, check_range};
 
 /// The shape of the noise added per training step, βₜ.
@@ -46,26 +46,22 @@ impl BetaCurve {
 
     /// Reads `beta_schedule`, `beta_start`, `beta_end` and `trained_betas`.
     pub(super) fn take(options: &mut Options, defaults: &ScheduleDefaults) -> Result<Self> {
-        let (first, last) = defaults.ends;
-        let ends = (
-            options.f64("beta_start", first)?,
-            options.f64("beta_end", last)?,
-        );
-        let name = options.string("beta_schedule", defaults.curve)?;
-        if let Some(list) = options.take("trained_betas") {
-            return trained_list(options, &list);
+        let first = options.f64("beta_start", defaults.ends.0)?;
+        let last = options.f64("beta_end", defaults.ends.1)?;
+        let numbers = |value: &Value| list(value, Value::as_f64);
+        if let Some(betas) = options.read("trained_betas", "a list of numbers", numbers)? {
+            return Ok(Self::Trained(betas));
         }
-        match name.as_str() {
-            "linear" => Ok(Self::Linear(ends.0, ends.1)),
-            "scaled_linear" => Ok(Self::ScaledLinear(ends.0, ends.1)),
-            "squaredcos_cap_v2" => Ok(Self::SquaredCosine),
-            other if defaults.further == Some(other) && other == "exp" => Ok(Self::Exponential),
-            other if defaults.further == Some(other) => Ok(Self::Sigmoid(ends.0, ends.1)),
-            other => {
-                let supported = "linear, scaled_linear, squaredcos_cap_v2";
-                Err(options.unsupported("beta_schedule", &other.into(), supported))
-            }
-        }
+        let mut known = vec![
+            ("linear", Self::Linear(first, last)),
+            ("scaled_linear", Self::ScaledLinear(first, last)),
+            ("squaredcos_cap_v2", Self::SquaredCosine),
+        ];
+        known.extend(defaults.further.map(|name| match name {
+            "exp" => (name, Self::Exponential),
+            _ => (name, Self::Sigmoid(first, last)),
+        }));
+        options.choice("beta_schedule", defaults.curve, &known)
     }
 }
 
@@ -154,16 +150,6 @@ fn trained(betas: &[f64], steps: usize) -> Result<Vec<f32>> {
         check_range("trained_betas", beta, min, max)?;
     }
     Ok(betas.iter().map(|&beta| beta as f32).collect())
-}
-
-fn trained_list(options: &Options, list: &Value) -> Result<BetaCurve> {
-    let numbers: Option<Vec<f64>> = list
-        .as_array()
-        .and_then(|list| list.iter().map(Value::as_f64).collect());
-    match numbers {
-        Some(betas) => Ok(BetaCurve::Trained(betas)),
-        None => Err(options.unsupported("trained_betas", list, "a list of numbers")),
-    }
 }
 
 #[cfg(test)]

@@ -40,15 +40,12 @@ impl Method for DdpmConfig {
             ..DEFAULTS
         };
         let schedule = NoiseSchedule::take(options, &defaults)?;
-        let name = options.string("variance_type", "fixed_small")?;
-        let variance = match name.as_str() {
-            "fixed_small" | "fixed_small_log" => Variance::Small,
-            "fixed_large" => Variance::Large,
-            other => {
-                let supported = "fixed_small, fixed_small_log, fixed_large";
-                return Err(options.unsupported("variance_type", &other.into(), supported));
-            }
-        };
+        let known = [
+            ("fixed_small", Variance::Small),
+            ("fixed_small_log", Variance::Small),
+            ("fixed_large", Variance::Large),
+        ];
+        let variance = options.choice("variance_type", "fixed_small", &known)?;
         Ok(Self {
             steps: Steps::take(options, schedule.steps(), "leading")?,
             prediction: Prediction::take(options, &Prediction::CURVED)?,

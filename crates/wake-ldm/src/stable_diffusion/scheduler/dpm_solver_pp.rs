@@ -90,17 +90,14 @@ fn take_steps(options: &mut Options, schedule: &NoiseSchedule) -> Result<Steps> 
 
 /// Whether the equation is solved in terms of the clean image (the "++"), and with noise at every step.
 fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<[bool; 2]> {
-    let name = options.string("algorithm_type", "dpmsolver++")?;
-    let algorithm = match name.as_str() {
-        "dpmsolver++" | "deis" => [true, false],
-        "sde-dpmsolver++" => [true, true],
-        "dpmsolver" => [false, false],
-        "sde-dpmsolver" => [false, true],
-        other => {
-            let supported = "dpmsolver++, sde-dpmsolver++, dpmsolver, sde-dpmsolver";
-            return Err(options.unsupported("algorithm_type", &other.into(), supported));
-        }
-    };
+    let known = [
+        ("dpmsolver++", [true, false]),
+        ("sde-dpmsolver++", [true, true]),
+        ("dpmsolver", [false, false]),
+        ("sde-dpmsolver", [false, true]),
+        ("deis", [true, false]),
+    ];
+    let algorithm = options.choice("algorithm_type", "dpmsolver++", &known)?;
     if end_at_zero && !algorithm[0] {
         let supported = "sigma_min with this algorithm_type";
         return Err(options.unsupported("final_sigmas_type", &"zero".into(), supported));
@@ -109,13 +106,10 @@ fn take_algorithm(options: &mut Options, end_at_zero: bool) -> Result<[bool; 2]>
 }
 
 fn take_midpoint(options: &mut Options) -> Result<bool> {
-    let name = options.string("solver_type", "midpoint")?;
-    match name.as_str() {
-        "heun" => Ok(false),
-        // UniPC's names, which diffusers takes for its default here.
-        "midpoint" | "logrho" | "bh1" | "bh2" => Ok(true),
-        other => Err(options.unsupported("solver_type", &other.into(), "midpoint, heun")),
-    }
+    // The last three are UniPC's names, which diffusers takes for its default here.
+    let midpoint = ["midpoint", "logrho", "bh1", "bh2"].map(|name| (name, true));
+    let known = [&[("heun", false)], &midpoint[..]].concat();
+    options.choice("solver_type", "midpoint", &known)
 }
 
 /// An exponential integrator: the linear part of the equation is solved exactly in λ = ln(α/σ),

@@ -1,7 +1,6 @@
 //! Euler's method in the noise level σ.
 
 use burn::tensor::Tensor;
-use serde_json::Value;
 
 use super::betas::DEFAULTS;
 use super::prediction::Prediction;
@@ -24,13 +23,20 @@ pub(super) struct Euler {
 
 impl SigmaMethod for Euler {
     fn take(options: &mut Options) -> Result<SigmaConfig<Self>> {
-        let continuous = take_choice(options, "timestep_type", ["discrete", "continuous"])?;
+        let continuous = options.choice(
+            "timestep_type",
+            "discrete",
+            &[("discrete", false), ("continuous", true)],
+        )?;
         let method = Self { continuous };
         let mut config = SigmaConfig::take_common(options, &DEFAULTS, &Prediction::CURVED, method)?;
         config.method.continuous &= config.prediction == Prediction::Velocity;
         config.sigmas = SigmaOptions::take(options, &[Spread::Karras, Spread::Exponential])?;
-        let evenly = take_choice(options, "interpolation_type", ["linear", "log_linear"])?;
-        config.sigmas.log_linear = evenly;
+        config.sigmas.log_linear = options.choice(
+            "interpolation_type",
+            "linear",
+            &[("linear", false), ("log_linear", true)],
+        )?;
         config.end_at_zero = take_final_zero(options)?;
         Ok(config)
     }
@@ -47,15 +53,6 @@ impl SigmaMethod for Euler {
         let (sigma, next) = call.ends();
         call.sample + call.slope * (next - sigma)
     }
-}
-
-/// Whether an option has the second of two values.
-fn take_choice(options: &mut Options, key: &str, [first, second]: [&str; 2]) -> Result<bool> {
-    let name = options.string(key, first)?;
-    if name == first || name == second {
-        return Ok(name == second);
-    }
-    Err(options.unsupported(key, &Value::from(name), &format!("{first}, {second}")))
 }
 
 #[cfg(test)]

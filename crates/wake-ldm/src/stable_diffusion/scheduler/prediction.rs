@@ -95,12 +95,8 @@ impl Prediction {
 
     /// Reads `prediction_type`, of which a method may know some.
     pub(super) fn take(options: &mut Options, known: &[Self]) -> Result<Self> {
-        let name = options.string("prediction_type", "epsilon")?;
-        if let Some(found) = known.iter().find(|kind| kind.name() == name) {
-            return Ok(*found);
-        }
-        let names: Vec<&str> = known.iter().map(|kind| kind.name()).collect();
-        Err(options.unsupported("prediction_type", &name.into(), &names.join(", ")))
+        let known: Vec<_> = known.iter().map(|kind| (kind.name(), *kind)).collect();
+        options.choice("prediction_type", "epsilon", &known)
     }
 
     /// Its name in diffusers.

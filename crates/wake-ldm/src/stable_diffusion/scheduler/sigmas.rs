@@ -223,12 +223,8 @@ pub(super) fn round(x: f64) -> f64 {
 
 /// Reads `final_sigmas_type`: whether a run ends at σ = 0, or else at the smallest of training.
 pub(super) fn take_final_zero(options: &mut Options) -> Result<bool> {
-    let name = options.string("final_sigmas_type", "zero")?;
-    match name.as_str() {
-        "zero" => Ok(true),
-        "sigma_min" => Ok(false),
-        other => Err(options.unsupported("final_sigmas_type", &other.into(), "zero, sigma_min")),
-    }
+    let known = [("zero", true), ("sigma_min", false)];
+    options.choice("final_sigmas_type", "zero", &known)
 }
 
 /// Refuses a path on which some noise level is not a positive number.

@@ -45,12 +45,8 @@ pub(super) struct Steps {
 impl Steps {
     /// Reads `timestep_spacing` and `steps_offset`.
     pub(super) fn take(options: &mut Options, train: usize, default: &str) -> Result<Self> {
-        let name = options.string("timestep_spacing", default)?;
-        let known = Spacing::ALL.into_iter().find(|known| known.name() == name);
-        let Some(spacing) = known else {
-            let supported = Spacing::ALL.map(Spacing::name).join(", ");
-            return Err(options.unsupported("timestep_spacing", &name.into(), &supported));
-        };
+        let known = Spacing::ALL.map(|spacing| (spacing.name(), spacing));
+        let spacing = options.choice("timestep_spacing", default, &known)?;
         let offset = options.usize("steps_offset", 0)?;
         check_range("steps_offset", offset as f64, 0.0, train as f64)?;
         Ok(Self {

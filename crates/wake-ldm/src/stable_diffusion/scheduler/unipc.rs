@@ -11,7 +11,7 @@ use super::sigmas::{SigmaOptions, Spread, take_final_zero};
 use super::spacing::Steps;
 use super::unipc_weights::{moments, solve};
 use super::{Method, NoiseLevel, NoiseSchedule, Scheduler, StepInput, StepOutput};
-use crate::options::Options;
+use crate::options::{Options, count, list};
 use wake_nn::Result;
 
 /// Options of [`UniPc`].
@@ -42,10 +42,12 @@ impl Method for UniPcConfig {
             // Limits are only known for the clean image.
             shared.clipping = Clipping::Off;
         }
+        let steps = |value: &Value| list(value, count);
+        let uncorrected = options.read("disable_corrector", "a list of steps", steps)?;
         let config = Self {
             shared,
             plain: take_plain(options)?,
-            uncorrected: take_uncorrected(options)?,
+            uncorrected: uncorrected.unwrap_or_default(),
             path,
             schedule,
         };
@@ -108,24 +110,10 @@ impl UniPcConfig {
 }
 
 fn take_plain(options: &mut Options) -> Result<bool> {
-    let name = options.string("solver_type", "bh2")?;
-    match name.as_str() {
-        "bh1" => Ok(true),
-        // DPM-Solver's names, which diffusers takes for its default here.
-        "bh2" | "midpoint" | "heun" | "logrho" => Ok(false),
-        other => Err(options.unsupported("solver_type", &other.into(), "bh1, bh2")),
-    }
-}
-
-fn take_uncorrected(options: &mut Options) -> Result<Vec<usize>> {
-    let Some(value) = options.take("disable_corrector") else {
-        return Ok(vec![]);
-    };
-    let count = |entry: &Value| entry.as_u64().and_then(|count| usize::try_from(count).ok());
-    let list = value
-        .as_array()
-        .and_then(|list| list.iter().map(count).collect());
-    list.ok_or_else(|| options.unsupported("disable_corrector", &value, "a list of steps"))
+    // The last three are DPM-Solver's names, which diffusers takes for its default here.
+    let others = ["bh2", "midpoint", "heun", "logrho"].map(|name| (name, false));
+    let known = [&[("bh1", true)], &others[..]].concat();
+    options.choice("solver_type", "bh2", &known)
 }
 
 /// An exponential integrator whose last step is corrected once the next prediction is known.
