@@ -7,9 +7,9 @@ use burn::tensor::activation::relu;
 use burn::tensor::module::{conv2d, max_pool2d};
 use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
 use burn::tensor::{Device, Tensor, TensorData};
-use safetensors::{Dtype, SafeTensors};
 
 use crate::error::{Error, Result};
+use wake_nn::weights::files::{Stored, WeightFiles};
 use wake_nn::{Mismatch, Misshapen};
 
 /// The network whose features are compared.
@@ -168,7 +168,7 @@ impl Lpips {
     /// # Errors
     ///
     /// [`wake_nn::Error::Io`], [`wake_nn::Error::InvalidSafetensors`], or [`wake_nn::Error::WeightsMismatch`] for tensors that are missing or of
-    /// another shape or type than f32; other tensors in the files are left alone.
+    /// another shape, or no numbers; other tensors in the files are left alone.
     pub fn load(
         network: LpipsNetwork,
         backbone: &Path,
@@ -188,7 +188,7 @@ impl Lpips {
         }
         let prefixed = format!("{}.", network.name());
         let lines = self::read(linear, |file| {
-            let several = file.names().iter().any(|name| name.starts_with(&prefixed));
+            let several = file.keys().any(|name| name.starts_with(&prefixed));
             network.linear(if several { &prefixed } else { "" })
         })?;
         Ok(Self {
@@ -293,34 +293,25 @@ fn unit(features: Tensor<4>) -> Tensor<4> {
     features / (length + 1e-10)
 }
 
-/// Reads tensors of f32 by name, in the order they are wanted in.
+/// Reads tensors by name, in the order they are wanted in.
 fn read(
     path: &Path,
-    wanted: impl Fn(&SafeTensors<'_>) -> Vec<(String, Vec<usize>)>,
+    wanted: impl Fn(&BTreeMap<String, Stored<'_>>) -> Vec<(String, Vec<usize>)>,
 ) -> Result<Vec<(String, TensorData)>> {
-    let bytes = whole_files::read_bytes(path)?;
-    let file = SafeTensors::deserialize(&bytes).map_err(|error| {
-        Error::Value(wake_nn::Error::InvalidSafetensors {
-            path: path.to_owned(),
-            reason: error.into(),
-        })
-    })?;
+    let files = WeightFiles::open(path)?;
+    let stored = files.tensors()?;
     let (mut found, mut mismatch) = (Vec::new(), Mismatch::default());
-    for (name, shape) in wanted(&file) {
-        match file.tensor(&name) {
-            Err(_) => mismatch.missing.push(name),
-            Ok(view) if view.dtype() != Dtype::F32 || view.shape() != shape => {
-                mismatch.misshapen.push(Misshapen {
-                    name,
-                    expected: format!("F32 {shape:?}"),
-                    found: format!("{:?} {:?}", view.dtype(), view.shape()),
-                });
+    for (name, shape) in wanted(&stored) {
+        match stored.get(&name) {
+            None => mismatch.missing.push(name),
+            Some(tensor) if tensor.is_float() && tensor.shape() == shape => {
+                found.push((name, TensorData::new(tensor.read()?, shape)));
             }
-            Ok(view) => {
-                let numbers = view.data().chunks_exact(4);
-                let numbers = numbers.map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-                found.push((name, TensorData::new(numbers.collect::<Vec<f32>>(), shape)));
-            }
+            Some(tensor) => mismatch.misshapen.push(Misshapen {
+                name,
+                expected: format!("float {shape:?}"),
+                found: format!("{tensor:?}"),
+            }),
         }
     }
     if mismatch.is_empty() {

@@ -93,6 +93,9 @@ impl Strength {
 /// Layer names with an α of their own; peft takes them for regular expressions, which only plain
 /// names are here.
 fn take_patterns(options: &mut Options) -> Result<Vec<(String, f64)>> {
+    let Some(value) = options.take("alpha_pattern") else {
+        return Ok(vec![]);
+    };
     let plain = |name: &str| {
         name.chars()
             .all(|c| c.is_alphanumeric() || "._".contains(c))
@@ -101,9 +104,10 @@ fn take_patterns(options: &mut Options) -> Result<Vec<(String, f64)>> {
         let alpha = alpha.as_f64().filter(|alpha| alpha.abs() <= 1e6)?;
         plain(name).then(|| (name.clone(), alpha))
     };
-    let entries = |value: &Value| value.as_object()?.iter().map(entry).collect();
-    let found = options.read("alpha_pattern", "layer names with numbers", entries)?;
-    Ok(found.unwrap_or_default())
+    let patterns = value
+        .as_object()
+        .and_then(|map| map.iter().map(entry).collect());
+    patterns.ok_or_else(|| options.unsupported("alpha_pattern", &value, "layer names with numbers"))
 }
 
 #[cfg(test)]

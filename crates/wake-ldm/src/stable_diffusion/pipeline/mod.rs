@@ -76,12 +76,7 @@ pub struct PipelineParts {
 /// Rombach et al. (2022), "High-Resolution Image Synthesis with Latent Diffusion Models".
 #[derive(Debug)]
 pub struct Pipeline {
-    tokenizer: Option<Tokenizer>,
-    text_encoder: ClipText,
-    unet: UNet,
-    autoencoder: AutoencoderKl,
-    scheduler: SchedulerConfig,
-    latent_size: usize,
+    parts: PipelineParts,
     embeddings: Mutex<HashMap<String, Tensor<3>>>,
     device: Device,
 }
@@ -96,21 +91,8 @@ impl Pipeline {
     pub fn new(parts: PipelineParts, device: &Device) -> Result<Self> {
         #[cfg(feature = "flex")]
         check_once(device)?;
-        let PipelineParts {
-            tokenizer,
-            text_encoder,
-            unet,
-            autoencoder,
-            scheduler,
-            latent_size,
-        } = parts;
         Ok(Self {
-            tokenizer,
-            text_encoder,
-            unet,
-            autoencoder,
-            scheduler,
-            latent_size,
+            parts,
             embeddings: Mutex::default(),
             device: device.clone(),
         })
@@ -118,14 +100,7 @@ impl Pipeline {
 
     /// What the pipeline is made of.
     pub fn into_parts(self) -> PipelineParts {
-        PipelineParts {
-            tokenizer: self.tokenizer,
-            text_encoder: self.text_encoder,
-            unet: self.unet,
-            autoencoder: self.autoencoder,
-            scheduler: self.scheduler,
-            latent_size: self.latent_size,
-        }
+        self.parts
     }
 
     /// Merges a low-rank adaptation in diffusers' format into the U-Net, and into the text encoder where
@@ -135,10 +110,12 @@ impl Pipeline {
     ///
     /// As [`merge_lora`].
     pub fn with_lora(mut self, path: &Path, scale: f64) -> Result<Self> {
-        self.unet = merge_lora(self.unet, Layout::Diffusers, "unet", path, scale)?;
+        let unet = self.parts.unet;
+        self.parts.unet = merge_lora(unet, Layout::Diffusers, "unet", path, scale)?;
         if weights::has_prefix(path, "text_encoder")? {
-            let text = self.text_encoder;
-            self.text_encoder = merge_lora(text, Layout::ClipText, "text_encoder", path, scale)?;
+            let text = self.parts.text_encoder;
+            self.parts.text_encoder =
+                merge_lora(text, Layout::ClipText, "text_encoder", path, scale)?;
             self.embeddings = Mutex::default();
         }
         Ok(self)
@@ -146,17 +123,17 @@ impl Pipeline {
 
     /// The scheduler of requests that name none.
     pub fn scheduler(&self) -> &SchedulerConfig {
-        &self.scheduler
+        &self.parts.scheduler
     }
 
     /// The autoencoder, for tiled encoding and decoding of large images.
     pub fn autoencoder(&self) -> &AutoencoderKl {
-        &self.autoencoder
+        &self.parts.autoencoder
     }
 
     /// Rows and columns of the images of requests that give no size.
     pub fn image_size(&self) -> [usize; 2] {
-        [self.latent_size * self.autoencoder.downsampling(); 2]
+        [self.parts.latent_size * self.parts.autoencoder.downsampling(); 2]
     }
 
     /// The device that the models lie on.
@@ -191,11 +168,11 @@ impl Pipeline {
         if let Some(known) = cache.get(prompt) {
             return known.clone();
         }
-        let ids = token_ids(self.tokenizer.as_ref(), prompt);
+        let ids = token_ids(self.parts.tokenizer.as_ref(), prompt);
         let length = ids.len();
         let ids: Tensor<2, Int> =
             Tensor::from_data(TensorData::new(ids, [1, length]), &self.device);
-        let embedding = self.text_encoder.last_hidden_state(ids);
+        let embedding = self.parts.text_encoder.last_hidden_state(ids);
         if cache.len() >= CACHED_PROMPTS {
             cache.clear();
         }
@@ -210,8 +187,8 @@ impl Pipeline {
     /// `[images, latent_channels, rows, columns]` to `[images, channels, …]`, larger by the
     /// autoencoder's downsampling.
     pub fn decode(&self, latents: Tensor<4>) -> Tensor<4> {
-        let z = self.autoencoder.from_latents(latents);
-        (self.autoencoder.decode_sliced(z) / 2.0 + 0.5).clamp(0.0, 1.0)
+        let z = self.parts.autoencoder.from_latents(latents);
+        (self.parts.autoencoder.decode_sliced(z) / 2.0 + 0.5).clamp(0.0, 1.0)
     }
 
     /// Encodes images in [0, 1] to latents, drawn with the given noise, one at a time.
@@ -223,17 +200,21 @@ impl Pipeline {
     pub fn encode(&self, pixels: Tensor<4>, noise: Tensor<4>) -> Tensor<4> {
         let images = pixels.dims()[0];
         let one = |k: usize| {
-            let image = self.autoencoder.scaled(pixels.clone().narrow(0, k, 1));
-            let posterior = self.autoencoder.encode(image);
+            let image = self
+                .parts
+                .autoencoder
+                .scaled(pixels.clone().narrow(0, k, 1));
+            let posterior = self.parts.autoencoder.encode(image);
             posterior.sample(noise.clone().narrow(0, k, 1))
         };
-        self.autoencoder
+        self.parts
+            .autoencoder
             .to_latents(Tensor::cat((0..images).map(one).collect(), 0))
     }
 
     /// Channels, rows and columns of the latent images of a request.
     fn latent_shape(&self, request: &Request) -> Result<[usize; 3]> {
-        let down = self.autoencoder.downsampling();
+        let down = self.parts.autoencoder.downsampling();
         let [rows, columns] = match (request.size, &request.start, &request.latents) {
             (Some(size), _, _) => size,
             (None, Some((StartImage::Pixels(pixels), _)), _) => last_two(pixels),
@@ -249,7 +230,7 @@ impl Pipeline {
             }
         }
         Ok([
-            self.autoencoder.latent_channels(),
+            self.parts.autoencoder.latent_channels(),
             rows / down,
             columns / down,
         ])
@@ -262,7 +243,7 @@ impl Pipeline {
             Prompts::Embeddings(embeddings) => embeddings.clone(),
         };
         let [found, tokens, width] = embeddings.dims();
-        let expected = self.text_encoder.width();
+        let expected = self.parts.text_encoder.width();
         if width != expected {
             return Err(invalid("width of embeddings", width, expected.to_string()));
         }
@@ -273,48 +254,42 @@ impl Pipeline {
             .reshape([images, tokens, width]))
     }
 
-    fn checked_condition(&self, request: &Request) -> Result<Option<Tensor<2>>> {
-        let found = request.condition.as_ref().map(Tensor::dims);
-        let channels = self.unet.condition_channels();
-        match (found, channels) {
-            (None, _) => Ok(None),
-            (Some([images, width]), Some(channels))
-                if images == request.images() && width == channels =>
-            {
-                Ok(request.condition.clone())
+    /// Checks the shape of the condition vectors, where there are any.
+    fn check_condition(&self, request: &Request) -> Result<()> {
+        let Some(condition) = &request.condition else {
+            return Ok(());
+        };
+        match self.parts.unet.condition_channels() {
+            Some(channels) => {
+                let expected = [request.images(), channels];
+                check_shape("condition", &condition.dims(), &expected)
             }
-            (Some(found), channels) => {
-                let expected = match channels {
-                    Some(channels) => format!("{:?}", [request.images(), channels]),
-                    None => "none, because this U-Net has no condition vector".to_owned(),
-                };
-                Err(invalid(
-                    "shape of condition",
-                    format!("{found:?}"),
-                    expected,
-                ))
-            }
+            None => Err(invalid(
+                "shape of condition",
+                format!("{:?}", condition.dims()),
+                "none, because this U-Net has no condition vector",
+            )),
         }
     }
 
     /// Checks that pixels fit latent images of a shape.
     fn check_pixels(&self, pixels: &Tensor<4>, [_, rows, columns]: [usize; 3]) -> Result<()> {
-        let [_, channels, pixel_rows, pixel_columns] = pixels.dims();
-        let down = self.autoencoder.downsampling();
-        let found = [channels, pixel_rows, pixel_columns];
-        let expected = [
-            self.autoencoder.image_channels(),
-            rows * down,
-            columns * down,
-        ];
-        if found == expected {
-            return Ok(());
-        }
-        Err(invalid(
-            "shape of the start image",
+        let autoencoder = &self.parts.autoencoder;
+        let (channels, down) = (autoencoder.image_channels(), autoencoder.downsampling());
+        let expected = [channels, rows * down, columns * down];
+        check_shape("the start image", &pixels.dims()[1..], &expected)
+    }
+}
+
+/// Refuses a tensor of another shape.
+fn check_shape(what: &str, found: &[usize], expected: &[usize]) -> Result<()> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(invalid(
+            &format!("shape of {what}"),
             format!("{found:?}"),
             format!("{expected:?}"),
-        ))
+        )),
     }
 }
 

@@ -1,12 +1,10 @@
 //! The loop over the steps, as an iterator.
 
-use std::fmt;
-
 use burn::tensor::Tensor;
 
-use super::Pipeline;
 use super::guidance::Guidance;
 use super::request::{Request, StartImage, invalid};
+use super::{Pipeline, check_shape};
 use crate::error::Result;
 use crate::stable_diffusion::scheduler::{Scheduler, StepInput};
 use crate::streams::{INITIAL_STREAM, POSTERIOR_STREAM, STEP_STREAM};
@@ -32,6 +30,7 @@ pub struct Progress {
 /// A run of the sampler, one step per item.
 ///
 /// Stop asking for items to stop or cancel the run; [`latents`](Self::latents) has what was reached.
+#[derive(Debug)]
 pub struct Sampling<'a> {
     pipeline: &'a Pipeline,
     scheduler: Box<dyn Scheduler>,
@@ -77,7 +76,10 @@ impl<'a> Sampling<'a> {
     fn new(pipeline: &'a Pipeline, request: &Request) -> Result<Self> {
         request.validate()?;
         let shape = pipeline.latent_shape(request)?;
-        let config = request.scheduler.as_ref().unwrap_or(&pipeline.scheduler);
+        let config = request
+            .scheduler
+            .as_ref()
+            .unwrap_or(&pipeline.parts.scheduler);
         let scheduler = config.scheduler(request.steps)?;
         let first = first_call(request, scheduler.as_ref());
         let sources = request.sources();
@@ -91,6 +93,7 @@ impl<'a> Sampling<'a> {
         };
         let calls = scheduler.timesteps().len();
         check_step_noise(request, calls, shape)?;
+        pipeline.check_condition(request)?;
         Ok(Self {
             guidance: request.guided().then_some(Guidance {
                 scale: request.guidance,
@@ -101,7 +104,7 @@ impl<'a> Sampling<'a> {
                 true => Some(pipeline.contexts(&request.negative, request)?),
                 false => None,
             },
-            condition: pipeline.checked_condition(request)?,
+            condition: request.condition.clone(),
             step_noise: request.step_noise.clone(),
             images_at_once: request.images_at_once,
             next: first,
@@ -168,7 +171,7 @@ impl<'a> Sampling<'a> {
         let timestep = self.scheduler.timesteps()[index];
         let batch = sample.dims()[0];
         let timesteps = Tensor::full([batch], timestep, &self.pipeline.device);
-        self.pipeline.unet.forward(UNetInput {
+        self.pipeline.parts.unet.forward(UNetInput {
             sample,
             timesteps,
             context: Some(context),
@@ -194,19 +197,6 @@ impl<'a> Sampling<'a> {
             shape,
             &self.pipeline.device,
         ))
-    }
-}
-
-impl fmt::Debug for Sampling<'_> {
-    /// How far the run is, without the models and their vocabulary.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Sampling")
-            .field("scheduler", &self.scheduler)
-            .field("guidance", &self.guidance)
-            .field("images", &self.sources.len())
-            .field("latents", &self.latents.dims())
-            .field("next", &self.next)
-            .finish_non_exhaustive()
     }
 }
 
@@ -267,14 +257,8 @@ fn initial_noise(
         ));
     };
     let expected = [sources.len(), shape[0], shape[1], shape[2]];
-    if given.dims() == expected {
-        return Ok(given.clone());
-    }
-    Err(invalid(
-        "shape of latents",
-        format!("{:?}", given.dims()),
-        format!("{expected:?}"),
-    ))
+    check_shape("latents", &given.dims(), &expected)?;
+    Ok(given.clone())
 }
 
 /// The clean latent images of a start, one per image of the run.
@@ -295,16 +279,8 @@ fn start_latents(
         }
     };
     let latents = one_each("number of start images", latents, images)?;
-    let [_, channels, rows, columns] = latents.dims();
-    if [channels, rows, columns] == shape {
-        return Ok(latents);
-    }
-    let found = format!("{:?}", [channels, rows, columns]);
-    Err(invalid(
-        "shape of start latents",
-        found,
-        format!("{shape:?}"),
-    ))
+    check_shape("start latents", &latents.dims()[1..], &shape)?;
+    Ok(latents)
 }
 
 /// Repeats a single entry for every image.
@@ -324,14 +300,7 @@ fn check_step_noise(request: &Request, calls: usize, [c, h, w]: [usize; 3]) -> R
     let Some(noise) = &request.step_noise else {
         return Ok(());
     };
-    let [steps, images, channels, rows, columns] = noise.dims();
-    if steps >= calls && [images, channels, rows, columns] == [request.images(), c, h, w] {
-        return Ok(());
-    }
-    let expected = format!("{:?}", [calls, request.images(), c, h, w]);
-    Err(invalid(
-        "shape of step noise",
-        format!("{:?}", noise.dims()),
-        expected,
-    ))
+    let steps = noise.dims()[0].min(calls);
+    let found = [&[steps], &noise.dims()[1..]].concat();
+    check_shape("step noise", &found, &[calls, request.images(), c, h, w])
 }

@@ -23,35 +23,39 @@ impl Pipeline {
     /// [`wake_nn::Error::Io`] and [`Error::Text`](crate::Error::Text) when a file cannot be
     /// written.
     pub fn save(&self, folder: &Path, precision: Precision) -> Result<()> {
-        let tokenizer = self.tokenizer.as_ref().unwrap_or_else(|| Tokenizer::clip());
+        let parts = &self.parts;
+        let tokenizer = parts
+            .tokenizer
+            .as_ref()
+            .unwrap_or_else(|| Tokenizer::clip());
         tokenizer.save(&folder.join("tokenizer"))?;
-        let text = self.text_encoder.config().to_json();
+        let text = parts.text_encoder.config().to_json();
         save_folder(
-            &self.text_encoder,
+            &parts.text_encoder,
             Layout::ClipText,
             &text,
             &folder.join("text_encoder"),
             precision,
         )?;
-        let unet = self.unet.config().clone();
-        let unet = unet.with_sample_size(self.latent_size).to_json();
+        let unet = parts.unet.config().clone();
+        let unet = unet.with_sample_size(parts.latent_size).to_json();
         save_folder(
-            &self.unet,
+            &parts.unet,
             Layout::Diffusers,
             &unet,
             &folder.join("unet"),
             precision,
         )?;
-        let vae = self.autoencoder.config().to_json();
+        let vae = parts.autoencoder.config().to_json();
         save_folder(
-            &self.autoencoder,
+            &parts.autoencoder,
             Layout::Diffusers,
             &vae,
             &folder.join("vae"),
             precision,
         )?;
         let scheduler = folder.join("scheduler/scheduler_config.json");
-        write_json(&scheduler, &self.scheduler.to_json())?;
+        write_json(&scheduler, &parts.scheduler.to_json())?;
         write_json(&folder.join("model_index.json"), &self.model_index())
     }
 
@@ -63,7 +67,7 @@ impl Pipeline {
             "image_encoder": [null, null],
             "requires_safety_checker": false,
             "safety_checker": [null, null],
-            "scheduler": ["diffusers", self.scheduler.class()],
+            "scheduler": ["diffusers", self.parts.scheduler.class()],
             "text_encoder": ["transformers", "CLIPTextModel"],
             "tokenizer": ["transformers", "CLIPTokenizer"],
             "unet": ["diffusers", "UNet2DConditionModel"],
