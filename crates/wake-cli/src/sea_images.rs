@@ -40,10 +40,8 @@ pub(crate) struct SeaFile {
 /// The images of a folder by name, without the masks and the detector's pictures of wakes (`*.wakes.png`).
 pub(crate) fn list(folder: &Path) -> Outcome<Vec<SeaFile>> {
     let place = folder.display();
-    let unreadable = |error: std::io::Error| format!("cannot read {place}: {error}");
     let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
+    for path in whole_files::entries(folder)? {
         let ending = path.extension().unwrap_or_default().to_string_lossy();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let is_image = ENDINGS.iter().any(|e| ending.eq_ignore_ascii_case(e));
@@ -58,7 +56,6 @@ pub(crate) fn list(folder: &Path) -> Outcome<Vec<SeaFile>> {
             path,
         });
     }
-    files.sort_by(|a, b| a.path.cmp(&b.path));
     if files.is_empty() {
         return Err(format!(
             "{place} holds no PNG, TIFF or JPEG image; name a folder of radar images"

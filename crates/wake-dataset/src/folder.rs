@@ -1,6 +1,6 @@
 //! A data set on disk, read back, once or again and again.
 
-use super::layout::{Layout, Manifest, broken, cannot};
+use super::layout::{Layout, Manifest, broken};
 use super::metadata::{Rows, parse};
 use super::pair::{Grey, Pair};
 use super::shuffle::shuffled;
@@ -29,8 +29,7 @@ impl Folder {
             return Err(broken(path, 0, message));
         };
         let metadata = Layout(path).metadata();
-        let text =
-            whole_files::read_regular(&metadata).map_err(|e| cannot("read", &metadata, e))?;
+        let text = whole_files::read_bytes(&metadata)?;
         let rows = parse(&metadata, &text, &manifest)?;
         let expected = manifest.indices().end - manifest.indices().start;
         if rows.len() as u64 != expected {

@@ -12,8 +12,7 @@ use std::path::{Path, PathBuf};
 use wake_nn::check_range;
 use wake_physics::Plan;
 use wake_physics::grey::GreyScale;
-use whole_files::read_text;
-use whole_files::{sealed, unsealed};
+use whole_files::{failed, read_text, sealed, unsealed};
 
 /// Version of the layout; a reader refuses others.
 const FORMAT: u32 = 5;
@@ -147,7 +146,7 @@ impl Manifest {
     /// The content of `dataset.json`, the same for a set and all its shards.
     pub(super) fn text(&self) -> Result<String> {
         let text = serde_json::to_string_pretty(self);
-        let text = text.map_err(|e| cannot("encode", Path::new("dataset.json"), e.into()))?;
+        let text = text.map_err(|e| failed("encode", Path::new("dataset.json"), e))?;
         Ok(sealed(&text) + "\n")
     }
 
@@ -265,14 +264,6 @@ impl Layout<'_> {
 /// `file_name` of a pair.
 pub(super) fn image_name(index: u64) -> String {
     format!("images/{index:06}.png")
-}
-
-pub(super) fn cannot(action: &'static str, path: &Path, source: std::io::Error) -> Error {
-    Error::Value(wake_nn::Error::Io {
-        action,
-        path: path.to_owned(),
-        source,
-    })
 }
 
 pub(super) fn broken(path: &Path, line: usize, message: impl Into<String>) -> Error {

@@ -1,11 +1,11 @@
 //! Joins the shards of a data set into the set that one run would have made.
 
-use super::layout::{Layout, Manifest, Shard, broken, cannot};
+use super::layout::{Layout, Manifest, Shard, broken};
 use super::metadata::{Rows, parse};
 use super::write::{claim, finish, is_text};
 use crate::error::Result;
 use std::path::{Path, PathBuf};
-use whole_files::read_text;
+use whole_files::{entries, failed, read_text};
 
 /// Folder of a shard below that of its set.
 pub fn shard_folder(folder: &Path, shard: Shard) -> PathBuf {
@@ -98,7 +98,7 @@ fn shard_at(folder: &Path, number: u64) -> Result<(PathBuf, Manifest)> {
 /// The lines of a shard and their rows, all of them, with every file here or already moved, and as it was written.
 fn finished_rows(folder: &Path, path: &Path, manifest: &Manifest) -> Result<(Vec<u8>, Rows)> {
     let metadata = Layout(path).metadata();
-    let text = whole_files::read_regular(&metadata).map_err(|e| cannot("read", &metadata, e))?;
+    let text = whole_files::read_bytes(&metadata)?;
     let rows = parse(&metadata, &text, manifest)?;
     let unfinished = |what: String| {
         let message = format!("{what}; make the same shard again to finish it");
@@ -129,7 +129,7 @@ fn move_files(folder: &Path, path: &Path, manifest: &Manifest) -> Result<()> {
         let from = Layout(path).files_of(index);
         let to = Layout(folder).files_of(index);
         for (from, to) in from.iter().zip(&to).filter(|(from, _)| from.is_file()) {
-            std::fs::rename(from, to).map_err(|e| cannot("move", from, e))?;
+            std::fs::rename(from, to).map_err(|e| failed("move", from, e))?;
         }
     }
     Ok(())
@@ -138,8 +138,7 @@ fn move_files(folder: &Path, path: &Path, manifest: &Manifest) -> Result<()> {
 /// Removes what is left of the shards of a set, and nothing else.
 fn remove_shards(folder: &Path) -> Result<()> {
     let text = manifest_text(folder)?;
-    for entry in std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))? {
-        let path = entry.map_err(|e| cannot("read", folder, e))?.path();
+    for path in entries(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let number = name
             .strip_prefix("shard-")
@@ -156,7 +155,7 @@ fn remove_shards(folder: &Path) -> Result<()> {
 fn remove(path: &Path) -> Result<()> {
     let layout = Layout(path);
     let gone = |result: std::io::Result<()>| match result {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(cannot("remove", path, e)),
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(failed("remove", path, e)),
         _ => Ok(()),
     };
     for inner in layout.folders() {

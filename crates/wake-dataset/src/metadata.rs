@@ -1,7 +1,7 @@
 //! `metadata.jsonl`: one line a pair, in order; it grows as pairs are made.
 
 use super::annotations::{Objects, dota, yolo, yolo_oriented};
-use super::layout::{Layout, Manifest, broken, cannot, image_name};
+use super::layout::{Layout, Manifest, broken, image_name};
 use super::pair::Pair;
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use wake_physics::Scene;
 use wake_physics::scene::Ship;
-use whole_files::{checksum, sealed, unsealed};
+use whole_files::{checksum, failed, sealed, unsealed};
 
 /// One pair as a line of `metadata.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,7 +58,7 @@ impl Row {
     ///
     /// [`Error::Dataset`](crate::Error::Dataset) if the file is not the one that was written with this row.
     pub(super) fn image_bytes(&self, path: &Path, line: usize) -> Result<Vec<u8>> {
-        let bytes = whole_files::read_regular(path).map_err(|e| cannot("read", path, e))?;
+        let bytes = whole_files::read_bytes(path)?;
         let found = checksum(&bytes);
         if found == self.image_crc32 {
             return Ok(bytes);
@@ -96,9 +96,7 @@ impl Row {
     ) -> Result<()> {
         self.image_bytes(image, line)?;
         for (path, text) in labels.iter().zip(self.labels(size)) {
-            if whole_files::read_regular(path).map_err(|e| cannot("read", path, e))?
-                != text.as_bytes()
-            {
+            if whole_files::read_bytes(path)? != text.as_bytes() {
                 let message = format!(
                     "changed: not the labels of line {line} of metadata.jsonl; remove the file and run `wake dataset` again \
                      to make it anew"
@@ -181,17 +179,17 @@ impl Log {
     /// [`Error::Dataset`](crate::Error::Dataset) with the number of the first line that the set does not have.
     pub(super) fn open(folder: &Path, manifest: &Manifest) -> Result<Self> {
         let path = Layout(folder).metadata();
-        let failed = |e| cannot("open", &path, e);
+        let fail = |e| failed("open", &path, e);
         let mut options = OpenOptions::new();
         let open = options.read(true).write(true).create(true).truncate(false);
-        let mut file = open.open(&path).map_err(failed)?;
-        let text = whole_files::read_regular(&path).map_err(failed)?;
+        let mut file = open.open(&path).map_err(fail)?;
+        let text = whole_files::read_regular(&path).map_err(fail)?;
         let whole = text.iter().rposition(|&b| b == b'\n').map_or(0, |n| n + 1);
         let rows = parse(&path, &text[..whole], manifest)?;
         check(&path, &text[..whole], &rows, manifest)?;
         let length = whole as u64;
-        file.set_len(length).map_err(failed)?;
-        file.seek(SeekFrom::Start(length)).map_err(failed)?;
+        file.set_len(length).map_err(fail)?;
+        file.seek(SeekFrom::Start(length)).map_err(fail)?;
         Ok(Self {
             path,
             file,
@@ -206,7 +204,7 @@ impl Log {
         if let Err(e) = self.file.write_all(line.as_bytes()) {
             // If this fails too, the next run cuts the line off.
             let _ = self.file.set_len(self.length);
-            return Err(cannot("write", &self.path, e));
+            return Err(failed("write", &self.path, e).into());
         }
         self.length += line.len() as u64;
         self.rows.push((index, row));
@@ -216,7 +214,7 @@ impl Log {
     /// Waits until all of it is on disk.
     pub(super) fn finish(self) -> Result<Rows> {
         let synced = self.file.sync_all();
-        synced.map_err(|e| cannot("write", &self.path, e))?;
+        synced.map_err(|e| failed("write", &self.path, e))?;
         Ok(self.rows)
     }
 }
@@ -224,7 +222,7 @@ impl Log {
 /// A row as its line.
 pub(super) fn line(row: &Row) -> Result<String> {
     let text = serde_json::to_string(row);
-    let text = text.map_err(|e| cannot("encode", Path::new(&row.file_name), e.into()))?;
+    let text = text.map_err(|e| failed("encode", Path::new(&row.file_name), e))?;
     Ok(sealed(&text) + "\n")
 }
 

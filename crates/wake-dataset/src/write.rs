@@ -1,7 +1,7 @@
 //! Makes a data set in a folder, or what is missing of it.
 
 use super::annotations::{Coco, data_yaml};
-use super::layout::{Layout, Manifest, Shard, broken, cannot};
+use super::layout::{Layout, Manifest, Shard, broken};
 use super::metadata::{Log, Row, Rows};
 use super::ordered::Ordered;
 use super::scenes::Simulated;
@@ -10,8 +10,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use wake_physics::output;
-use whole_files::FolderLock;
-use whole_files::checksum;
+use whole_files::{FolderLock, checksum, failed};
 
 /// How far a data set is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -133,7 +132,7 @@ pub(super) fn is_text(path: &Path, text: &str) -> bool {
 /// Whether a folder holds nothing but what a run may have left before its `dataset.json`: shards, the note of its own
 /// shard, files half-written.
 fn is_free(folder: &Path, shard: Option<Shard>) -> Result<bool> {
-    let mut entries = std::fs::read_dir(folder).map_err(|e| cannot("read", folder, e))?;
+    let mut entries = std::fs::read_dir(folder).map_err(|e| failed("read", folder, e))?;
     Ok(entries.all(|entry| {
         entry.is_ok_and(|e| {
             let name = e.file_name();

@@ -134,16 +134,6 @@ impl From<whole_files::Error> for Error {
     }
 }
 
-/// The error for a file that cannot be read.
-#[cfg(feature = "burn")]
-pub(crate) fn unreadable(path: &std::path::Path, source: std::io::Error) -> Error {
-    Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    }
-}
-
 /// Which tensors of a weight file do not fit a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Mismatch {

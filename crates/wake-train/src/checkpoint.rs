@@ -18,7 +18,7 @@ use safetensors::tensor::{Dtype, View};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use wake_nn::weights::files::WeightFiles;
-use whole_files::{file_checksum, sealed, unsealed};
+use whole_files::{entries, failed, file_checksum, sealed, unsealed};
 
 use crate::error::{Error, Result};
 
@@ -63,12 +63,12 @@ impl Checkpoint {
             // The write failed already; what is left of it is the lesser trouble.
             fs::remove_dir_all(&temporary).ok();
         }
-        written.map_err(|source| io("write", &target, source))?;
+        written.map_err(|source| failed("write", &target, source))?;
         sweep(folder)?;
         let mut old = checkpoints(folder)?;
         old.truncate(old.len().saturating_sub(KEPT));
         for (_, path) in old {
-            fs::remove_dir_all(&path).map_err(|source| io("remove", &path, source))?;
+            fs::remove_dir_all(&path).map_err(|source| failed("remove", &path, source))?;
         }
         Ok(target)
     }
@@ -140,7 +140,7 @@ impl Checkpoint {
         let file = path.join(TENSORS);
         let found = file_checksum(&file).map_err(|source| match source.kind() {
             ErrorKind::NotFound => damaged(&file),
-            _ => io("read", &file, source),
+            _ => failed("read", &file, source).into(),
         })?;
         if found != tensors {
             return Err(damaged(&file));
@@ -211,20 +211,11 @@ fn short(value: &Value) -> String {
     }
 }
 
-fn io(action: &'static str, path: &Path, source: std::io::Error) -> Error {
-    Error::Value(wake_nn::Error::Io {
-        action,
-        path: path.to_owned(),
-        source,
-    })
-}
-
 /// Removes checkpoints half-written.
 fn sweep(folder: &Path) -> Result<()> {
-    for entry in fs::read_dir(folder).map_err(|source| io("read", folder, source))? {
-        let path = entry.map_err(|source| io("read", folder, source))?.path();
+    for path in entries(folder)? {
         if whole_files::is_temporary(&path) {
-            fs::remove_dir_all(&path).map_err(|source| io("remove", &path, source))?;
+            fs::remove_dir_all(&path).map_err(|source| failed("remove", &path, source))?;
         }
     }
     Ok(())
@@ -235,10 +226,8 @@ fn checkpoints(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
-    let entries = fs::read_dir(folder).map_err(|source| io("read", folder, source))?;
     let mut found = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|source| io("read", folder, source))?.path();
+    for path in entries(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if let Some(step) = name
             .strip_prefix("step-")

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::trainer::StepReport;
 use crate::error::{Error, Result};
+use whole_files::failed;
 
 /// The log of a run.
 #[derive(Debug)]
@@ -28,13 +29,7 @@ impl TrainLog {
     /// [`wake_nn::Error::Io`] when the file cannot be read or written, [`Error::Data`] with the number of a line that is none
     /// of a log.
     pub fn open(path: &Path, step: usize) -> Result<Self> {
-        let io = |source| {
-            Error::Value(wake_nn::Error::Io {
-                action: "write",
-                path: path.to_owned(),
-                source,
-            })
-        };
+        let io = |source| failed("write", path, source);
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(io)?;
         }
@@ -70,24 +65,9 @@ impl TrainLog {
         if let (Value::Object(line), Value::Object(more)) = (&mut line, more) {
             line.extend(more.clone());
         }
-        writeln!(self.file, "{line}").map_err(|source| {
-            Error::Value(wake_nn::Error::Io {
-                action: "write",
-                path: self.path.clone(),
-                source,
-            })
-        })?;
+        writeln!(self.file, "{line}").map_err(|source| failed("write", &self.path, source))?;
         Ok(line)
     }
-}
-
-/// The error for a file that cannot be read.
-pub(super) fn unreadable(path: &Path, source: std::io::Error) -> Error {
-    Error::Value(wake_nn::Error::Io {
-        action: "read",
-        path: path.to_owned(),
-        source,
-    })
 }
 
 /// The lines of the first `step` steps; half a line at the end, which a kill left, is dropped.
@@ -95,7 +75,7 @@ fn kept_lines(path: &Path, step: usize) -> Result<String> {
     let bytes = match whole_files::read_regular(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
-        Err(source) => return Err(unreadable(path, source)),
+        Err(source) => return Err(failed("read", path, source).into()),
     };
     let whole = bytes
         .iter()

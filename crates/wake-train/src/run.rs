@@ -11,7 +11,6 @@ use serde_json::{Value, json};
 use super::checkpoint::Checkpoint;
 use super::trainer::{StepReport, Trainer, TrainerOptions};
 use crate::error::{Error, Result};
-use wake_ldm::network::WakeModelConfig;
 
 /// Parts of a loss by name.
 pub type Terms = Vec<(&'static str, f64)>;
@@ -102,34 +101,10 @@ pub struct Run<M> {
 impl<M: Module> Run<M> {
     /// A run from random weights.
     ///
-    /// - `part`: which part of the model learns; a checkpoint of another part is refused
+    /// - `part`: which part of a model learns; a checkpoint of another part is refused
+    /// - `model`: what shapes it
     /// - `init`: draws its weights
     /// - `devices`: autodiff devices, at least one; each takes its share of every batch
-    ///
-    /// # Errors
-    ///
-    /// As [`WakeModelConfig::validate`] and [`RunOptions::validate`].
-    pub fn new(
-        part: &str,
-        config: &WakeModelConfig,
-        init: impl FnOnce(&WakeModelConfig, &Device) -> M,
-        options: RunOptions,
-        devices: Vec<Device>,
-    ) -> Result<Self> {
-        config.validate()?;
-        Self::of(
-            part,
-            &json!(config),
-            |device| init(config, device),
-            options,
-            devices,
-        )
-    }
-
-    /// A run of a model of any kind from random weights.
-    ///
-    /// - `part`, `devices`: as in [`new`](Self::new)
-    /// - `model`: what shapes it
     ///
     /// # Errors
     ///

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use burn::module::Module;
 use burn::tensor::{DType, Device, Tensor};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::trainer::Trainer;
 use super::*;
@@ -82,8 +82,15 @@ fn options(accumulation: usize) -> RunOptions {
 
 fn run(workers: usize, accumulation: usize) -> Run<Flow> {
     let devices = vec![Device::flex().autodiff(); workers];
-    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
-    Run::new("flow", &config(), init, options(accumulation), devices).unwrap()
+    let init = |device: &Device| config().init_flow(device);
+    Run::of(
+        "flow",
+        &json!(config()),
+        init,
+        options(accumulation),
+        devices,
+    )
+    .unwrap()
 }
 
 /// A run that goes on from a checkpoint.
@@ -194,10 +201,10 @@ fn sixteen_bits_learn_as_32_bits_do() {
     let start = start(folder.path());
     let losses = |bf16: bool| {
         let devices = vec![Device::flex().autodiff()];
-        let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
+        let init = |device: &Device| config().init_flow(device);
         let mut options = options(1);
         options.trainer.bf16 = bf16;
-        let mut run = Run::new("flow", &config(), init, options, devices).unwrap();
+        let mut run = Run::of("flow", &json!(config()), init, options, devices).unwrap();
         // The same weights; a run of its own would begin with 32 bits or go on with them.
         let mut start = start.clone();
         start.state["trainer"]["bf16"] = bf16.into();
@@ -222,10 +229,10 @@ fn sixteen_bits_learn_as_32_bits_do() {
 fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     let (set, _) = set();
     let device = Device::flex();
-    let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
-    let mut run = Run::new(
+    let init = |device: &Device| config().init_prior(device);
+    let mut run = Run::of(
         "prior",
-        &config(),
+        &json!(config()),
         init,
         options(1),
         vec![device.autodiff()],
@@ -258,9 +265,9 @@ fn a_reader_learns_to_tell_prompts_apart() {
         vocabulary: vocabulary.known().to_vec(),
         ..config()
     };
-    let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
+    let init = |device: &Device| config.init_parser(device);
     let devices = vec![Device::flex().autodiff()];
-    let mut run = Run::new("parser", &config, init, options(1), devices).unwrap();
+    let mut run = Run::of("parser", &json!(config), init, options(1), devices).unwrap();
     let task = ParserTask {
         prompts: &prompts,
         vocabulary: &vocabulary,
@@ -279,10 +286,17 @@ fn a_checkpoint_of_another_model_is_refused() {
         ..config()
     };
     let devices = vec![Device::flex().autodiff()];
-    let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
-    let mut other = Run::new("flow", &other, init, options(1), devices.clone()).unwrap();
+    let init = |device: &Device| config().init_flow(device);
+    let mut other = Run::of(
+        "flow",
+        &json!(other),
+        |device| other.init_flow(device),
+        options(1),
+        devices.clone(),
+    )
+    .unwrap();
     assert!(other.resume(start.clone()).is_err());
-    let mut renamed = Run::new("other", &config(), init, options(1), devices).unwrap();
+    let mut renamed = Run::of("other", &json!(config()), init, options(1), devices).unwrap();
     assert!(renamed.resume(start.clone()).is_err());
     let mut broken = start;
     broken.tensors.pop_last();

@@ -17,11 +17,8 @@ pub struct Error {
 /// Result of this crate's fallible functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
-pub(crate) fn failed(
-    action: &'static str,
-    path: &Path,
-    source: impl Into<std::io::Error>,
-) -> Error {
+/// The error of what was tried with a file or folder.
+pub fn failed(action: &'static str, path: &Path, source: impl Into<std::io::Error>) -> Error {
     Error {
         action,
         path: path.to_owned(),

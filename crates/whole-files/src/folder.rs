@@ -3,7 +3,7 @@
 use crate::error::{Result, failed};
 use crate::write::{is_temporary, temporary};
 use std::fs::{File, TryLockError};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Makes a folder and the folders above it, checks that files can be written there, and [`sweep`]s it.
 ///
@@ -52,16 +52,27 @@ pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
     }
 }
 
+/// What a folder holds, in the order of names.
+///
+/// # Errors
+///
+/// When the folder cannot be read.
+pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let fail = |e| failed("read", folder, e);
+    let entries = std::fs::read_dir(folder).map_err(fail)?;
+    let paths = entries.map(|entry| Ok(entry.map_err(fail)?.path()));
+    let mut paths: Vec<PathBuf> = paths.collect::<Result<_>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
 /// Removes what killed processes left half-written in a folder, and nothing that a living one writes.
 ///
 /// # Errors
 ///
 /// [`Error`](crate::Error) if the folder cannot be read.
 pub fn sweep(folder: &Path) -> Result<()> {
-    let entries = std::fs::read_dir(folder).map_err(|e| failed("read", folder, e))?;
-    for entry in entries {
-        let path = entry.map_err(|e| failed("read", folder, e))?.path();
-        // Without write access to what another left, it stays.
+    for path in entries(folder)? {
         if is_temporary(&path) && path.is_file() && is_abandoned(&path) {
             let _ = std::fs::remove_file(&path);
         }

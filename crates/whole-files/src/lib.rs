@@ -11,8 +11,8 @@ mod read;
 mod checksum;
 
 pub use checksum::{checksum, file_checksum, sealed, unsealed};
-pub use error::{Error, Result};
-pub use folder::{FolderLock, lock_folder, make_folder, sweep};
+pub use error::{Error, Result, failed};
+pub use folder::{FolderLock, entries, lock_folder, make_folder, sweep};
 pub use read::{fingerprint, open_regular, read_bytes, read_regular, read_text};
 pub use text::{quoted, sentence};
 pub use write::{is_temporary, write_atomically, write_json, write_synced, write_with};

@@ -60,10 +60,8 @@ fn labels(path: &Path) -> Result<Labels> {
 }
 
 fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
-    let fail = |e: std::io::Error| unreadable(folder, &e);
     let mut paths = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(fail)? {
-        let path = entry.map_err(fail)?.path();
+    for path in whole_files::entries(folder)? {
         let is_png = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("png"));
@@ -72,7 +70,6 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
             paths.push(path);
         }
     }
-    paths.sort();
     if paths.is_empty() {
         let none = std::io::Error::other("it holds no PNG image; name a folder of real images");
         return Err(unreadable(folder, &none));

@@ -13,8 +13,8 @@ use safetensors::tensor::{Metadata, TensorInfo};
 use super::header::{self, Header};
 use super::index::ShardIndex;
 use super::names::modern;
-use crate::error::unreadable;
 use crate::error::{Error, Result};
+use whole_files::failed;
 
 /// File names of models, the preferred ones first, each with the names of the index that it may have
 /// instead, in shards.
@@ -182,19 +182,21 @@ impl WeightFiles {
 impl WeightFile {
     fn open(path: &Path) -> Result<Self> {
         // Opening a pipe would wait for somebody to write into it.
-        let found = std::fs::metadata(path).map_err(|source| unreadable(path, source))?;
+        let found = std::fs::metadata(path).map_err(|source| failed("read", path, source))?;
         if !found.is_file() {
             return Err(Error::InvalidSafetensors {
                 path: path.to_owned(),
                 reason: "no regular file".into(),
             });
         }
-        let file = File::open(path).map_err(|source| unreadable(path, source))?;
+        let file = File::open(path).map_err(|source| failed("read", path, source))?;
         Self::new(path, Contents::Disk(file))
     }
 
     fn new(path: &Path, contents: Contents) -> Result<Self> {
-        let size = contents.size().map_err(|source| unreadable(path, source))?;
+        let size = contents
+            .size()
+            .map_err(|source| failed("read", path, source))?;
         let header = header::read(path, contents.reader(), size)?;
         Ok(Self {
             path: path.to_owned(),
@@ -281,7 +283,7 @@ impl Stored<'_> {
             let (whole, _) = bytes.as_chunks::<N>();
             numbers.extend(whole.iter().map(|bytes| number(*bytes)));
         });
-        converted.map_err(|source| unreadable(&self.file.path, source))?;
+        converted.map_err(|source| failed("read", &self.file.path, source))?;
         Ok(numbers)
     }
 }

@@ -8,8 +8,8 @@ use std::path::Path;
 use safetensors::tensor::Metadata;
 use serde::de::{Deserializer as _, Error as _, IgnoredAny, MapAccess, Visitor};
 
-use crate::error::unreadable;
 use crate::error::{Error, Result};
+use whole_files::failed;
 
 /// The format's own limit on the length of a header.
 const LONGEST: u64 = 100_000_000;
@@ -33,7 +33,7 @@ pub(super) struct Header {
 /// - `file`: at its first byte
 /// - `size`: its length in bytes
 pub(super) fn read(path: &Path, mut file: impl Read, size: u64) -> Result<Header> {
-    let io = |source| unreadable(path, source);
+    let io = |source| failed("read", path, source);
     let invalid = |reason: Box<dyn std::error::Error + Send + Sync>| Error::InvalidSafetensors {
         path: path.to_owned(),
         reason,

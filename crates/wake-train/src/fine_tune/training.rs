@@ -134,13 +134,10 @@ impl FineTuning<'_> {
         let mut files = BTreeMap::new();
         for part in ["unet", "vae", "text_encoder", "scheduler"] {
             let folder = self.weights.join(part);
-            let Ok(entries) = std::fs::read_dir(&folder) else {
+            let Ok(paths) = whole_files::entries(&folder) else {
                 continue;
             };
-            for entry in entries {
-                let path = entry
-                    .map_err(|source| crate::log::unreadable(&folder, source))?
-                    .path();
+            for path in paths {
                 let name = path.file_name().unwrap_or_default();
                 let name = name.to_string_lossy();
                 if path.is_file() && !name.starts_with('.') {

@@ -9,9 +9,9 @@ use super::super::run::Run;
 use super::super::sheet::write_sheet;
 use super::super::stage_options::StageOptions;
 use super::super::tasks::FlowTask;
-use super::{ACROSS, SHEET, WakeTraining, defaults, keep};
+use super::{ACROSS, SHEET, WakeTraining, keep};
 use crate::error::Result;
-use wake_ldm::network::{Flow, Part, WakeModel, WakeModelConfig};
+use wake_ldm::network::{Flow, Part, WakeModel};
 use wake_ldm::sampler::WakeSampler;
 
 impl WakeTraining<'_> {
@@ -39,14 +39,8 @@ impl WakeTraining<'_> {
         let set = counted("residuals", set.len() as u64, self.progress, |done| {
             set.residuals(&model.prior, |n| done(n as u64))
         });
-        let init = |config: &WakeModelConfig, device: &Device| config.init_flow(device);
-        let run = Run::new(
-            Part::Flow.name(),
-            &config,
-            init,
-            options.run(&defaults(Part::Flow), identity),
-            options.learning_devices()?,
-        )?;
+        let init = |device: &Device| config.init_flow(device);
+        let run = self.run_of(Part::Flow, options, identity, init)?;
         let task = FlowTask {
             set: &set,
             patches: &model.patches,

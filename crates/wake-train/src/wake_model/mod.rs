@@ -9,13 +9,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use burn::module::Module;
-use serde_json::Value;
+use burn::tensor::Device;
+use serde_json::{Value, json};
 
 use super::checkpoint::Checkpoint;
 use super::folder::RunFolder;
 use super::latents::LatentSet;
 use super::pairs::TrainingPairs;
 use super::progress::{Progress, counted};
+use super::run::Run;
 use super::stage::Stage;
 use super::stage_options::{StageDefaults, StageOptions};
 use crate::error::{Error, Result};
@@ -104,6 +106,7 @@ impl<'a> WakeTraining<'a> {
         pairs: Option<TrainingPairs>,
         progress: &'a (dyn Fn(Progress) + Sync),
     ) -> Result<Self> {
+        config.validate()?;
         let devices = options.learning_devices()?.len();
         if part != Part::Patches {
             let constants = options.run(&defaults(part), Value::Null);
@@ -176,6 +179,19 @@ impl<'a> WakeTraining<'a> {
         let checkpoint = Checkpoint::newest(&self.folder.checkpoints(part.name()))?;
         let state = checkpoint.map_or(Value::Null, |checkpoint| checkpoint.state);
         Ok(Some(self.options.before(left, &state)))
+    }
+
+    /// A run that trains a part.
+    fn run_of<M: Module>(
+        &self,
+        part: Part,
+        options: &StageOptions,
+        identity: Value,
+        init: impl FnOnce(&Device) -> M,
+    ) -> Result<Run<M>> {
+        let constants = options.run(&defaults(part), identity);
+        let devices = options.learning_devices()?;
+        Run::of(part.name(), &json!(self.config), init, constants, devices)
     }
 
     fn fingerprint(&self, part: Part) -> Result<String> {

@@ -6,12 +6,12 @@ use serde_json::json;
 use super::super::run::Run;
 use super::super::stage_options::StageOptions;
 use super::super::tasks::ParserTask;
-use super::{WakeTraining, defaults, keep};
+use super::{WakeTraining, keep};
 use crate::error::Result;
 use crate::prompts::Prompts;
 use wake_dataset::{Recipe, Simulated};
 use wake_ldm::conditioning::Vocabulary;
-use wake_ldm::network::{Part, PromptParser, WakeModelConfig};
+use wake_ldm::network::{Part, PromptParser};
 
 /// Ranges that prompts to read are drawn from, beyond those of images.
 const PROMPT_RANGES: [&str; 4] = [
@@ -28,14 +28,9 @@ impl WakeTraining<'_> {
         let identity = json!({"prompts": recipe});
         let prompts = Prompts::new(Simulated::new(recipe, options.seed)?);
         let vocabulary = Vocabulary::new(self.config.vocabulary.iter().copied());
-        let init = |config: &WakeModelConfig, device: &Device| config.init_parser(device);
-        let run = Run::new(
-            Part::Parser.name(),
-            &self.config,
-            init,
-            options.run(&defaults(Part::Parser), identity),
-            options.learning_devices()?,
-        )?;
+        let config = &self.config;
+        let init = |device: &Device| config.init_parser(device);
+        let run = self.run_of(Part::Parser, options, identity, init)?;
         let task = ParserTask {
             prompts: &prompts,
             vocabulary: &vocabulary,

@@ -9,7 +9,7 @@ use super::super::run::Run;
 use super::super::sheet::write_sheet;
 use super::super::stage_options::StageOptions;
 use super::super::tasks::PriorTask;
-use super::{ACROSS, SHEET, WakeTraining, defaults, keep};
+use super::{ACROSS, SHEET, WakeTraining, keep};
 use crate::error::Result;
 use wake_dataset::Pair;
 use wake_ldm::network::{Part, PatchTransform, PhysicsPrior, Prior, WakeModelConfig};
@@ -22,14 +22,9 @@ impl WakeTraining<'_> {
         let pairs = self.pairs()?;
         let identity =
             json!({"data": pairs.identity(), "patches": self.fingerprint(Part::Patches)?});
-        let init = |config: &WakeModelConfig, device: &Device| config.init_prior(device);
-        let run = Run::new(
-            Part::Prior.name(),
-            &self.config,
-            init,
-            options.run(&defaults(Part::Prior), identity),
-            options.learning_devices()?,
-        )?;
+        let config = &self.config;
+        let init = |device: &Device| config.init_prior(device);
+        let run = self.run_of(Part::Prior, options, identity, init)?;
         let task = PriorTask {
             set: &set,
             seed: options.seed,
