@@ -24,70 +24,44 @@ pub(crate) fn code(work: impl FnOnce() -> Outcome<()>) -> ExitCode {
     }
 }
 
+/// Whether an error of a crate is a failure: it wraps one in one of these variants, or is of another kind that always is one.
+macro_rules! is_failure_of {
+    ($error:ident: $crate_error:ty, $($wraps:ident)|+ $(, always $kind:pat)?) => {
+        if let Some(error) = $error.downcast_ref::<$crate_error>() {
+            type E = $crate_error;
+            return match error {
+                $(E::$wraps(error) => is_failure(error),)+
+                $($kind => true,)?
+                _ => false,
+            };
+        }
+    };
+}
+
 /// Whether an error has another cause than the input.
 fn is_failure(error: &(dyn Error + 'static)) -> bool {
     #[cfg(feature = "train")]
-    if let Some(error) = error.downcast_ref::<wake_train::Error>() {
-        use wake_train::Error as E;
-        return match error {
-            E::Value(error) => is_failure(error),
-            E::Model(error) => is_failure(error),
-            E::Data(error) => is_failure(error),
-            E::Detector(error) => is_failure(error),
-            E::Scene(error) => is_failure(error),
-            E::Diverged { .. } => true,
-            _ => false,
-        };
+    is_failure_of!(error: wake_train::Error, Value | Model | Data | Detector | Scene, always E::Diverged { .. });
+    #[cfg(feature = "dataset")]
+    if let Some(wake_dataset::Error::Source(error)) = error.downcast_ref() {
+        return is_failure(error.as_ref());
     }
     #[cfg(feature = "dataset")]
-    if let Some(error) = error.downcast_ref::<wake_dataset::Error>() {
-        use wake_dataset::Error as E;
-        return match error {
-            E::Value(error) => is_failure(error),
-            E::Scene(error) => is_failure(error),
-            E::Source(error) => is_failure(error.as_ref()),
-            E::Threads { .. } => true,
-            _ => false,
-        };
-    }
+    is_failure_of!(error: wake_dataset::Error, Value | Scene, always E::Threads { .. });
     #[cfg(feature = "generate")]
-    if let Some(error) = error.downcast_ref::<wake_ldm::Error>() {
-        use wake_ldm::Error as E;
-        return match error {
-            E::Model(error) => is_failure(error),
-            E::Scene(error) => is_failure(error),
-            _ => false,
-        };
-    }
+    is_failure_of!(error: wake_ldm::Error, Model | Scene);
     #[cfg(feature = "detect")]
-    if let Some(error) = error.downcast_ref::<wake_map::Error>() {
-        use wake_map::Error as E;
-        return match error {
-            E::Product(error) => is_failure(error),
-            E::File(error) => is_failure(error),
-            _ => false,
-        };
-    }
+    is_failure_of!(error: wake_map::Error, Product | File);
     #[cfg(feature = "detect")]
-    if let Some(wake_detector::Error::Model(error)) = error.downcast_ref() {
-        return is_failure(error);
-    }
+    is_failure_of!(error: wake_detector::Error, Model);
+    #[cfg(feature = "simulate")]
+    is_failure_of!(error: wake_product::Error, Product | Scene | File);
     #[cfg(any(feature = "dataset", feature = "generate", feature = "detect"))]
     if let Some(error) = error.downcast_ref::<wake_nn::Error>() {
         use wake_nn::Error as E;
         return match error {
             E::Io { action, .. } => is_of_writing(action),
             E::NotFinite { .. } | E::WrongNumbers { .. } => true,
-            _ => false,
-        };
-    }
-    #[cfg(feature = "simulate")]
-    if let Some(error) = error.downcast_ref::<wake_product::Error>() {
-        use wake_product::Error as E;
-        return match error {
-            E::Product(error) => is_failure(error),
-            E::Scene(error) => is_failure(error),
-            E::File(error) => is_failure(error),
             _ => false,
         };
     }

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
+use wake_nn::check_range;
 use wake_nn::weights::{Layout, load, load_bytes};
 
-use crate::error::{Result, check_range};
+use crate::error::Result;
 use crate::image::GreyImage;
 use crate::maps::Maps;
 use crate::network::{INPUTS, Network, STRIDE};
@@ -72,9 +73,9 @@ impl Detector {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for another number.
+    /// [`OutOfRange`](wake_nn::Error::OutOfRange) for another number.
     pub fn with_spacing(mut self, spacing: f32) -> Result<Self> {
-        check_range("spacing", spacing, 0.5, 100.0)?;
+        check_range("spacing", spacing.into(), 0.5, 100.0)?;
         self.search.spacing = Some(spacing);
         Ok(self)
     }
@@ -83,9 +84,9 @@ impl Detector {
     ///
     /// # Errors
     ///
-    /// [`Error::OutOfRange`](crate::Error::OutOfRange) for another number.
+    /// [`OutOfRange`](wake_nn::Error::OutOfRange) for another number.
     pub fn with_least_score(mut self, least_score: f32) -> Result<Self> {
-        check_range("least_score", least_score, 0.0, 1.0)?;
+        check_range("least_score", least_score.into(), 0.0, 1.0)?;
         self.search.least_score = least_score;
         Ok(self)
     }

@@ -73,15 +73,6 @@ pub enum Error {
         levels: usize,
     },
 
-    /// A number outside the closed range in which it means something.
-    #[error("{name} is {value}, outside [{min}, {max}]")]
-    OutOfRange {
-        name: &'static str,
-        value: f64,
-        min: f64,
-        max: f64,
-    },
-
     /// Weights whose maps of a plain wake show nothing.
     #[error(
         "the weights in {} on {device} give maps that are {why} for an image with one plain wake; \
@@ -97,17 +88,4 @@ pub enum Error {
     /// An error of weights or devices.
     #[error(transparent)]
     Model(#[from] wake_nn::Error),
-}
-
-/// Checks a number against a closed range; what is not a number lies outside.
-pub(crate) fn check_range(name: &'static str, value: f32, min: f32, max: f32) -> Result<()> {
-    match (min..=max).contains(&value) {
-        true => Ok(()),
-        false => Err(Error::OutOfRange {
-            name,
-            value: value.into(),
-            min: min.into(),
-            max: max.into(),
-        }),
-    }
 }

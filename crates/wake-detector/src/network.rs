@@ -5,6 +5,7 @@ use burn::nn::conv::Conv2d;
 use burn::tensor::{Device, Tensor};
 use wake_nn::conv::{conv1x1, conv3x3, convolve};
 use wake_nn::norm::GroupNorm;
+use wake_nn::patch::space_to_depth;
 use wake_nn::resample::{Downsample, Upsample};
 
 /// Pixels of the image for one cell of the maps, in each direction.
@@ -171,7 +172,9 @@ impl Network {
     /// `[batch, INPUTS, rows, columns]` to `[batch, OUTPUTS, rows / STRIDE, columns / STRIDE]`; rows and columns are
     /// multiples of [`MULTIPLE`].
     pub fn forward(&self, images: Tensor<4>) -> Tensor<4> {
-        let fine = self.fine.forward(convolve(&self.stem, patches(images)));
+        let fine = self
+            .fine
+            .forward(convolve(&self.stem, space_to_depth(images, STRIDE)));
         let middle = convolve(&self.widen1, self.down1.forward(fine.clone()));
         let middle = self.middle.forward(middle);
         let mut coarse = convolve(&self.widen2, self.down2.forward(middle.clone()));
@@ -184,16 +187,6 @@ impl Network {
         let fine = self.fine_up.forward(fine + up);
         convolve(&self.head, self.norm.forward_silu(fine))
     }
-}
-
-/// Squares of `STRIDE` × `STRIDE` pixels as channels.
-fn patches(images: Tensor<4>) -> Tensor<4> {
-    let [batch, channels, rows, columns] = images.dims();
-    let (s, r, c) = (STRIDE, rows / STRIDE, columns / STRIDE);
-    images
-        .reshape([batch, channels, r, s, c, s])
-        .permute([0, 1, 3, 5, 2, 4])
-        .reshape([batch, channels * s * s, r, c])
 }
 
 #[cfg(test)]
