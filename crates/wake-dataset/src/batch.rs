@@ -45,23 +45,6 @@ pub struct ToBatch;
 
 impl Batcher<Pair, Batch> for ToBatch {
     fn batch(&self, pairs: Vec<Pair>, device: &Device) -> Batch {
-        Parts::of(pairs).onto(device)
-    }
-}
-
-/// A batch that is not on its device yet.
-#[derive(Debug)]
-struct Parts {
-    images: TensorData,
-    boxes: TensorData,
-    objects: Vec<Vec<Object>>,
-    scenes: Vec<Scene>,
-    prompts: Vec<String>,
-}
-
-impl Parts {
-    /// Pairs of one size, as a [`Source`] gives them.
-    fn of(pairs: Vec<Pair>) -> Self {
         let count = pairs.len();
         let [rows, columns] = pairs
             .first()
@@ -74,22 +57,13 @@ impl Parts {
             scenes.push(pair.scene);
             prompts.push(pair.prompt);
         }
-        Self {
-            boxes: boxes(&objects),
-            images: TensorData::new(values, [count, 1, rows, columns]),
+        let images = TensorData::new(values, [count, 1, rows, columns]);
+        Batch {
+            images: Tensor::from_data(images, device),
+            boxes: Tensor::from_data(boxes(&objects), device),
             objects,
             scenes,
             prompts,
-        }
-    }
-
-    fn onto(self, device: &Device) -> Batch {
-        Batch {
-            images: Tensor::from_data(self.images, device),
-            boxes: Tensor::from_data(self.boxes, device),
-            objects: self.objects,
-            scenes: self.scenes,
-            prompts: self.prompts,
         }
     }
 }
@@ -115,7 +89,7 @@ impl<S: Source> Loader<S> {
     /// [`Error::Threads`](crate::Error::Threads) if the system gives no thread.
     pub fn on(self, device: &Device) -> Result<Batches> {
         Ok(Batches {
-            parts: self.each(Parts::of)?,
+            pairs: self.ordered()?,
             device: device.clone(),
         })
     }
@@ -124,7 +98,7 @@ impl<S: Source> Loader<S> {
 /// The batches of a [`Loader`], without end: each thread is up to four ahead.
 #[derive(Debug)]
 pub struct Batches {
-    parts: Ordered<Parts>,
+    pairs: Ordered<Vec<Pair>>,
     device: Device,
 }
 
@@ -132,8 +106,8 @@ impl Iterator for Batches {
     type Item = Result<Batch>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let parts = self.parts.next()?;
-        Some(parts.map(|parts| parts.onto(&self.device)))
+        let pairs = self.pairs.next()?;
+        Some(pairs.map(|pairs| ToBatch.batch(pairs, &self.device)))
     }
 }
 

@@ -58,15 +58,14 @@ impl<S: Source> Loader<S> {
     ///
     /// As [`on`](Self::on); each batch those of [`Source::items`].
     pub fn pairs(self) -> Result<impl Iterator<Item = Result<Vec<Pair>>>> {
-        self.each(|pairs| pairs)
+        self.ordered()
     }
 
-    /// What is made of the pairs of each batch, on the threads, in order.
-    pub(super) fn each<T: Send + 'static>(self, make: fn(Vec<Pair>) -> T) -> Result<Ordered<T>> {
+    pub(super) fn ordered(self) -> Result<Ordered<Vec<Pair>>> {
         let (source, batch) = (self.source, self.batch as u64);
         let steps = self.start..u64::MAX / batch;
         Ordered::new(steps, self.threads, move |step| {
-            Ok(make(source.items(step * batch..(step + 1) * batch)?))
+            source.items(step * batch..(step + 1) * batch)
         })
     }
 }
