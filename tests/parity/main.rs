@@ -18,6 +18,8 @@ mod published;
 mod requests;
 mod saving;
 mod schedulers;
+#[cfg(feature = "flex")]
+mod shipped;
 mod taps;
 mod tiling;
 mod units;

@@ -1,6 +1,6 @@
-//! `wake evaluate`: what it refuses.
+//! `wake evaluate`: what it refuses, and one run of the model and of the simulator.
 
-use super::{cannot_write, refused_by};
+use super::{cannot_write, done, names, refused_by};
 
 #[test]
 fn wrong_options_are_named() {
@@ -23,4 +23,25 @@ fn wrong_options_are_named() {
     ];
     refused_by("evaluate", &lpips, &["no/backbone"]);
     cannot_write("evaluate", &["--count", "1"]);
+}
+
+/// Every figure and picture is made, though one scene says nothing; less than four images have no two-sample test.
+#[test]
+fn one_scene_is_judged() {
+    for arguments in [&["--count", "1"][..], &["--count", "1", "--simulator-only"]] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let out = folder.path().join("out");
+        let printed = done("evaluate", arguments, &out);
+        assert!(printed.contains("## Seconds per image"), "{printed}");
+        assert_eq!(
+            names(&out),
+            [
+                "ablation.png",
+                "report.json",
+                "report.md",
+                "spectrum.svg",
+                "wake_correlation.svg"
+            ]
+        );
+    }
 }
