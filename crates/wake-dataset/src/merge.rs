@@ -173,5 +173,5 @@ fn remove(path: &Path) -> Result<()> {
     ] {
         gone(std::fs::remove_file(file))?;
     }
-    gone(std::fs::remove_dir(path))
+    Ok(gone(std::fs::remove_dir(path))?)
 }

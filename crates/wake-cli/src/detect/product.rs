@@ -1,7 +1,7 @@
 //! `wake detect PRODUCT`: the wakes of a satellite product as places on a map.
 
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use image::{ImageFormat, RgbImage};
 use indicatif::ProgressBar;
