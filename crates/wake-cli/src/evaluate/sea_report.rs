@@ -28,16 +28,6 @@ pub(crate) struct RecipeRow {
     pub(crate) network: TwoSample,
 }
 
-/// Everything that `report.json` holds.
-#[derive(Debug, Serialize)]
-pub(crate) struct SeaReport {
-    pub(crate) images: usize,
-    /// Windows of each kind.
-    pub(crate) windows: usize,
-    /// The right halves first.
-    pub(crate) rows: Vec<SeaRow>,
-}
-
 /// The report in Markdown.
 pub(crate) fn markdown(report: &SeaReport) -> String {
     let command = "wake evaluate sea --real DIR";
