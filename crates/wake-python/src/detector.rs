@@ -68,7 +68,7 @@ impl PyDetector {
                 let Ok(wakes) = detector.find_in(&amplitudes, &tile);
                 found.extend(wakes);
             }
-            Ok(Detector::merged(found))
+            Ok(detector.merged(found))
         })?;
         json(py, &found.iter().map(detection).collect::<Vec<_>>())
     }

@@ -169,8 +169,7 @@ impl From<wake_detector::Error> for Fault {
         let text = error.to_string();
         match error {
             E::Model(error) => error.into(),
-            E::WrongMaps { .. } => Self(WeightsError::new_err(text)),
-            E::OutOfRange { .. } => Self(OptionError::new_err(text)),
+            E::WrongMaps { .. } | E::Calibration { .. } => Self(WeightsError::new_err(text)),
             E::WrongSize { .. } => Self(ArrayError::new_err(text)),
             E::Io { .. } | E::NoImages { .. } | E::Unreadable { .. } => {
                 Self(FileError::new_err(text))
