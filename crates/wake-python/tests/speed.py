@@ -1,9 +1,9 @@
 """Measures the package beside its own Rust code, and prints the rows of docs/python.md. On an idle machine:
 
-    python tests/speed.py [simulate] [batch] [loader] [ray]
+    python tests/speed.py [simulate] [batch] [loader]
 
 `simulate` compares the time of a call with the time that Rust measures inside it; `loader` compares torch's loader with `Dataset.write`, which is
-`wake dataset`; `ray` compares one and two workers with the same images made in this process.
+`wake dataset`.
 """
 
 from __future__ import annotations
@@ -79,30 +79,6 @@ def loader() -> None:
         row(f"DataLoader, {name}, 2 workers, their start included", f"{rate:.1f} images/s", f"{rate / write:.2f}")
 
 
-def ray() -> None:
-    import ray as cluster
-
-    from shipwake.ray import Simulate
-
-    arguments: dict[str, Any] = {"seed": 7, "changes": CHANGES}
-    alone = Simulate(**arguments)
-    alone({"id": np.arange(4)})
-    own = IMAGES / seconds(lambda: alone({"id": np.arange(IMAGES)}))
-    row("one process, one thread", f"{own:.1f} images/s", 1)
-    cluster.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-    for workers in (1, 2):
-        rows = cluster.data.range(2 * IMAGES, override_num_blocks=16).map_batches(
-            Simulate, fn_constructor_kwargs=arguments, batch_size=8, concurrency=workers
-        )
-        # From the first image to the last: the start of the workers is not the engine's overhead on an image.
-        stream = iter(rows.iter_rows())
-        next(stream)
-        begin, count = time.perf_counter(), sum(1 for _ in stream)
-        rate = count / (time.perf_counter() - begin)
-        row(f"Ray, {workers} workers", f"{rate:.1f} images/s", f"{rate / own / workers:.2f} a worker")
-    cluster.shutdown()
-
-
 if __name__ == "__main__":
     for name in sys.argv[1:] or ["simulate", "batch", "loader"]:
-        {"simulate": simulate, "batch": batch, "loader": loader, "ray": ray}[name]()
+        {"simulate": simulate, "batch": batch, "loader": loader}[name]()

@@ -11,7 +11,7 @@ import pytest
 import shipwake
 
 MODULES = ["shipwake", *(f"shipwake.{one.name}" for one in pkgutil.iter_modules(shipwake.__path__))]
-NEEDS = {"shipwake.torch": "torch", "shipwake.ray": "ray"}
+NEEDS = {"shipwake.torch": "torch"}
 
 
 @pytest.mark.parametrize("name", [name for name in MODULES if name != "shipwake._core"])

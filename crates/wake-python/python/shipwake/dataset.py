@@ -266,9 +266,9 @@ class Dataset:
             rows["text"].append(item["prompt"])
             rows["objects"].append(
                 {
-                    "bbox": np.stack([left, top, right - left, bottom - top], axis=1),
-                    "oriented": item["corners"],
-                    "categories": item["classes"],
+                    "bbox": np.stack([left, top, right - left, bottom - top], axis=1).tolist(),
+                    "oriented": item["corners"].tolist(),
+                    "categories": item["classes"].tolist(),
                 }
             )
             rows["scene"].append(item["scene"].to_toml())

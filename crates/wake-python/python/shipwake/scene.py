@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from . import _check, _core
 from .errors import OptionError, UnknownKeyError
@@ -13,7 +13,7 @@ from .plan import Plan
 
 __all__ = ["Scene", "Wording"]
 
-Wording = Literal["paper", "wind-first", "radar-first", "brief"]
+Wording: TypeAlias = Literal["paper", "wind-first", "radar-first", "brief"]
 """How a scene is put in words."""
 
 _WORDINGS: tuple[str, ...] = ("paper", "wind-first", "radar-first", "brief")
@@ -124,7 +124,7 @@ class Scene:
         """The scene in words. Of several ships the prompt states speed and heading of the first.
 
         >>> Scene(ship=None).prompt("brief")
-        'SAR image of open sea without a ship, wind 5 mps toward 90 degrees, fetch 40000 meter, incidence 32 degrees.'
+        'SAR open sea, no ship, wind 5 mps toward 90 degrees, fetch 40000 meter, incidence 32 degrees.'
         """
         if wording not in _WORDINGS:
             raise OptionError(f"wording is {wording!r:.80}, expected one of {', '.join(_WORDINGS)}")
@@ -146,6 +146,8 @@ class Scene:
             tables = self._inner.to_tables()
             tables["seed"] = int(tables["seed"])
             tables.setdefault("ship", None)
+            if tables["sea"]["depth"] == "infinite":
+                tables["sea"]["depth"] = float("inf")
             self._tables = tables
         return self._tables
 

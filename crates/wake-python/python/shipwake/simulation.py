@@ -113,8 +113,8 @@ def simulate(scene: Scene, *, threads: int | None = None, direct: bool = False) 
     >>> simulation = simulate(Scene(grid={"rows": 64, "columns": 64}))
     >>> simulation.intensity.shape, simulation.intensity.dtype
     ((64, 64), dtype('float32'))
-    >>> [thing.name for thing in simulation.labels.objects]
-    ['wake']
+    >>> simulation.labels.ships[0]["ship"]["speed"]
+    10.0
 
     Args:
         scene: What is simulated.
