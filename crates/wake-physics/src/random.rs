@@ -65,11 +65,12 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    const ALL: [Stream; 8] = [
+    const ALL: [Stream; 9] = [
         Stream::Sea,
         Stream::Points,
         Stream::Scatterers,
         Stream::Gusts,
+        Stream::Mottle,
         Stream::Slicks,
         Stream::Swell,
         Stream::Reflectivity,

@@ -2,6 +2,7 @@
 
 mod ablation;
 mod calibration;
+mod common;
 mod curve;
 mod detector;
 mod domain;

@@ -14,8 +14,9 @@ use wake_train::evaluation::{
     Evaluation, HeldOut, ImageSource, Named, Reconstructed, TextToImage, View,
 };
 
+use super::common::Common;
 use super::judged::Judged;
-use super::options::Common;
+use super::schedulers::Drawn;
 use super::{curve, effects, plot, schedulers};
 use crate::exit::Outcome;
 use crate::generate::scheduler_of;
@@ -62,12 +63,6 @@ pub(crate) struct Options {
     samples: Option<u64>,
     #[command(flatten)]
     common: Common,
-}
-
-/// A scheduler's name, and the model with it.
-pub(super) struct Drawn<'a> {
-    pub(super) scheduler: String,
-    pub(super) source: TextToImage<'a>,
 }
 
 pub(crate) fn run(options: &Options) -> Outcome<()> {

@@ -1,12 +1,17 @@
 //! Schedulers and their steps: figures, seconds, and the error against many steps.
 
-use super::pipeline::Drawn;
 use crate::exit::Outcome;
 use serde::Serialize;
 use std::time::Instant;
 use wake_physics::{Field, Scene};
-use wake_train::evaluation::{Baseline, Evaluation, ImageSource, PixelRow, Told};
+use wake_train::evaluation::{Baseline, Evaluation, ImageSource, PixelRow, TextToImage, Told};
 use wake_train::metrics::Lpips;
+
+/// A scheduler's name, and the model with it.
+pub(super) struct Drawn<'a> {
+    pub(super) scheduler: String,
+    pub(super) source: TextToImage<'a>,
+}
 
 /// Scenes that every scheduler draws, as many as there are up to this number.
 const SCENES: usize = 16;

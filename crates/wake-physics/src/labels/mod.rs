@@ -8,6 +8,7 @@ mod clip;
 mod curve;
 mod dark_line;
 mod empty_list;
+mod rows;
 mod short_waves;
 mod visibility;
 

@@ -1,6 +1,7 @@
 //! How far a wake is seen, and how clearly: its expected contrast against sea and speckle, without an image.
 
 use super::dark_line::DarkLine;
+use super::rows::rows_in;
 use super::short_waves::{Profile, ShortWaves};
 use crate::effects::Effects;
 use crate::kelvin::{KelvinWake, Ray};
@@ -16,7 +17,6 @@ use crate::turbulent::current::WakeEdge;
 use crate::window::sinc;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// Side of the windows in which a wake is looked for \[pixels\]: chosen.
 const WINDOW: usize = 16;
@@ -34,9 +34,6 @@ const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
 
 /// Least standard deviation of a pixel that counts: the rounding of the fields.
 const LEAST_NOISE: f64 = 1e-6;
-
-/// Rows of windows beyond which one cannot be told from the next: their numbers round to 2⁻⁴ of a row.
-const FARTHEST_ROW: f64 = (1u64 << 48) as f64;
 
 /// How clearly a wake is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -407,27 +404,6 @@ impl<'a> Background<'a> {
         let [height, across] = [self.raster.rows, self.raster.columns].map(|n| n as f64);
         2.0 * height.hypot(across) * self.raster.spacing
     }
-}
-
-/// The rows of windows, counted from the stern, that may hold a place of the image. Their number does not grow with the distance
-/// of the ship: those that the image is long along a straight track, and those of half a circle.
-///
-/// - `half_length` of the hull, `step` from row to row \[m\]
-/// - none where the ship is so far that rows cannot be told apart
-fn rows_in(track: &Track, raster: &Raster, half_length: f64, step: f64) -> [Range<u64>; 2] {
-    let farthest = (track.farthest_astern(raster) - half_length).max(0.0);
-    let end = (farthest / step).ceil();
-    let mut next = 0.0f64;
-    track.astern(raster).map(|[near, far]| {
-        let row = |distance: f64| (distance - half_length) / step;
-        let first = (row(near).floor() - 1.0).max(next);
-        let last = (row(far).ceil() + 1.0).min(end);
-        if last >= FARTHEST_ROW || first >= last {
-            return 0..0;
-        }
-        next = last;
-        first as u64..last as u64
-    })
 }
 
 /// Smallest and largest of some values.

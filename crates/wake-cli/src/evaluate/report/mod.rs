@@ -4,7 +4,7 @@ mod contents;
 mod images;
 mod values;
 
-use super::options::Common;
+use super::common::Common;
 use crate::exit::{self, Outcome};
 pub(crate) use contents::{PAPER, Report};
 use contents::{Paper, number};

@@ -60,7 +60,8 @@ impl TrainingRanges {
         Ok(ranges)
     }
 
-    /// Checks that a scene has only values that were seen; a ranges of no scene holds every scene.
+    /// Checks that a scene has only values that were seen; a ranges of no scene holds every scene. Keys that scenes did not have when
+    /// these were seen must have their default.
     ///
     /// # Errors
     ///
@@ -69,8 +70,10 @@ impl TrainingRanges {
         if self.0.is_empty() {
             return Ok(());
         }
+        let defaults = Self::of([&Scene::default()])?;
         for (option, value) in leaves(scene)? {
-            let seen = self.0.get(&option).cloned().unwrap_or_default();
+            let seen = self.0.get(&option).or_else(|| defaults.0.get(&option));
+            let seen = seen.cloned().unwrap_or_default();
             if !seen.holds(&value) {
                 return Err(Error::Model(wake_nn::Error::InvalidOption {
                     option,

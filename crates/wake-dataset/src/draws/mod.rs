@@ -1,5 +1,7 @@
 //! Scenes whose values are drawn, each on its own, keyed by their path in a scene file.
 
+mod table;
+
 use super::delivery::Delivery;
 use super::distribution::{Distribution, Value, choose, refused};
 use crate::error::{Error, Result};
@@ -8,6 +10,7 @@ use serde::de::Error as _;
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
+use table::{is_whole, place, replace_radar, set, tenths, toml, with_length};
 use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
 use wake_physics::scene::{Ship, stored_key};
@@ -386,75 +389,6 @@ fn number(
         Value::Number(number) => Some(number),
         _ => None,
     }
-}
-
-/// Takes away what a sensor sets: all of the radar but what no sensor sets, and the spacing.
-fn replace_radar(table: &mut toml::Table) {
-    let mut of = |name: &str, keep: &dyn Fn(&str) -> bool| {
-        if let Some(table) = table.get_mut(name).and_then(toml::Value::as_table_mut) {
-            table.retain(|key, _| keep(key));
-        }
-    };
-    of("radar", &|key| key == "relaxation_rate");
-    of("grid", &|key| key != "spacing");
-}
-
-/// Whether a value of a scene is a whole number.
-fn is_whole(path: &str) -> bool {
-    ["radar.looks", "grid.oversampling", COUNT, QUALITY].contains(&path)
-}
-
-fn toml(value: &Value, whole: bool) -> toml::Value {
-    match value {
-        Value::Flag(flag) => (*flag).into(),
-        Value::Word(word) => word.as_str().into(),
-        Value::Number(number) if whole => (*number as i64).into(),
-        Value::Number(number) => (*number).into(),
-    }
-}
-
-/// Sets the value at a path of tables.
-fn set(table: &mut toml::Table, path: &str, value: toml::Value) -> Result<(), String> {
-    let (tables, last) = path.rsplit_once('.').unwrap_or(("", path));
-    let mut table = table;
-    for name in tables.split('.').filter(|name| !name.is_empty()) {
-        let entry = table
-            .entry(name.to_owned())
-            .or_insert_with(|| toml::Table::new().into());
-        table = entry
-            .as_table_mut()
-            .ok_or_else(|| format!("draw.{path}: {name} is no table"))?;
-    }
-    table.insert(last.to_owned(), value);
-    Ok(())
-}
-
-fn tenths(value: f64) -> f64 {
-    (10.0 * value).round() / 10.0
-}
-
-/// A coordinate \[m\] between the first pixel's centre and the last one's, in steps of 0.1 m.
-fn place(pixels: usize, spacing: f64, at: f64) -> f64 {
-    let first = -((pixels / 2) as f64);
-    let pixel = first + at * pixels.saturating_sub(1) as f64;
-    tenths(spacing * pixel)
-}
-
-/// Another length; beam and draft keep their proportion to it, in steps of 0.1 mm, so that every reader of JSON gets the
-/// same numbers.
-fn with_length(ship: &mut toml::Table, length: f64) {
-    let number = |ship: &toml::Table, key: &str, default: f64| {
-        ship.get(key)
-            .and_then(toml::Value::as_float)
-            .unwrap_or(default)
-    };
-    let default = Ship::default();
-    let before = number(ship, "length", default.length);
-    for (key, size) in [("beam", default.beam), ("draft", default.draft)] {
-        let scaled = (1e4 * number(ship, key, size) * length / before).round() / 1e4;
-        ship.insert(key.to_owned(), scaled.into());
-    }
-    ship.insert("length".to_owned(), length.into());
 }
 
 impl Serialize for Draws {

@@ -1,0 +1,41 @@
+//! Options of every evaluation of images.
+
+use crate::exit::Outcome;
+use clap::Args;
+use std::path::PathBuf;
+use wake_nn::burn::tensor::Device;
+use wake_train::metrics::{Lpips, LpipsNetwork};
+
+/// Options of every evaluation of images.
+#[derive(Args)]
+pub(crate) struct Common {
+    /// Held-out scenes
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub(crate) count: u32,
+    /// Weights of torchvision's alexnet as safetensors, for LPIPS; without them LPIPS is left out
+    #[arg(long, value_name = "FILE", requires = "lpips_linear")]
+    lpips_backbone: Option<PathBuf>,
+    /// Linear weights of the package lpips as safetensors
+    #[arg(long, value_name = "FILE", requires = "lpips_backbone")]
+    lpips_linear: Option<PathBuf>,
+    /// flex, ndarray, wgpu or cuda, where compiled in; a GPU's number may follow, as in cuda:1
+    #[arg(long, default_value = "flex")]
+    pub(crate) device: String,
+    /// Folder of the results, made if absent
+    #[arg(long, value_name = "DIR", default_value = "out/evaluate")]
+    pub(crate) out: PathBuf,
+    /// Print the report as JSON on standard output, and nothing else
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Common {
+    /// The networks of LPIPS, where they are named.
+    pub(crate) fn lpips(&self, device: &Device) -> Outcome<Option<Lpips>> {
+        let (Some(backbone), Some(linear)) = (&self.lpips_backbone, &self.lpips_linear) else {
+            return Ok(None);
+        };
+        let lpips = Lpips::load(LpipsNetwork::Alex, backbone, linear, device)?;
+        Ok(Some(lpips))
+    }
+}
