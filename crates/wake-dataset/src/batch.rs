@@ -199,7 +199,15 @@ mod tests {
     /// Row by row the box, the class and the image of every object.
     #[test]
     fn boxes_are_those_of_the_objects() {
-        let batch = ToBatch.batch(source().items(0..30).unwrap(), &Device::default());
+        // Large enough for wakes that are seen in two rows of windows.
+        let sizes = [
+            "scene.grid.rows = 64",
+            "scene.grid.columns = 64",
+            "scene.grid.spacing = 8",
+        ];
+        let recipe = Recipe::default().with_assignments(&sizes).unwrap();
+        let source = Simulated::new(recipe, 5).unwrap();
+        let batch = ToBatch.batch(source.items(0..30).unwrap(), &Device::default());
         let rows: Vec<f32> = batch.boxes.clone().into_data().try_to_vec().unwrap();
         let mut rows = rows.chunks(6);
         assert_eq!(
@@ -213,7 +221,7 @@ mod tests {
                 let expected = [image as f64, class, left, top, width, height];
                 let row = rows.next().unwrap();
                 for (found, expected) in row.iter().zip(expected) {
-                    // Rounding of f32 below 24 pixels.
+                    // Rounding of f32 up to 64 pixels.
                     assert!((f64::from(*found) - expected).abs() < 1e-5, "{row:?}");
                 }
             }
