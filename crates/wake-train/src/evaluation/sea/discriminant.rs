@@ -214,6 +214,7 @@ mod tests {
             accuracy("power") > 0.99 && accuracy("all") > 0.99,
             "{rows:?}"
         );
-        assert!(accuracy("mottle") < 0.9, "{rows:?}");
+        // Neither kind has blocks.
+        assert!((accuracy("JPEG") - 0.5).abs() < 4.0 * 0.072, "{rows:?}");
     }
 }
