@@ -10,7 +10,7 @@ use serde::de::Error as _;
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
-use table::{is_whole, place, replace_radar, set, tenths, toml, with_length};
+use table::{place, replace_radar, set, tenths, toml, with_length};
 use wake_nn::noise::NoiseSource;
 use wake_physics::Scene;
 use wake_physics::scene::{Ship, stored_key};
@@ -389,6 +389,11 @@ fn number(
         Value::Number(number) => Some(number),
         _ => None,
     }
+}
+
+/// Whether a value of a scene is a whole number.
+fn is_whole(path: &str) -> bool {
+    ["radar.looks", "grid.oversampling", COUNT, QUALITY].contains(&path)
 }
 
 impl Serialize for Draws {

@@ -1,6 +1,5 @@
 //! Values of scenes in their TOML tables.
 
-use super::{COUNT, QUALITY};
 use crate::distribution::Value;
 use wake_physics::scene::Ship;
 
@@ -13,11 +12,6 @@ pub(super) fn replace_radar(table: &mut toml::Table) {
     };
     of("radar", &|key| key == "relaxation_rate");
     of("grid", &|key| key != "spacing");
-}
-
-/// Whether a value of a scene is a whole number.
-pub(super) fn is_whole(path: &str) -> bool {
-    ["radar.looks", "grid.oversampling", COUNT, QUALITY].contains(&path)
 }
 
 pub(super) fn toml(value: &Value, whole: bool) -> toml::Value {
