@@ -98,10 +98,8 @@ sensors! {
 
 /// Interferometric wide swath, ground range detected, high resolution; alike on Sentinel-1A to 1D, whose radars and orbits are the same.
 ///
-/// Frequency, range window, looks and overlap (3.5 of 14.1 MHz), noise, pulse rate (of IW1) and range resolution: annotation of a
-/// product of 12 June 2022. Window and resolution in azimuth: fitted to the correlations 0.43, −0.01 and 0.00 of its sea at lags of
-/// one to three pixels, here 0.435, 0.009 and 0.005. Without a window they are 0.437, 0.002 and 0.047; the annotated Hamming 0.70 at
-/// the annotated bandwidth gives 0.66 at the first.
+/// Frequency, windows, looks and overlap (3.5 of 14.1 MHz), noise, pulse rate (of IW1) and resolution: annotation of a
+/// product of 12 June 2022. Azimuth is unwindowed, as its sea was measured.
 fn sentinel_1_iw() -> SensorMode {
     SensorMode {
         frequency: 5.405e9,
@@ -112,8 +110,8 @@ fn sentinel_1_iw() -> SensorMode {
         spacing: 10.0,
         // 14.1 MHz and Hamming 0.70 in the first sub-swath; the bandwidths of the others leave 19.6 and 19.5 m.
         range_resolution: RangeResolution::Ground(20.3),
-        azimuth_resolution: 17.2,
-        windows: [Window::Hamming(0.70), Window::Hamming(0.85)],
+        azimuth_resolution: 18.4,
+        windows: [Window::Hamming(0.70), Window::Uniform],
         looks: (5, 0.25),
         nesz: -25.0,
         prf: 1717.0,

@@ -87,9 +87,8 @@ fn the_speckle_is_that_of_the_product() {
         ([0, 1], 0.625),
         ([0, 2], 0.140),
         ([0, 3], 0.010),
-        ([1, 0], 0.435),
-        ([2, 0], 0.009),
-        ([3, 0], 0.005),
+        ([1, 0], 0.437),
+        ([2, 0], 0.002),
     ] {
         let found = correlation(image, place);
         assert!((found - expected).abs() < error, "{place:?}: {found}");
