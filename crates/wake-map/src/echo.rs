@@ -16,7 +16,7 @@ pub struct Echo {
     /// Longitude of the place where it is imaged \[degrees\].
     pub longitude: f64,
     /// How far it lies from the wake along azimuth, in the direction of flight \[m\]; `None` where the axis of the wake does not
-    /// tell it to [`MOST_DEVIATION`] of velocity.
+    /// tell it to 0.25 m/s.
     pub displacement: Option<f64>,
     /// Velocity toward the radar that the displacement means \[m/s\].
     pub radial_velocity: Option<f64>,
