@@ -1,4 +1,4 @@
-//! What is asked for.
+//! Arguments of `wake detect`.
 
 use std::path::PathBuf;
 
@@ -45,14 +45,14 @@ pub(crate) struct Arguments {
     pub(super) product: ProductArguments,
 }
 
-/// What is asked for of a product.
+/// Arguments for satellite products.
 #[derive(clap::Args, Debug, Clone)]
 #[command(next_help_heading = "Products")]
 pub(crate) struct ProductArguments {
     /// Also write the wakes as GeoJSON to this file
     #[arg(long, value_name = "FILE")]
     pub(super) geojson: Option<PathBuf>,
-    /// Polygons of land (GeoJSON), in the place of the built-in coast of Natural Earth
+    /// Polygons of land (GeoJSON), instead of the built-in coast of Natural Earth
     #[arg(long, value_name = "FILE")]
     pub(super) land: Option<PathBuf>,
     /// Search land, too

@@ -1,4 +1,4 @@
-//! How sure a detection is, in words.
+//! Confidence of a detection as text.
 
 /// The probability of a detection, or its score where none is known.
 pub(super) fn how_sure(probability: Option<f64>, score: f64) -> String {
