@@ -4,20 +4,34 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use arbitrary::Unstructured;
 use arbtest::arbtest;
+use rand::rngs::Xoshiro256PlusPlus;
+use rand::{Rng, SeedableRng};
 
 use crate::mutation;
 
 /// No sentence about an input is longer [characters].
 const LONGEST: usize = 4000;
 
-/// Replays the corpus of a target, then mutates it for a while.
+/// Replays the corpus of a target, then mutates it: for the seconds of `FUZZ_SECONDS`, by default 1, or so many times as
+/// `FUZZ_EXECUTIONS` says, from the seeds 0, 1, 2, ….
 pub(crate) fn attack(target: &str, check: impl Fn(&[u8])) {
     let corpus = corpus(target);
     assert!(!corpus.is_empty(), "no corpus for {target}");
     corpus.iter().for_each(|input| check(input));
-    let seconds = std::env::var("FUZZ_SECONDS").ok();
-    let seconds = seconds.map_or(1.0, |text| text.parse().expect("FUZZ_SECONDS is a number"));
+    if let Some(count) = variable::<u64>("FUZZ_EXECUTIONS") {
+        for seed in 0..count {
+            let entropy = entropy(seed);
+            let _named = Named { target, seed };
+            if let Ok(input) = mutation::mutated(&mut Unstructured::new(&entropy), &corpus) {
+                check(&input);
+            }
+        }
+        println!("{target}: {count} executions");
+        return;
+    }
+    let seconds = variable("FUZZ_SECONDS").unwrap_or(1.0);
     let executions = Cell::new(corpus.len());
     arbtest(|u| {
         let input = mutation::mutated(u, &corpus)?;
@@ -27,6 +41,33 @@ pub(crate) fn attack(target: &str, check: impl Fn(&[u8])) {
     })
     .budget(Duration::from_secs_f64(seconds));
     println!("{target}: {} executions", executions.get());
+}
+
+/// A number from the environment.
+fn variable<T: std::str::FromStr<Err: std::fmt::Debug>>(name: &str) -> Option<T> {
+    let text = std::env::var(name).ok()?;
+    Some(text.parse().expect("a number"))
+}
+
+/// Bytes that a mutation is drawn from.
+fn entropy(seed: u64) -> Vec<u8> {
+    let mut bytes = vec![0; 512];
+    Xoshiro256PlusPlus::seed_from_u64(seed).fill_bytes(&mut bytes);
+    bytes
+}
+
+/// Names the seed of an input that broke something.
+struct Named<'a> {
+    target: &'a str,
+    seed: u64,
+}
+
+impl Drop for Named<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("{}: FUZZ_EXECUTIONS seed {}", self.target, self.seed);
+        }
+    }
 }
 
 fn corpus(target: &str) -> Vec<Vec<u8>> {

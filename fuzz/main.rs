@@ -4,6 +4,7 @@
 //! ```text
 //! cargo test --features train --test fuzz                                          # corpora, then a second each
 //! FUZZ_SECONDS=600 cargo test --release --features train --test fuzz -- --nocapture   # for long; prints executions
+//! FUZZ_EXECUTIONS=1000000 cargo test …                                             # so many, from seeds that a failure names
 //! ARBTEST_SEED=…                                                                   # as a failure names it: in `attack`
 //! ```
 //!

@@ -1,9 +1,9 @@
 """Compares the wakes of `wake detect` with the ships of `wake simulate --product`: positions, headings, radial velocities.
 
-    python3 tests/foreign/compare_map.py SHIPS.geojson wakes.geojson AZIMUTH [--each]
+    python3 tests/foreign/compare_map.py SHIPS.geojson wakes.geojson [--each]
 
-AZIMUTH is the direction of increasing range from true north (`platformHeading` of the annotation plus 90 degrees). `--each` also
-prints every ship: how far the tip of its wake lies astern of the stern and to starboard of the track, the turn, and both velocities.
+The direction of increasing range is that of a plane through the tips of the wakes. `--each` also prints every ship: how far the tip
+of its wake lies astern of the stern and to starboard of the track, the turn, and both velocities.
 """
 import json
 import math
@@ -15,7 +15,6 @@ FARTHEST = 600.0  # m
 
 ships = json.load(open(sys.argv[1]))["features"]
 wakes = json.load(open(sys.argv[2]))["features"]
-range_azimuth = math.radians(float(sys.argv[3]))
 wakes = [wake for wake in wakes if wake["properties"]["type"] == "wake" and wake["properties"]["sure"]]
 middle = statistics.mean(ship["geometry"]["coordinates"][1] for ship in ships)
 
@@ -26,6 +25,19 @@ def metres(place):
     return longitude * RADIUS * math.cos(math.radians(middle)), latitude * RADIUS
 
 
+def slopes(values):
+    """Change of values with (line, pixel), by least squares over the tips of the wakes."""
+    places = [(wake["properties"]["line"], wake["properties"]["pixel"]) for wake in wakes]
+    means = [statistics.mean(part) for part in zip(*places)]
+    mean = statistics.mean(values)
+    away = [(line - means[0], pixel - means[1], value - mean) for (line, pixel), value in zip(places, values)]
+    a, b, c = (sum(d[i] * d[j] for d in away) for i, j in [(0, 0), (0, 1), (1, 1)])
+    p, q = (sum(d[i] * d[2] for d in away) for i in range(2))
+    return (c * p - b * q) / (a * c - b * b), (a * q - b * p) / (a * c - b * b)
+
+
+tips = [metres(wake["geometry"]["coordinates"][0]) for wake in wakes]
+range_azimuth = math.atan2(slopes([east for east, _ in tips])[1], slopes([north for _, north in tips])[1])
 each = "--each" in sys.argv
 errors = {"position [m]": [], "heading [deg]": [], "radial velocity [m/s]": []}
 taken = set()

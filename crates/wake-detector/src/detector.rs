@@ -216,7 +216,12 @@ impl Mapper for Detector {
         let maps = self
             .network
             .forward(Tensor::from_data(inputs, &self.device));
-        let values = maps.into_data().iter::<f32>().collect();
+        let values = maps.into_data();
+        let values = match values.try_to_vec::<f32>() {
+            Ok(values) => values,
+            // Half precision.
+            Err(_) => values.iter::<f32>().collect(),
+        };
         Maps::new(rows / STRIDE, columns / STRIDE, values)
     }
 }

@@ -24,12 +24,12 @@ const LARGE_TILE: usize = 2048;
 const MARGIN: usize = 384;
 /// Scales at which an image is searched, when its own fits the network.
 const SCALES: [f32; 5] = [0.35, 0.5, 0.7, 1.0, 1.4];
-/// Where the pixel spacing is known: the scale at which everything is searched, the score from which on other scales look, too, those
-/// scales, how far around a wake and how far along it they look, and the longest side of what they look at together
-/// \[pixels at scale 1\].
-const FIRST: f32 = 0.7;
+/// Where the pixel spacing is known: the scales in their order. Everything is searched at the first; each of the others looks where
+/// those before it agree on a score from [`CANDIDATE`] on.
+const KNOWN_SCALES: [f32; 3] = [0.7, 1.0, 1.4];
 const CANDIDATE: f32 = 0.02;
-const OTHERS: [f32; 4] = [0.35, 0.5, 1.0, 1.4];
+/// How far around a wake and how far along it other scales look, and the longest side of what they look at together
+/// \[pixels at scale 1\].
 const AROUND: f32 = 128.0;
 const ALONG: f32 = 400.0;
 const TOGETHER: f32 = 1024.0;
@@ -72,7 +72,7 @@ pub(crate) fn merged(found: Vec<Detection>) -> Vec<Detection> {
 /// ```
 ///
 /// with `s_i` the score at scale i, 0 where nothing is found there.
-fn agreed(by_scale: Vec<Vec<Detection>>) -> Vec<Detection> {
+fn agreed(by_scale: &[Vec<Detection>]) -> Vec<Detection> {
     let count = by_scale.len().max(1) as f32;
     let kept = without_repeats(by_scale.iter().flatten().copied().collect(), NEAR);
     let raised = |one: Detection| {
@@ -215,10 +215,11 @@ pub(crate) fn in_tile<R: Raster>(
         let wake = is_told.then(|| tile.placed(one.wake)).flatten()?;
         Some(Detection { wake, ..one })
     };
-    let by_scale = by_scale
+    let by_scale: Vec<Vec<Detection>> = by_scale
         .into_iter()
-        .map(|found| found.into_iter().filter_map(told).collect());
-    Ok(agreed(by_scale.collect()))
+        .map(|found| found.into_iter().filter_map(told).collect())
+        .collect();
+    Ok(agreed(&by_scale))
 }
 
 /// Pixels that are searched.
@@ -241,16 +242,22 @@ impl View<'_> {
             .collect()
     }
 
-    /// The wakes at one scale, and at the others around them.
+    /// The wakes at the first of the known scales, and at each of the others around what those before it see.
     fn around_candidates(&self, native: f32, mapper: &dyn Mapper) -> Vec<Vec<Detection>> {
-        let mut first = self.at(FIRST * native, mapper);
-        first.retain(|one| one.score >= CANDIDATE);
-        let windows = windows(&first, [self.rows, self.columns], native);
-        let mut by_scale = vec![first];
-        for scale in OTHERS {
-            let windows = windows.iter();
-            let found = windows.flat_map(|&window| self.in_window(window, scale * native, mapper));
-            by_scale.push(found.collect());
+        let mut by_scale = Vec::new();
+        for scale in KNOWN_SCALES {
+            let found = if by_scale.is_empty() {
+                self.at(scale * native, mapper)
+            } else {
+                let mut candidates = agreed(&by_scale);
+                candidates.retain(|one| one.score >= CANDIDATE);
+                let windows = windows(&candidates, [self.rows, self.columns], native);
+                let windows = windows.into_iter();
+                let found =
+                    windows.flat_map(|window| self.in_window(window, scale * native, mapper));
+                found.collect()
+            };
+            by_scale.push(found);
         }
         by_scale
     }
@@ -561,16 +568,15 @@ mod tests {
         };
         assert!(at_spot(&found[0]), "{found:?}");
         assert!(!found[1..].iter().any(at_spot), "{found:?}");
-        // The whole image, and windows that are smaller.
-        assert_eq!(sizes.len(), 1 + OTHERS.len(), "{sizes:?}");
+        // The whole image, and windows that are smaller, at least one at each of the other scales.
+        assert!(sizes.len() >= KNOWN_SCALES.len(), "{sizes:?}");
         assert_eq!(
             sizes[0],
             [630, 770].map(|n: usize| n.next_multiple_of(MULTIPLE))
         );
-        for (size, scale) in sizes[1..].iter().zip(OTHERS) {
-            let [height, width] = [rows, columns].map(|n| 0.8 * scale * n as f32);
+        for [height, width] in &sizes[1..] {
             assert!(
-                (size[0] as f32) < height && (size[1] as f32) < width,
+                5 * height < 4 * rows && 5 * width < 4 * columns,
                 "{sizes:?}"
             );
         }

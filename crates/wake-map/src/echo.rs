@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use wake_detector::Wake;
-use wake_geo::{Product, Values};
+use wake_geo::{Product, Values, Window};
 
 /// A ship's echo.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -20,8 +20,21 @@ pub struct Echo {
     pub displacement: Option<f64>,
     /// Velocity toward the radar that the displacement means \[m/s\].
     pub radial_velocity: Option<f64>,
-    /// Standard deviation of that velocity, by how well the axis is known \[m/s\].
+    /// Standard deviation of that velocity, by how well the axis and the echo's middle are known \[m/s\].
     pub radial_velocity_deviation: Option<f64>,
+    /// Where the ship is: the place on the wake's axis at the echo's range, since motion displaces an echo along azimuth alone.
+    /// `None` where the axis runs so close to azimuth that the place is not known to 100 m.
+    #[serde(skip)]
+    pub(crate) ship: Option<ShipOnAxis>,
+}
+
+/// Where a ship is on the axis of its wake.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ShipOnAxis {
+    /// (Pixel, line) of midship.
+    pub(crate) middle: [f64; 2],
+    /// Half the length of the echo along the axis \[pixels\].
+    pub(crate) half_length: f64,
 }
 
 /// Fastest ship that is looked for \[m/s\].
@@ -30,13 +43,21 @@ const FASTEST: f64 = 18.0;
 const ASIDE: i64 = 24;
 /// An echo is brighter than the sea by this factor.
 const BRIGHT: f32 = 8.0;
-/// Pixels around the brightest one that belong to it.
-const REACH: i64 = 12;
+/// Pixels around the middle of an echo that may belong to it: half the length of the longest ships.
+const REACH: usize = 20;
+/// Pixels of an echo are brighter than this share of its brightest one: others are sidelobes.
+const LEAST_OF_PEAK: f32 = 0.01;
+/// Steps in which the middle of an echo is found from its brightest pixel.
+const STEPS: usize = 4;
+/// Standard deviation of the middle of an echo, both ways \[pixels\]: of 20 simulated ships 1.1 along azimuth and 1.5 along range.
+const MIDDLE: f64 = 1.5;
 /// Standard deviation across the axis of a line that stands out, and of one that does not \[pixels\]: the steps in which lines are
 /// fitted, and the cells of the detector's maps.
 const ACROSS: [f64; 2] = [1.5, 4.0];
 /// A velocity that is known less well is not told \[m/s\].
 pub(crate) const MOST_DEVIATION: f64 = 0.25;
+/// A place of the ship that is known less well is not told \[pixels\].
+const MOST_ALONG: f64 = 10.0;
 
 /// How a displacement becomes a velocity.
 #[derive(Debug, Clone, Copy)]
@@ -60,14 +81,28 @@ impl Displacements {
     /// d = Δy (line − line of the axis at the same range),    v = d/(R/V)
     /// ```
     fn of(&self, [pixel, line]: [f64; 2]) -> f64 {
-        let [right, down] = self.direction;
-        let on_axis = self.tip[1] + (pixel - self.tip[0]) * down / right;
-        (line - on_axis) * self.line_spacing
+        (line - self.line_of_axis(pixel)) * self.line_spacing
     }
 
-    /// Standard deviation of the velocity \[m/s\]: that of the axis, as it is seen along azimuth.
+    /// Line of the axis at a range.
+    fn line_of_axis(&self, pixel: f64) -> f64 {
+        let [right, down] = self.direction;
+        self.tip[1] + (pixel - self.tip[0]) * down / right
+    }
+
+    /// Standard deviation of the velocity \[m/s\]: of the axis, as it is seen along azimuth, and of the echo's middle.
     fn deviation(&self) -> f64 {
-        self.across / self.direction[0].abs() * self.line_spacing / self.ratio
+        let lines = (self.across / self.direction[0]).hypot(MIDDLE);
+        lines * self.line_spacing / self.ratio
+    }
+
+    /// Where on the axis a ship is whose echo lies at a range; `None` where that is not known.
+    fn ship(&self, pixel: f64, half_length: f64) -> Option<ShipOnAxis> {
+        let along = self.across.hypot(MIDDLE) / self.direction[0].abs();
+        (along <= MOST_ALONG).then(|| ShipOnAxis {
+            middle: [pixel, self.line_of_axis(pixel)],
+            half_length,
+        })
     }
 
     /// Whether a ship that leaves the wake astern can be there: its speed, toward the tip, is none that ships do not have.
@@ -116,7 +151,11 @@ pub(crate) fn echo(product: &Product, wake: &Wake, is_clear: bool) -> Option<Ech
         let middle = middle as i64;
         (middle - reach).max(0) as usize..(middle + reach + 1).clamp(0, size as i64) as usize
     };
-    let (rows, columns) = (range(at_line, along, lines), range(at_pixel, ASIDE, pixels));
+    let reach = REACH as i64;
+    let (rows, columns) = (
+        range(at_line, along + reach, lines),
+        range(at_pixel, ASIDE + reach, pixels),
+    );
     let window = product.read_window(rows.clone(), columns.clone()).ok()?;
     let mut sorted: Vec<f32> = window
         .values
@@ -142,24 +181,21 @@ pub(crate) fn echo(product: &Product, wake: &Wake, is_clear: bool) -> Option<Ech
         let [row, column] = [n / width, n % width];
         displacements.is_possible([(column + columns.start) as f64, (row + rows.start) as f64])
     };
+    let is_near = |n: &usize| {
+        let [row, column] = [n / width, n % width].map(|x| x as f64);
+        let aside = column + columns.start as f64 - tip_pixel;
+        let away = row + rows.start as f64 - tip_line;
+        aside.abs() <= ASIDE as f64 && away.abs() <= along as f64
+    };
     let bright = (0..window.values.len()).filter(|&n| window.values[n] > BRIGHT * sea);
-    let bright = bright.filter(is_possible);
+    let bright = bright.filter(is_near).filter(is_possible);
     let peak = bright.max_by(|&a, &b| score(a).total_cmp(&score(b)))?;
-    // The middle of what is bright around it.
-    let (row, column) = ((peak / width) as i64, (peak % width) as i64);
-    let (mut total, mut line, mut pixel) = (0.0, 0.0, 0.0);
-    for r in (row - REACH).max(0)..(row + REACH + 1).min(rows.len() as i64) {
-        for c in (column - REACH).max(0)..(column + REACH + 1).min(width as i64) {
-            let value = window.line(r as usize)[c as usize];
-            if value > 0.5 * BRIGHT * sea {
-                let weight = f64::from(value - sea);
-                total += weight;
-                line += weight * (r as usize + rows.start) as f64;
-                pixel += weight * (c as usize + columns.start) as f64;
-            }
-        }
-    }
-    let (line, pixel) = (line / total, pixel / total);
+    let least = (BRIGHT * sea).max(LEAST_OF_PEAK * window.values[peak]);
+    let middle = Middle::of(&window, peak, least);
+    let (line, pixel) = (
+        middle.row + rows.start as f64,
+        middle.column + columns.start as f64,
+    );
     let there = product.place(line, pixel).ok()?;
     let deviation = displacements.deviation();
     let is_known = deviation.is_finite() && deviation <= MOST_DEVIATION;
@@ -172,7 +208,67 @@ pub(crate) fn echo(product: &Product, wake: &Wake, is_clear: bool) -> Option<Ech
         displacement,
         radial_velocity: displacement.map(|metres| metres / ratio),
         radial_velocity_deviation: displacement.map(|_| deviation),
+        ship: displacements.ship(pixel, middle.half_length(displacements.direction)),
     })
+}
+
+/// Middle of an echo, and the second moments of its pixels around it.
+#[derive(Debug, Clone, Copy)]
+struct Middle {
+    row: f64,
+    column: f64,
+    /// Means of the squares of columns and rows, and of their product.
+    squares: [f64; 3],
+}
+
+impl Middle {
+    /// The middle of the bright pixels around the brightest one.
+    ///
+    /// All of them count the same: a few scatterers outshine the rest of a ship, and lie anywhere on it.
+    fn of(window: &Window, peak: usize, least: f32) -> Self {
+        let (rows, columns) = (window.lines, window.pixels);
+        let mut middle = Self {
+            row: (peak / columns) as f64,
+            column: (peak % columns) as f64,
+            squares: [0.0; 3],
+        };
+        for _ in 0..STEPS {
+            let around = |at: f64, size: usize| {
+                let at = at.round() as usize;
+                at.saturating_sub(REACH)..(at + REACH + 1).min(size)
+            };
+            let (mut count, mut sums, mut squares) = (0.0, [0.0; 2], [0.0; 3]);
+            for row in around(middle.row, rows) {
+                for column in around(middle.column, columns) {
+                    if window.line(row)[column] <= least {
+                        continue;
+                    }
+                    let (x, y) = (column as f64 - middle.column, row as f64 - middle.row);
+                    count += 1.0;
+                    sums = [sums[0] + x, sums[1] + y];
+                    squares = [squares[0] + x * x, squares[1] + y * y, squares[2] + x * y];
+                }
+            }
+            if count == 0.0 {
+                break;
+            }
+            let [x, y] = sums.map(|sum| sum / count);
+            let [xx, yy, xy] = squares.map(|sum| sum / count);
+            middle = Self {
+                row: middle.row + y,
+                column: middle.column + x,
+                squares: [xx - x * x, yy - y * y, xy - x * y],
+            };
+        }
+        middle
+    }
+
+    /// Half the length along a direction (right, down), as that of a bar: √3 standard deviations.
+    fn half_length(&self, [right, down]: [f64; 2]) -> f64 {
+        let [xx, yy, xy] = self.squares;
+        let variance = right * right * xx + down * down * yy + 2.0 * right * down * xy;
+        (3.0 * variance.max(0.0)).sqrt()
+    }
 }
 
 #[cfg(test)]
@@ -200,7 +296,7 @@ mod tests {
         assert!(!wake.is_possible([500.0, 800.0 + 220.0]));
         // At another range the axis lies elsewhere.
         assert!((wake.of([508.0, 806.0])).abs() < 1e-9);
-        assert!((wake.deviation() - 1.5 / 0.8 * 10.0 / 115.0).abs() < 1e-12);
+        assert!((wake.deviation() - (1.5f64 / 0.8).hypot(1.5) * 10.0 / 115.0).abs() < 1e-12);
         // Along azimuth nothing can be told, and nothing is ruled out.
         for wake in [
             across([0.3, 0.954], 1.5),

@@ -14,6 +14,8 @@ mod search;
 mod echo;
 mod profile;
 
+mod seen;
+
 mod wake;
 
 mod geojson;

@@ -21,8 +21,9 @@ pub enum Kind {
 /// Half the width of the line \[pixels\], and where the sea beside it begins and ends.
 const LINE: i32 = 2;
 const BESIDE: [i32; 2] = [7, 16];
-/// The line begins behind the ship \[pixels\]: its echo may lie on the first part.
-const BEHIND: f32 = 10.0;
+/// The line begins behind the ship, after a quarter of its length within these bounds \[pixels\]: the echo may lie on the first part,
+/// and the waves beside the ship displace what is seen of it.
+const BEHIND: [f32; 2] = [10.0, 40.0];
 /// No more of it is looked at \[pixels\].
 const LONGEST: f32 = 240.0;
 /// A contrast of fewer standard deviations is none.
@@ -30,8 +31,12 @@ const CLEAR: f64 = 4.0;
 /// Pixels brighter than the median of all around by this factor are of an echo.
 const ECHO: f64 = 5.0;
 /// How far the line may lie from where it was found, and by which angle it may be turned: pixels and degrees, in steps.
-const ASIDE: i32 = 14;
-const TURN: [f32; 2] = [4.0, 0.5];
+const ASIDE: i32 = 8;
+const TURN: [f32; 2] = [2.5, 0.5];
+/// Lines parallel to a wake are summed up to this distance from it \[pixels\].
+const FARTHEST: i32 = ASIDE + BESIDE[1];
+/// A bright line counts less by this factor where a dark one is near it.
+const BRIGHT: f64 = 0.5;
 
 /// Pixels around a wake.
 pub(crate) struct Surroundings {
@@ -68,7 +73,7 @@ impl Contrast {
 impl Surroundings {
     /// Reads the pixels around a wake; `None` where they cannot be read.
     pub(crate) fn of(product: &Product, wake: &Wake) -> Option<Self> {
-        let margin = (ASIDE + BESIDE[1]) as f32 + 0.1 * LONGEST;
+        let margin = FARTHEST as f32 + 0.1 * LONGEST;
         let ends = [wake.at(0.0), wake.at(wake.length.min(LONGEST))];
         let size = [product.size().1, product.size().0];
         let [columns, rows] = [0, 1].map(|axis| {
@@ -123,69 +128,106 @@ impl Surroundings {
         (power <= self.brightest).then_some(power)
     }
 
-    /// The contrast along a line; `None` where too few pixels are there.
-    pub(crate) fn contrast(&self, wake: &Wake) -> Option<Contrast> {
+    /// Sums along the lines parallel to a wake, from [`FARTHEST`] pixels to its left to as many to its right, beginning behind the
+    /// ship.
+    fn lines(&self, wake: &Wake) -> Vec<Sums> {
         let [right, down] = wake.direction();
-        let (mut line, mut beside) = ([0.0; 2], [0.0; 3]);
-        let steps = (wake.length.min(LONGEST) - BEHIND).max(0.0) as i32;
-        for step in 0..steps {
-            let [x, y] = wake.at(BEHIND + step as f32);
-            for across in -BESIDE[1]..=BESIDE[1] {
-                let away = across.abs();
-                if away > LINE && away < BESIDE[0] {
-                    continue;
-                }
+        let length = wake.length.min(LONGEST);
+        let behind = (0.25 * length).clamp(BEHIND[0], BEHIND[1]);
+        let steps = (length - behind).max(0.0) as i32;
+        let line = |across: i32| {
+            let mut sums = Sums::default();
+            for step in 0..steps {
+                let [x, y] = wake.at(behind + step as f32);
                 let at = [x - across as f32 * down, y + across as f32 * right];
-                let Some(power) = self.power(at) else {
-                    continue;
-                };
-                if away <= LINE {
-                    line = [line[0] + 1.0, line[1] + power];
-                } else {
-                    beside = [
-                        beside[0] + 1.0,
-                        beside[1] + power,
-                        beside[2] + power * power,
-                    ];
+                if let Some(power) = self.power(at) {
+                    sums.add(power);
                 }
             }
-        }
-        if line[0] < 100.0 || beside[0] < 100.0 || beside[1] <= 0.0 || line[1] <= 0.0 {
-            return None;
-        }
-        let off = beside[1] / beside[0];
-        let variance = beside[2] / beside[0] / (off * off) - 1.0;
-        // Pixels are two to a cell of resolution, both ways.
-        let deviation = (variance.max(1e-6) * 4.0 / line[0]).sqrt();
-        let ratio = line[1] / line[0] / off;
-        Some(Contrast {
-            ratio,
-            deviations: (ratio - 1.0) / deviation,
-        })
+            sums
+        };
+        (-FARTHEST..=FARTHEST).map(line).collect()
     }
 
     /// The wake with its axis on the line that stands out most near where it was found; as it was, where none does.
+    ///
+    /// The dark line is the axis, though a bright edge beside it may stand out more.
     pub(crate) fn refined(&self, wake: &Wake) -> (Wake, Option<Contrast>) {
-        let as_found = self.contrast(wake);
-        let mut best = (*wake, as_found);
-        let size = |contrast: Option<Contrast>| contrast.map_or(0.0, |c| c.deviations.abs());
+        let as_found = contrast(&self.lines(wake), 0);
+        let mut best: Option<(f64, Wake, Contrast)> = None;
         let turns = (TURN[0] / TURN[1]) as i32;
         for turn in -turns..=turns {
+            let turned = Wake {
+                axis_deg: (wake.axis_deg + TURN[1] * turn as f32).rem_euclid(360.0),
+                ..*wake
+            };
+            let lines = self.lines(&turned);
+            let [right, down] = turned.direction();
             for aside in -ASIDE..=ASIDE {
-                let mut moved = *wake;
-                let [right, down] = wake.direction();
-                moved.tip[0] -= aside as f32 * down;
-                moved.tip[1] += aside as f32 * right;
-                moved.axis_deg = (wake.axis_deg + TURN[1] * turn as f32).rem_euclid(360.0);
-                let contrast = self.contrast(&moved);
-                if size(contrast) > size(best.1) {
-                    best = (moved, contrast);
+                let Some(found) = contrast(&lines, aside) else {
+                    continue;
+                };
+                let weight = if found.deviations < 0.0 { 1.0 } else { BRIGHT };
+                let size = weight * found.deviations.abs();
+                let is_best = best.is_none_or(|best| size > best.0);
+                if found.kind() != Kind::Arms && is_best {
+                    let mut moved = turned;
+                    moved.tip[0] -= aside as f32 * down;
+                    moved.tip[1] += aside as f32 * right;
+                    best = Some((size, moved, found));
                 }
             }
         }
-        match size(best.1) > CLEAR {
-            true => best,
-            false => (*wake, as_found),
+        match best {
+            Some((_, moved, contrast)) => (moved, Some(contrast)),
+            None => (*wake, as_found),
         }
     }
+}
+
+/// Sums over the pixels of a line that are there.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    count: f64,
+    power: f64,
+    square: f64,
+}
+
+impl Sums {
+    fn add(&mut self, power: f64) {
+        self.count += 1.0;
+        self.power += power;
+        self.square += power * power;
+    }
+
+    fn of(lines: &[Self]) -> Self {
+        let sum = |all: Self, one: &Self| Self {
+            count: all.count + one.count,
+            power: all.power + one.power,
+            square: all.square + one.square,
+        };
+        lines.iter().fold(Self::default(), sum)
+    }
+}
+
+/// The contrast of the line so many pixels to the right of the middle one; `None` where too few pixels are there.
+fn contrast(lines: &[Sums], aside: i32) -> Option<Contrast> {
+    let middle = FARTHEST + aside;
+    let between =
+        |from: i32, to: i32| Sums::of(&lines[(middle + from) as usize..=(middle + to) as usize]);
+    let line = between(-LINE, LINE);
+    let [near, far] = BESIDE;
+    let beside = Sums::of(&[between(-far, -near), between(near, far)]);
+    if line.count < 100.0 || beside.count < 100.0 || beside.power <= 0.0 || line.power <= 0.0 {
+        return None;
+    }
+    let off = beside.power / beside.count;
+    let variance = beside.square / beside.count / (off * off) - 1.0;
+    // Pixels are two to a cell of resolution, both ways.
+    let deviation = (variance.max(1e-6) * 4.0 / line.count).sqrt();
+    let ratio = line.power / line.count / off;
+    Some(Contrast {
+        ratio,
+        deviations: (ratio - 1.0) / deviation,
+    })
 }

@@ -11,6 +11,9 @@ use crate::error::Result;
 use crate::sea::SeaOf;
 use crate::state::State;
 
+/// Tiles searched at a time, however many threads there are: 170 MB each.
+const AT_ONCE: usize = 8;
+
 /// How a product is searched.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Search<'a> {
@@ -51,8 +54,9 @@ pub fn search(
     let known = state.as_mut().map(|state| std::mem::take(&mut state.done));
     let known = known.unwrap_or_default();
     let finished = std::sync::atomic::AtomicUsize::new(known.len());
-    done(known.len(), tiles.len());
-    let one = |(n, tile): (usize, &Tile)| -> Result<Vec<Detection>> {
+    let count = tiles.len();
+    done(known.len(), count);
+    let one = |&(n, tile): &(usize, &Tile)| -> Result<Vec<Detection>> {
         if let Some(found) = known.get(&n) {
             return Ok(found.clone());
         }
@@ -61,10 +65,14 @@ pub fn search(
             state.note(n, &found)?;
         }
         let finished = 1 + finished.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        done(finished, tiles.len());
+        done(finished, count);
         Ok(found)
     };
-    let found = tiles.par_iter().enumerate().map(one);
-    let found: Vec<Vec<Detection>> = found.collect::<Result<_>>()?;
-    Ok(detector.merged(found.concat()))
+    let tiles: Vec<(usize, &Tile)> = tiles.iter().enumerate().collect();
+    let mut found = Vec::new();
+    for some in tiles.chunks(AT_ONCE) {
+        let some: Vec<_> = some.par_iter().map(one).collect::<Result<_>>()?;
+        found.extend(some.into_iter().flatten());
+    }
+    Ok(detector.merged(found))
 }

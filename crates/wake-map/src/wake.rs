@@ -5,9 +5,10 @@ use serde::Serialize;
 use wake_detector::Detection;
 use wake_geo::Product;
 
-use crate::echo::{Echo, echo};
+use crate::echo::Echo;
 use crate::error::Result;
-use crate::profile::{Contrast, Kind, Surroundings};
+use crate::profile::{Contrast, Kind};
+use crate::seen::{Seen, one_a_ship};
 
 /// A wake with all that is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,27 +52,27 @@ pub struct MappedWake {
     pub echo: Option<Echo>,
 }
 
-/// The wakes of a product with all that is known of them, in the same order.
+/// The wakes of a product with all that is known of them, the surest first; further detections of a ship's wake are left out.
 ///
 /// # Errors
 ///
 /// [`Error::Product`](crate::Error::Product) for places that cannot be computed.
 pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>> {
-    found
+    let seen: Vec<Seen> = found.par_iter().map(|one| Seen::of(product, one)).collect();
+    let ships = one_a_ship(seen);
+    ships
         .par_iter()
         .map(|one| one_mapped(product, one))
         .collect()
 }
 
-fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
-    let surroundings = Surroundings::of(product, &one.wake);
-    // The detector sees the wake as a whole, and knows its direction best; where the line lies beside the ship, pixels do.
-    let (line, measured) = match &surroundings {
-        Some(pixels) => pixels.refined(&one.wake),
-        None => (one.wake, None),
-    };
-    let is_clear = measured.is_some_and(|contrast| contrast.kind() != Kind::Arms);
-    let wake = &one.wake;
+fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
+    let Seen {
+        detection,
+        wake,
+        measured,
+        echo,
+    } = *one;
     let (lines, pixels) = product.size();
     let inside = |[x, y]: [f32; 2]| {
         let clamped = |value: f32, size: usize| f64::from(value).clamp(-0.5, size as f64 - 0.5);
@@ -79,10 +80,10 @@ fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
     };
     let (tip, end) = (inside(wake.tip), inside(wake.at(wake.length)));
     let mut mapped = MappedWake {
-        score: f64::from(one.score),
-        probability: one.probability.map(f64::from),
-        direction_probability: one.direction_probability.map(f64::from),
-        sure: one.sure,
+        score: f64::from(detection.score),
+        probability: detection.probability.map(f64::from),
+        direction_probability: detection.direction_probability.map(f64::from),
+        sure: detection.sure,
         line: f64::from(wake.tip[1]),
         pixel: f64::from(wake.tip[0]),
         tip: None,
@@ -96,7 +97,7 @@ fn one_mapped(product: &Product, one: &Detection) -> Result<MappedWake> {
         kind: measured.map(Contrast::kind),
         incidence: None,
         time: None,
-        echo: echo(product, &line, is_clear),
+        echo,
     };
     if product.has_places() {
         let [from, to] = [product.place(tip.0, tip.1)?, product.place(end.0, end.1)?];

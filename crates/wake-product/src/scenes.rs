@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use wake_geo::{Polarization, Product, Sentinel1};
+use wake_geo::{PixelAxes, Polarization, Product, Sentinel1};
 use wake_physics::Scene;
 use wake_physics::scene::Ship;
 
@@ -107,10 +107,10 @@ impl<'a> Scenes<'a> {
             scene.radar.incidence = incidence;
         }
         if let Some(ratio) = self.product.range_to_velocity(line, pixel)? {
-            scene.radar.range_to_velocity = ratio;
+            // Displaced by as many lines as in the product, whose lines are not quite as far apart as its pixels.
+            scene.radar.range_to_velocity = ratio * scene.grid.spacing / axes.line_spacing;
         }
-        let turned = |degrees: f64| (degrees - axes.line_azimuth).rem_euclid(360.0);
-        scene.sea.wind_toward = turned(self.wind.toward);
+        scene.sea.wind_toward = in_scene(&axes, self.wind.toward);
         let spacing = scene.grid.spacing;
         let first_row = (lines.len() / 2) as f64 - (lines.len() - 1) as f64;
         let first_column = -((pixels.len() / 2) as f64);
@@ -129,7 +129,7 @@ impl<'a> Scenes<'a> {
                     (pixel - pixels.start as f64 + first_column) * spacing,
                     (line - lines.start as f64 + first_row) * spacing,
                 ],
-                heading: turned(ship.heading),
+                heading: in_scene(&axes, ship.heading),
                 speed: ship.speed,
                 length: ship.length,
                 beam: ship.beam,
@@ -142,6 +142,15 @@ impl<'a> Scenes<'a> {
         scene.validate()?;
         Ok(scene)
     }
+}
+
+/// A direction clockwise from true north as that of a scene, clockwise from the direction of lines: so that a ship runs over the
+/// same pixels, though lines and pixels of the product are neither quite at right angles nor equally far apart \[degrees\].
+fn in_scene(axes: &PixelAxes, toward: f64) -> f64 {
+    let sine = |degrees: f64| degrees.to_radians().sin();
+    let lines = sine(axes.pixel_azimuth - toward) / axes.line_spacing;
+    let pixels = sine(toward - axes.line_azimuth) / axes.pixel_spacing;
+    pixels.atan2(lines).to_degrees().rem_euclid(360.0)
 }
 
 /// The Sentinel-1 product.
@@ -177,5 +186,34 @@ fn sensor(product: &Product, sentinel: &Sentinel1) -> Result<&'static str> {
             "it is of mode {mode} with pixels of {} m; IW of 10 m and EW of 40 m can be",
             annotation.range_spacing
         ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A step toward 30° on lines of 10.1 m toward 193° and pixels of 9.9 m toward 283.4°: so many lines and pixels as the scene's
+    /// direction has. With square pixels it is the angle from the direction of lines.
+    #[test]
+    fn directions_lead_over_the_same_pixels() {
+        let axes = |line_spacing, pixel_spacing, pixel_azimuth| PixelAxes {
+            line_azimuth: 193.0,
+            pixel_azimuth,
+            line_spacing,
+            pixel_spacing,
+        };
+        let skew = axes(10.1, 9.9, 283.4);
+        let unit = |degrees: f64| [degrees.to_radians().sin(), degrees.to_radians().cos()];
+        let found = in_scene(&skew, 30.0).to_radians();
+        let (line, pixel) = (unit(skew.line_azimuth), unit(skew.pixel_azimuth));
+        let step = [0, 1].map(|k| {
+            found.cos() * skew.line_spacing * line[k] + found.sin() * skew.pixel_spacing * pixel[k]
+        });
+        let length = step[0].hypot(step[1]);
+        let expected = unit(30.0);
+        assert!((0..2).all(|k| (step[k] / length - expected[k]).abs() < 1e-12));
+        let square = axes(10.0, 10.0, 283.0);
+        assert!((in_scene(&square, 30.0) - 197.0).abs() < 1e-9);
     }
 }

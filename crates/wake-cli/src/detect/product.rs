@@ -7,7 +7,7 @@ use image::{ImageFormat, RgbImage};
 use indicatif::ProgressBar;
 use serde_json::json;
 use wake_detector::drawing::Drawing;
-use wake_detector::{Detection, GreyImage, Wake};
+use wake_detector::{Detection, GreyImage, Wake, angle_of};
 use wake_geo::{Land, LandMask, Product, Values};
 use wake_map::{MappedWake, Search, csv, geojson, html, mapped, search};
 use whole_files::{make_folder, write_atomically, write_json};
@@ -81,7 +81,7 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
     let found = found?;
     let wakes = mapped(product, &found)?;
     let collection = geojson(&wakes, &name);
-    let picture = quick_look(product, &found)?;
+    let picture = quick_look(product, &wakes)?;
     let mut png = Cursor::new(Vec::new());
     picture.plain.write_to(&mut png, ImageFormat::Png)?;
     let told = |value: Option<f32>| value.map_or("unknown".to_owned(), |v| format!("{v:.1} m"));
@@ -167,7 +167,7 @@ struct QuickLook {
     drawn: RgbImage,
 }
 
-fn quick_look(product: &Product, found: &[Detection]) -> Outcome<QuickLook> {
+fn quick_look(product: &Product, wakes: &[MappedWake]) -> Outcome<QuickLook> {
     let (lines, pixels) = product.size();
     let step = lines.max(pixels).div_ceil(LONGEST);
     let (rows, columns) = (lines / step, pixels / step);
@@ -193,19 +193,8 @@ fn quick_look(product: &Product, found: &[Detection]) -> Outcome<QuickLook> {
     let level = |mean: &f64| (110.0 * mean / median).round().clamp(0.0, 255.0) as u8;
     let levels: Vec<u8> = means.iter().map(level).collect();
     let small = GreyImage::eight_bits(rows, columns, levels.clone())?;
-    let scaled = |one: &Detection| {
-        let factor = 1.0 / step as f32;
-        Detection {
-            wake: Wake {
-                tip: one.wake.tip.map(|x| (x + 0.5) * factor - 0.5),
-                length: one.wake.length * factor,
-                ..one.wake
-            },
-            ..*one
-        }
-    };
-    let sure = found.iter().filter(|one| one.sure);
-    let sure: Vec<Detection> = sure.map(scaled).collect();
+    let sure = wakes.iter().filter(|wake| wake.sure);
+    let sure: Vec<Detection> = sure.map(|wake| scaled(wake, step)).collect();
     let mut drawing = Drawing::new(&small);
     drawing.found(sure.iter());
     let plain = image::GrayImage::from_raw(columns as u32, rows as u32, levels);
@@ -213,6 +202,25 @@ fn quick_look(product: &Product, found: &[Detection]) -> Outcome<QuickLook> {
         plain: plain.ok_or("a picture of the wrong size")?,
         drawn: drawing.into_picture(),
     })
+}
+
+/// A wake in pixels of which `step` of the product make one.
+fn scaled(wake: &MappedWake, step: usize) -> Detection {
+    let small = |at: f64| ((at + 0.5) / step as f64 - 0.5) as f32;
+    let (tip, end) = ([wake.pixel, wake.line].map(small), wake.end_px.map(small));
+    let [right, down] = [end[0] - tip[0], end[1] - tip[1]];
+    let drawn = Wake {
+        tip,
+        axis_deg: angle_of([right, down]),
+        half_angle_deg: wake.half_angle as f32,
+        length: right.hypot(down),
+        snr: f32::INFINITY,
+        contrast_db: None,
+    };
+    Detection {
+        sure: wake.sure,
+        ..Detection::new(wake.score as f32, drawn)
+    }
 }
 
 /// The wakes that are likely ones, a line each.

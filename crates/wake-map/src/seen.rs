@@ -1,0 +1,190 @@
+//! Detections at full resolution: where exactly a wake lies and begins, and which of them are of one ship.
+
+use wake_detector::{Detection, Wake};
+use wake_geo::Product;
+
+use crate::echo::{Echo, ShipOnAxis, echo};
+use crate::profile::{Contrast, Kind, Surroundings};
+
+/// A detection, and what the pixels around it show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen {
+    pub(crate) detection: Detection,
+    /// The wake on its line, from the stern.
+    pub(crate) wake: Wake,
+    pub(crate) measured: Option<Contrast>,
+    pub(crate) echo: Option<Echo>,
+}
+
+/// The tip of a wake moves no farther along its axis, to where the echo says that the stern is \[pixels\].
+const FARTHEST: f64 = 60.0;
+/// Echoes closer than this are one \[pixels\], and wakes that lead to it one if their axes differ by less \[degrees\].
+const SAME_ECHO: f64 = 6.0;
+const SAME_AXIS: f32 = 30.0;
+/// A wake without an echo is the later part of a surer one whose axis it lies on: so far astern of the tip, so far off the axis, and
+/// by this share of the distance farther \[pixels\], and turned by less \[degrees\].
+const ASTERN: f32 = 600.0;
+const OFF: f32 = 12.0;
+const SPREAD: f32 = 0.03;
+const TURNED: f32 = 8.0;
+
+impl Seen {
+    pub(crate) fn of(product: &Product, one: &Detection) -> Self {
+        // The detector sees the wake as a whole, and knows its direction best; where the line lies beside the ship, pixels do.
+        let (line, measured) = match Surroundings::of(product, &one.wake) {
+            Some(pixels) => pixels.refined(&one.wake),
+            None => (one.wake, None),
+        };
+        let is_clear = measured.is_some_and(|contrast| contrast.kind() != Kind::Arms);
+        let echo = echo(product, &line, is_clear);
+        Self {
+            detection: *one,
+            wake: placed(&one.wake, &line, echo.and_then(|echo| echo.ship)),
+            measured,
+            echo,
+        }
+    }
+
+    /// Whether another detection, which is less sure, is of the same wake.
+    fn is_again(&self, other: &Self) -> bool {
+        let turn = (other.wake.axis_deg - self.wake.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
+        match (&self.echo, &other.echo) {
+            (Some(a), Some(b)) => {
+                let away = (a.line - b.line).hypot(a.pixel - b.pixel);
+                away < SAME_ECHO && turn.abs() < SAME_AXIS
+            }
+            (_, Some(_)) => false,
+            (_, None) => {
+                let [right, down] = self.wake.direction();
+                let [x, y] = [0, 1].map(|k| other.wake.tip[k] - self.wake.tip[k]);
+                let (along, across) = (x * right + y * down, y * right - x * down);
+                (0.0..ASTERN).contains(&along)
+                    && across.abs() < OFF + SPREAD * along
+                    && turn.abs() < TURNED
+            }
+        }
+    }
+}
+
+/// A wake that was found, on its line as the pixels have it, and beginning at the stern of the ship where its echo says where
+/// that is; its end stays.
+fn placed(found: &Wake, line: &Wake, ship: Option<ShipOnAxis>) -> Wake {
+    let mut placed = Wake {
+        tip: line.tip,
+        ..*found
+    };
+    let Some(ship) = ship else { return placed };
+    let [right, down] = line.direction().map(f64::from);
+    let along = |place: [f64; 2]| {
+        (place[0] - f64::from(line.tip[0])) * right + (place[1] - f64::from(line.tip[1])) * down
+    };
+    let stern = along(ship.middle) + ship.half_length;
+    if stern.abs() <= FARTHEST && stern < f64::from(found.length) {
+        placed.tip = line.at(stern as f32);
+        placed.length -= stern as f32;
+    }
+    placed
+}
+
+/// Detections, the surest first, without those that are of the wake of a surer one; what they see of it makes it longer.
+pub(crate) fn one_a_ship(seen: Vec<Seen>) -> Vec<Seen> {
+    let mut kept: Vec<Seen> = Vec::new();
+    for one in seen {
+        match kept.iter_mut().find(|surer| surer.is_again(&one)) {
+            None => kept.push(one),
+            Some(surer) => {
+                let wake = &mut surer.wake;
+                let [right, down] = wake.direction();
+                let [x, y] = one.wake.at(one.wake.length);
+                let end = (x - wake.tip[0]) * right + (y - wake.tip[1]) * down;
+                wake.length = wake.length.max(end.min(ASTERN));
+            }
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wake(tip: [f32; 2], axis_deg: f32) -> Wake {
+        Wake {
+            tip,
+            axis_deg,
+            half_angle_deg: 1.0,
+            length: 100.0,
+            snr: f32::INFINITY,
+            contrast_db: None,
+        }
+    }
+
+    fn seen(score: f32, tip: [f32; 2], axis_deg: f32, echo: Option<[f64; 2]>) -> Seen {
+        let wake = wake(tip, axis_deg);
+        let echo = echo.map(|[pixel, line]| Echo {
+            line,
+            pixel,
+            latitude: 0.0,
+            longitude: 0.0,
+            displacement: None,
+            radial_velocity: None,
+            radial_velocity_deviation: None,
+            ship: None,
+        });
+        Seen {
+            detection: Detection::new(score, wake),
+            wake,
+            measured: None,
+            echo,
+        }
+    }
+
+    /// A wake to the right from (500, 500): a detection of its later part makes it longer, one that leads to its echo goes; a wake
+    /// beside it, one across it, and one with an echo of its own are of other ships.
+    #[test]
+    fn a_ship_has_one_wake() {
+        let echo = Some([505.0, 560.0]);
+        let first = seen(0.9, [500.0, 500.0], 90.0, echo);
+        let later = seen(0.5, [760.0, 512.0], 93.0, None);
+        let again = seen(0.4, [510.0, 503.0], 78.0, Some([506.0, 558.0]));
+        let others = [
+            seen(0.8, [760.0, 560.0], 90.0, None),
+            seen(0.7, [700.0, 500.0], 120.0, None),
+            seen(0.6, [760.0, 500.0], 90.0, Some([760.0, 470.0])),
+            seen(0.3, [510.0, 503.0], 200.0, echo),
+            seen(0.2, [440.0, 500.0], 90.0, None),
+        ];
+        let mut all = vec![first, later, again];
+        all.extend(others);
+        all.sort_by(|a, b| b.detection.score.total_cmp(&a.detection.score));
+        let kept = one_a_ship(all);
+        let scores: Vec<f32> = kept.iter().map(|one| one.detection.score).collect();
+        assert_eq!(scores, [0.9, 0.8, 0.7, 0.6, 0.3, 0.2]);
+        let end = 260.0 + 100.0 * 93f32.to_radians().sin();
+        assert!(
+            (kept[0].wake.length - end).abs() < 1e-3,
+            "{}",
+            kept[0].wake.length
+        );
+        assert!((kept[1].wake.length - 100.0).abs() < 1e-6);
+    }
+
+    /// A line to the right that was found 5 pixels too high and 20 ahead of a ship of 30 pixels: its wake begins at the stern, and
+    /// its end stays. A ship too far away moves nothing.
+    #[test]
+    fn a_wake_begins_at_the_stern() {
+        let found = wake([480.0, 495.0], 90.0);
+        let line = wake([480.0, 500.0], 90.0);
+        let ship = |pixel: f64| ShipOnAxis {
+            middle: [pixel, 500.0],
+            half_length: 15.0,
+        };
+        let moved = placed(&found, &line, Some(ship(485.0)));
+        assert!((moved.tip[0] - 500.0).abs() < 1e-4 && (moved.tip[1] - 500.0).abs() < 1e-4);
+        assert!((moved.at(moved.length)[0] - 580.0).abs() < 1e-4);
+        for ship in [None, Some(ship(530.0))] {
+            let moved = placed(&found, &line, ship);
+            assert!((moved.tip[0] - 480.0).abs() < 1e-6 && (moved.length - 100.0).abs() < 1e-6);
+        }
+    }
+}
