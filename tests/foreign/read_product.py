@@ -3,7 +3,8 @@
     python3 -m venv out/venv && out/venv/bin/pip install rasterio xarray-sentinel
     out/venv/bin/python tests/foreign/read_product.py PRODUCT.SAFE WAKE
 
-WAKE is the program `wake`: places and sigma nought of some pixels are its answers of `wake locate --json`.
+The product must be simulated on a complete annotation: xarray-sentinel needs its `swathTiming`, which the test fixtures lack. WAKE is
+the program `wake`: places and sigma nought of some pixels are its answers of `wake locate --json`.
 """
 import json
 import subprocess
