@@ -158,8 +158,11 @@ mod tests {
         all.extend(others);
         all.sort_by(|a, b| b.detection.score.total_cmp(&a.detection.score));
         let kept = one_a_ship(all);
-        let scores: Vec<f32> = kept.iter().map(|one| one.detection.score).collect();
-        assert_eq!(scores, [0.9, 0.8, 0.7, 0.6, 0.3, 0.2]);
+        let scores: Vec<i32> = kept
+            .iter()
+            .map(|one| (10.0 * one.detection.score).round() as i32)
+            .collect();
+        assert_eq!(scores, [9, 8, 7, 6, 3, 2]);
         let end = 260.0 + 100.0 * 93f32.to_radians().sin();
         assert!(
             (kept[0].wake.length - end).abs() < 1e-3,
