@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,10 @@ import numpy.typing as npt
 from . import _check, _core
 from .product import Product
 
-__all__ = ["Detection", "Detector"]
+__all__ = ["LEAST_SCORE", "Detection", "Detector"]
+
+LEAST_SCORE = 0.03
+"""Wakes of a lower score are left out, unless they are asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +24,12 @@ class Detection:
 
     score: float
     """How sure the detector is, 0 to 1: an order, not a probability."""
+    probability: float | None
+    """Probability of a wake, in either direction; ``None`` for weights without a calibration."""
+    direction_probability: float | None
+    """Probability that tip and end are not taken for each other, if it is a wake; ``None`` for weights without a calibration."""
+    sure: bool
+    """Whether it counts as found: the score is at least that of the calibration, 0.25 without one."""
     tip: tuple[float, float]
     """Where the wake begins [pixels]."""
     axis_deg: float
@@ -41,16 +50,15 @@ class Detection:
 class Detector:
     """Finds ship wakes in radar images.
 
-    Grey may have any scaling: the network reads contrast in standard deviations of the speckle around.
+    Grey may have any scaling: the network reads contrast in standard deviations of the speckle around. Calls return unsure
+    wakes, too; :attr:`Detection.sure` says which count as found.
 
     >>> import numpy as np
     >>> from shipwake import Detector
-    >>> Detector.pretrained().find(np.full((256, 256), 90, dtype=np.uint8))
+    >>> found = Detector.pretrained().find(np.full((256, 256), 90, dtype=np.uint8))
+    >>> [wake for wake in found if wake.sure]
     []
     """
-
-    OPERATING_POINT: ClassVar[float] = 0.25
-    """Score from which a wake is likely: half a false alarm an image on real tiles."""
 
     __slots__ = ("_inner", "_file")
 
@@ -67,7 +75,7 @@ class Detector:
 
     @classmethod
     def load(cls, file: Any) -> Detector:
-        """The network of a file that ``wake train detector`` wrote.
+        """The network of a file that ``wake train detector`` wrote, with the calibration beside it, if there is one.
 
         Raises:
             FileError: A file that cannot be read.
@@ -87,7 +95,7 @@ class Detector:
         image: npt.ArrayLike,
         *,
         spacing: float | None = None,
-        least_score: float = OPERATING_POINT,
+        least_score: float = LEAST_SCORE,
         intensity: bool = False,
         threads: int | None = None,
     ) -> list[Detection]:
@@ -97,7 +105,7 @@ class Detector:
             image: ``[rows, columns]`` grey or amplitudes, at most 20,000 a side. What is no finite number is missing: land,
                 or pixels without data.
             spacing: Size of a pixel [m], 0.5 to 100; without it the scale comes from the image.
-            least_score: Wakes of a lower score are left out, 0 to 1.
+            least_score: Wakes of a lower score are left out, 0 to 1; by default as in ``wake detect``.
             intensity: Whether ``image`` holds intensities, such as the normalized radar cross-section; the detector then
                 searches their square root.
             threads: Number of threads, by default one a core.
@@ -117,19 +125,20 @@ class Detector:
         product: Product,
         *,
         spacing: float | None = None,
-        least_score: float = OPERATING_POINT,
+        least_score: float = LEAST_SCORE,
         coast: float | None = 1000.0,
         threads: int | None = None,
     ) -> list[dict[str, Any]]:
         """The wakes of a whole product as places on a map, the surest first.
 
-        Each has the keys of ``wakes.json`` of ``wake detect``: ``score``, ``tip`` and ``end`` (longitude, latitude),
-        ``heading`` from true north, ``length`` [m], ``echo`` of the ship with its displacement, and others.
+        Each has the keys of ``wakes.json`` of ``wake detect``: ``score``, ``probability``, ``direction_probability``, ``sure``,
+        ``tip`` and ``end`` (longitude, latitude), ``heading`` from true north, ``length`` [m], ``echo`` of the ship with its
+        displacement, and others.
 
         Args:
             product: The product.
             spacing: Size of a pixel [m]; by default that of the product.
-            least_score: Wakes of a lower score are left out, 0 to 1.
+            least_score: Wakes of a lower score are left out, 0 to 1; by default as in ``wake detect``.
             coast: Sea closer to land is left out [m], 0 to 50,000; ``None`` searches land, too.
             threads: Number of threads, by default one a core.
 
@@ -162,6 +171,9 @@ def _detection(one: Mapping[str, Any]) -> Detection:
     tip = one["tip"]
     return Detection(
         score=one["score"],
+        probability=one["probability"],
+        direction_probability=one["direction_probability"],
+        sure=one["sure"],
         tip=(tip[0], tip[1]),
         axis_deg=one["axis_deg"],
         half_angle_deg=one["half_angle_deg"],
