@@ -99,7 +99,7 @@ def test_a_wake_is_found_where_it_is(detector: Detector) -> None:
 def test_probabilities_are_those_of_the_calibration(detector: Detector) -> None:
     calibration = json.loads((WEIGHTS / "detector.calibration.json").read_text())
     image = np.random.default_rng(3).gamma(4.0, size=(256, 256))
-    image[128, 20:230] *= 3
+    image[128:132, 20:230] *= 0.4
     for spacing, name in ((10.0, "known_spacing"), (None, "unknown_spacing")):
         known = calibration[name]
         found = detector.find(image, spacing=spacing, least_score=0.0, intensity=True)
@@ -109,13 +109,14 @@ def test_probabilities_are_those_of_the_calibration(detector: Detector) -> None:
             x = min(max(one.score, 1e-6), 1 - 1e-6)
             logit = known["wake"]["a"] * np.log(x) - known["wake"]["b"] * np.log1p(-x) + known["wake"]["c"]
             assert one.probability == pytest.approx(1 / (1 + np.exp(-logit)), rel=1e-6)
-            assert one.direction_probability is not None and 0 <= one.direction_probability <= 1
+            if one.score > 0:
+                assert one.direction_probability is not None and 0 <= one.direction_probability <= 1
             assert one.sure == (one.score >= known["sure_from"])
 
 
 def test_weights_of_a_file_have_the_calibration_beside_it(detector: Detector, tmp_path: Path) -> None:
     image = np.random.default_rng(3).gamma(4.0, size=(256, 256))
-    image[128, 20:230] *= 3
+    image[128:132, 20:230] *= 0.4
     expected = detector.find(image, intensity=True)
     file = tmp_path / "detector.safetensors"
     file.write_bytes((WEIGHTS / "detector.safetensors").read_bytes())

@@ -27,7 +27,8 @@ class Detection:
     probability: float | None
     """Probability of a wake, in either direction; ``None`` for weights without a calibration."""
     direction_probability: float | None
-    """Probability that tip and end are not taken for each other, if it is a wake; ``None`` for weights without a calibration."""
+    """Probability that tip and end are not taken for each other, if it is a wake; ``None`` for weights without a calibration, and
+    where the score is 0."""
     sure: bool
     """Whether it counts as found: the score is at least that of the calibration, 0.25 without one."""
     tip: tuple[float, float]
@@ -117,7 +118,7 @@ class Detector:
         if intensity:
             with np.errstate(invalid="ignore"):
                 pixels = np.sqrt(pixels)
-        found = self._inner.find(pixels, _spacing(spacing), _score(least_score), _check.threads(threads))
+        found = self._inner.find(pixels, pixel_size(spacing), lowest(least_score), _check.threads(threads))
         return [_detection(one) for one in found]
 
     def find_in(
@@ -149,9 +150,9 @@ class Detector:
             raise TypeError(f"product is {product!r:.80}, expected a Product")
         return self._inner.find_in(
             product._inner,
-            _spacing(spacing),
-            _score(least_score),
-            None if coast is None else _check.number("coast", coast, 0.0, 50_000.0),
+            pixel_size(spacing),
+            lowest(least_score),
+            sea_from(coast),
             _check.threads(threads),
         )
 
@@ -159,12 +160,19 @@ class Detector:
         return Detector._load, (self._file,)
 
 
-def _spacing(spacing: float | None) -> float | None:
+def pixel_size(spacing: float | None) -> float | None:
+    """A size of pixels that the detector takes."""
     return None if spacing is None else _check.number("spacing", spacing, 0.5, 100.0)
 
 
-def _score(score: float) -> float:
+def lowest(score: float) -> float:
+    """A least score that the detector takes."""
     return _check.number("least_score", score, 0.0, 1.0)
+
+
+def sea_from(coast: float | None) -> float | None:
+    """A distance from land that the detector takes."""
+    return None if coast is None else _check.number("coast", coast, 0.0, 50_000.0)
 
 
 def _detection(one: Mapping[str, Any]) -> Detection:
