@@ -120,7 +120,7 @@ class Dataset:
     ) -> None:
         seed = _check.whole("seed", seed, 0, _check.LARGEST_SEED)
         if count is None:
-            count = 3456 if recipe == "paper" else 100
+            count = 3456 if isinstance(recipe, str) and recipe == "paper" else 100
         self._count = _check.whole("count", count, 1, 10**12)
         self._threads = _check.threads(threads)
         values = dict(changes or {})
