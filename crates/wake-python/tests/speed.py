@@ -57,14 +57,14 @@ def batch() -> None:
         row(f"simulate_batch, 128 x 128, {threads} threads", f"{IMAGES / took:.1f} images/s")
 
 
-def rates(ways: dict[str, Callable[[str], Any]]) -> dict[str, float]:
-    """Images a second of each way to make them, by the median time of some turns; a way is given a new folder."""
+def rates(ways: dict[str, Callable[[str], Any]], images: int = IMAGES) -> dict[str, float]:
+    """Images a second of each way to make so many, by the median time of some turns; a way is given a new folder."""
     times: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(TURNS):
         for name, way in ways.items():
             with tempfile.TemporaryDirectory() as folder:
                 times[name].append(seconds(lambda: way(f"{folder}/set")))
-    return {name: IMAGES / statistics.median(of) for name, of in times.items()}
+    return {name: images / statistics.median(of) for name, of in times.items()}
 
 
 def loader() -> None:
@@ -91,20 +91,21 @@ def ray() -> None:
 
     from shipwake.ray import Simulate, write
 
-    data = shipwake.Dataset("ranges", seed=7, count=IMAGES, changes=CHANGES)
     for workers in (1, 2):
-        ray.init(num_cpus=workers, include_dashboard=False, log_to_driver=False)
+        data = shipwake.Dataset("ranges", seed=7, count=300 * workers, changes=CHANGES)
+        ray.init(num_cpus=workers, include_dashboard=False, log_to_driver=False, _system_config={"worker_niceness": 0})
         ray.data.DataContext.get_current().enable_progress_bars = False
-        numbers = ray.data.range(IMAGES, override_num_blocks=10)
+        numbers = ray.data.range(len(data), override_num_blocks=8 * workers)
         write(shipwake.Dataset("ranges", count=workers, changes=CHANGES), tempfile.mkdtemp(), shards=workers)
         found = rates(
             {
                 f"`wake dataset`, {workers} jobs": lambda folder: data.write(folder, threads=workers),
-                f"Ray, {workers} workers, `write`": lambda folder: write(data, folder, shards=8),
+                f"Ray, {workers} workers, `write`": lambda folder: write(data, folder, shards=8 * workers),
                 f"Ray, {workers} workers, `map_batches` to Parquet": lambda folder: numbers.map_batches(
                     Simulate(data), batch_size=10
                 ).write_parquet(folder),
-            }
+            },
+            len(data),
         )
         for name, rate in found.items():
             row(name, f"{rate:.1f} images/s", f"{rate / next(iter(found.values())):.2f}")

@@ -27,7 +27,9 @@ WAIT = 120
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[None]:
-    ray.init(num_cpus=3, include_dashboard=False, log_to_driver=False, object_store_memory=200_000_000)
+    # Workers of Ray give way to all else that the machine does, unless told otherwise.
+    options = {"worker_niceness": 0}
+    ray.init(num_cpus=3, include_dashboard=False, log_to_driver=False, object_store_memory=2 * 10**8, _system_config=options)
     ray.data.DataContext.get_current().enable_progress_bars = False
     yield
     ray.shutdown()
