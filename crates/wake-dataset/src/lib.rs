@@ -68,7 +68,7 @@ pub use scenes::{PAPER_SCENES, Simulated};
 pub use sea::Sea;
 pub use shuffle::shuffled;
 pub use source::Source;
-pub use webdataset::write_webdataset;
+pub use webdataset::{sample_files, write_webdataset};
 pub use write::{Progress, write};
 
 #[cfg(test)]

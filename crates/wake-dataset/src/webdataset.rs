@@ -1,10 +1,14 @@
 //! A data set as `WebDataset` shards: tar files that trainers read one after the other.
 
 use super::folder::Folder;
-use super::layout::{Layout, broken};
+use super::layout::{Layout, broken, image_name};
+use super::metadata::Row;
+use super::pair::Pair;
 use crate::error::Result;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use wake_physics::output;
+use whole_files::checksum;
 
 /// Size of the blocks of a tar file \[bytes\].
 const BLOCK: usize = 512;
@@ -52,7 +56,25 @@ pub fn write_webdataset(folder: &Path, out: &Path, each: u64) -> Result<Vec<Path
     Ok(written)
 }
 
-/// The three files of a pair.
+/// The three files of a pair with their endings, as [`write_webdataset`] has them: `json`, `png`, `txt`.
+///
+/// For those who make shards pair by pair, such as a cluster.
+///
+/// # Errors
+///
+/// [`Error::Scene`](crate::Error::Scene) for an image that cannot be encoded.
+pub fn sample_files(pair: &Pair) -> Result<[(&'static str, Vec<u8>); 3]> {
+    let name = image_name(pair.index);
+    let name = Path::new(&name);
+    let [rows, columns] = [pair.image.rows, pair.image.columns];
+    let png = output::encode_png(name, &pair.image.levels(), rows, columns)?;
+    let line = serde_json::to_vec(&Row::of(pair, checksum(&png)));
+    let line = line.map_err(|e| whole_files::failed("encode", name, e))?;
+    let prompt = pair.prompt.clone().into_bytes();
+    Ok([("json", line), ("png", png), ("txt", prompt)])
+}
+
+/// The three files of a pair of a folder.
 fn sample(archive: &mut Vec<u8>, folder: &Path, set: &Folder, position: u64) -> Result<()> {
     let (index, row) = set.row(position)?;
     let line = serde_json::to_vec(row);
@@ -147,7 +169,8 @@ mod tests {
         let manifest = manifest.with_val_share(0.4).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let set = folder.path().join("set");
-        write(&set, &manifest, &manifest.source().unwrap(), 1, |_| ()).unwrap();
+        let source = manifest.source().unwrap();
+        write(&set, &manifest, &source, 1, |_| ()).unwrap();
         let outs = ["one", "two"].map(|name| folder.path().join(name));
         let [one, two] = outs
             .each_ref()
@@ -173,6 +196,12 @@ mod tests {
             for sample in read(&archive).as_chunks::<3>().0 {
                 let [(json, line), (png, image), (txt, prompt)] = sample;
                 let stem = png.strip_suffix(".png").unwrap();
+                let pair = source.pair(stem.parse().unwrap()).unwrap();
+                let files = [("json", line), ("png", image), ("txt", prompt)];
+                assert_eq!(
+                    sample_files(&pair).unwrap(),
+                    files.map(|(ending, content)| (ending, content.clone()))
+                );
                 assert_eq!(
                     [json, txt],
                     [&format!("{stem}.json"), &format!("{stem}.txt")]

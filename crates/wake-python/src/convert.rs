@@ -13,6 +13,9 @@ use wake_physics::Field;
 /// Tables of a scene are no deeper.
 const DEEPEST: usize = 8;
 
+/// No array of numbers in a scene or a recipe is longer.
+const MOST_VALUES: usize = 10_000;
+
 /// Anything that has a form in JSON as dictionaries, lists, numbers and text.
 pub(crate) fn json<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     let value = serde_json::to_value(value).map_err(|error| SceneError::new_err(error.to_string()));
@@ -113,7 +116,17 @@ fn toml_at(name: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Optio
         }
         return Ok(Some(values.into()));
     }
-    // Scalars and arrays of NumPy.
+    // Scalars and arrays of NumPy. A view of few bytes may have more values than memory holds.
+    let size = value
+        .getattr("size")
+        .and_then(|size| size.extract::<usize>());
+    if let Ok(size) = size
+        && size > MOST_VALUES
+    {
+        let text =
+            format!("{name} is an array of {size} values, expected at most {MOST_VALUES} values");
+        return Err(SceneError::new_err(text));
+    }
     if let Ok(plain) = value.call_method0("tolist")
         && !plain.is(value)
     {

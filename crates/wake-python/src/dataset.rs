@@ -7,7 +7,7 @@ use crate::scene::{PyScene, labels};
 use crate::work::{caught, run};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList};
 use std::path::PathBuf;
 use wake_dataset::{Manifest, Pair, Recipe, Shard, Simulated, Source};
 use wake_physics::Field;
@@ -81,6 +81,23 @@ impl PySimulated {
     /// Pair number `index` with everything but its image.
     fn without_image<'py>(&self, py: Python<'py>, index: u64) -> PyResult<Bound<'py, PyDict>> {
         item(py, caught(|| Ok(self.0.pair_without_image(index)?))?)
+    }
+
+    /// The files of pair number `index` by their endings: `json`, `png` and `txt`.
+    fn files<'py>(
+        &self,
+        py: Python<'py>,
+        index: u64,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let files = run(py, threads, || {
+            Ok(wake_dataset::sample_files(&self.0.pair(index)?)?)
+        })?;
+        let named = PyDict::new(py);
+        for (ending, content) in files {
+            named.set_item(ending, PyBytes::new(py, &content))?;
+        }
+        Ok(named)
     }
 
     /// The pairs from `first` up to `end`: their images `[pairs, 1, rows, columns]`, and a list of the rest.

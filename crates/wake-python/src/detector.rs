@@ -158,6 +158,9 @@ fn detection(found: &Detection) -> Value {
     let wake = &found.wake;
     json!({
         "score": found.score,
+        "probability": found.probability,
+        "direction_probability": found.direction_probability,
+        "sure": found.sure,
         "tip": wake.tip,
         "axis_deg": wake.axis_deg,
         "half_angle_deg": wake.half_angle_deg,

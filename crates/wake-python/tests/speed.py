@@ -1,9 +1,9 @@
 """Measures the package beside its own Rust code, and prints the rows of docs/python.md. On an idle machine:
 
-    python tests/speed.py [simulate] [batch] [loader]
+    python tests/speed.py [simulate] [batch] [loader] [ray]
 
-`simulate` compares the time of a call with the time that Rust measures inside it; `loader` compares torch's loader with `Dataset.write`, which is
-`wake dataset`.
+`simulate` compares the time of a call with the time that Rust measures inside it; `loader` and `ray` compare torch's loader and Ray with
+`Dataset.write`, which is `wake dataset`. What is compared is measured in turn; the ratio is that of medians.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ import numpy as np
 
 import shipwake
 
-IMAGES = 64
+IMAGES = 200
+TURNS = 3
 CHANGES = {"speckle": True}
 
 
@@ -56,29 +57,61 @@ def batch() -> None:
         row(f"simulate_batch, 128 x 128, {threads} threads", f"{IMAGES / took:.1f} images/s")
 
 
+def rates(ways: dict[str, Callable[[str], Any]], images: int = IMAGES) -> dict[str, float]:
+    """Images a second of each way to make so many, by the median time of some turns; a way is given a new folder."""
+    times: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(TURNS):
+        for name, way in ways.items():
+            with tempfile.TemporaryDirectory() as folder:
+                times[name].append(seconds(lambda: way(f"{folder}/set")))
+    return {name: images / statistics.median(of) for name, of in times.items()}
+
+
 def loader() -> None:
     from torch.utils.data import DataLoader
 
     from shipwake.torch import Batches, collate
 
     data = shipwake.Dataset("ranges", seed=7, count=IMAGES, changes=CHANGES)
-    rates: dict[str, list[float]] = {"write": [], "map": [], "iterable": []}
-    for _ in range(3):
-        with tempfile.TemporaryDirectory() as folder:
-            rates["write"].append(IMAGES / seconds(lambda: data.write(folder, threads=2)))
-        loaders = {
-            "map": DataLoader(data, batch_size=8, num_workers=2, collate_fn=collate),
-            "iterable": DataLoader(Batches(data, 8), batch_size=None, num_workers=2),
+    map_style = DataLoader(data, batch_size=8, num_workers=2, collate_fn=collate)
+    iterable = DataLoader(Batches(data, 8), batch_size=None, num_workers=2)
+    found = rates(
+        {
+            "`wake dataset`, 2 jobs": lambda folder: data.write(folder, threads=2),
+            "DataLoader, map, 2 workers and their start": lambda _: list(map_style),
+            "DataLoader, iterable, 2 workers and their start": lambda _: list(iterable),
         }
-        for name, batches in loaders.items():
-            rates[name].append(IMAGES / seconds(lambda: list(batches)))
-    write = statistics.median(rates["write"])
-    row("`wake dataset`, 2 jobs", f"{write:.1f} images/s", 1)
-    for name in ("map", "iterable"):
-        rate = statistics.median(rates[name])
-        row(f"DataLoader, {name}, 2 workers, their start included", f"{rate:.1f} images/s", f"{rate / write:.2f}")
+    )
+    for name, rate in found.items():
+        row(name, f"{rate:.1f} images/s", f"{rate / next(iter(found.values())):.2f}")
+
+
+def ray() -> None:
+    import ray
+
+    from shipwake.ray import Simulate, write
+
+    for workers in (1, 2):
+        data = shipwake.Dataset("ranges", seed=7, count=300 * workers, changes=CHANGES)
+        ray.init(num_cpus=workers, include_dashboard=False, log_to_driver=False, _system_config={"worker_niceness": 0})
+        ray.data.DataContext.get_current().enable_progress_bars = False
+        numbers = ray.data.range(len(data), override_num_blocks=8 * workers)
+        write(shipwake.Dataset("ranges", count=workers, changes=CHANGES), tempfile.mkdtemp(), shards=workers)
+        found = rates(
+            {
+                f"`wake dataset`, {workers} jobs": lambda folder: data.write(folder, threads=workers),
+                f"Ray, {workers} workers, `write`": lambda folder: write(data, folder, shards=8 * workers),
+                f"Ray, {workers} workers, `map_batches` to Parquet": lambda folder: numbers.map_batches(
+                    Simulate(data), batch_size=10
+                ).write_parquet(folder),
+            },
+            len(data),
+        )
+        for name, rate in found.items():
+            row(name, f"{rate:.1f} images/s", f"{rate / next(iter(found.values())):.2f}")
+        ray.shutdown()
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:] or ["simulate", "batch", "loader"]:
-        {"simulate": simulate, "batch": batch, "loader": loader}[name]()
+    for name in sys.argv[1:] or ["simulate", "batch", "loader", "ray"]:
+        {"simulate": simulate, "batch": batch, "loader": loader, "ray": ray}[name]()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 from shipwake import Detector, Sampler, Scene, errors, simulate
+
+WEIGHTS = Path(__file__).parents[2] / "wake-detector" / "assets"
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +94,43 @@ def test_a_wake_is_found_where_it_is(detector: Detector) -> None:
     assert [w.score for w in one] == [w.score for w in two]
     again = pickle.loads(pickle.dumps(detector)).find(made.levels(), spacing=scene.spacing)
     assert [w.score for w in again] == [w.score for w in detector.find(made.levels(), spacing=scene.spacing)]
+
+
+def test_probabilities_are_those_of_the_calibration(detector: Detector) -> None:
+    calibration = json.loads((WEIGHTS / "detector.calibration.json").read_text())
+    image = np.random.default_rng(3).gamma(4.0, size=(256, 256))
+    image[128:132, 20:230] *= 0.4
+    for spacing, name in ((10.0, "known_spacing"), (None, "unknown_spacing")):
+        known = calibration[name]
+        found = detector.find(image, spacing=spacing, least_score=0.0, intensity=True)
+        assert found[0].sure and not found[-1].sure
+        for one in found:
+            # The formula of the page, in double precision, of a score in single precision, to a result in single precision.
+            x = min(max(one.score, 1e-6), 1 - 1e-6)
+            logit = known["wake"]["a"] * np.log(x) - known["wake"]["b"] * np.log1p(-x) + known["wake"]["c"]
+            assert one.probability == pytest.approx(1 / (1 + np.exp(-logit)), rel=1e-6)
+            if one.score > 0:
+                assert one.direction_probability is not None and 0 <= one.direction_probability <= 1
+            assert one.sure == (one.score >= known["sure_from"])
+
+
+def test_weights_of_a_file_have_the_calibration_beside_it(detector: Detector, tmp_path: Path) -> None:
+    image = np.random.default_rng(3).gamma(4.0, size=(256, 256))
+    image[128:132, 20:230] *= 0.4
+    expected = detector.find(image, intensity=True)
+    file = tmp_path / "detector.safetensors"
+    file.write_bytes((WEIGHTS / "detector.safetensors").read_bytes())
+    found = Detector.load(file).find(image, intensity=True)
+    assert [one.score for one in found] == [one.score for one in expected]
+    for one in found:
+        assert one.probability is None and one.direction_probability is None and one.sure == (one.score >= 0.25)
+    beside = tmp_path / "detector.calibration.json"
+    beside.write_bytes((WEIGHTS / "detector.calibration.json").read_bytes())
+    found = Detector.load(file).find(image, intensity=True)
+    assert [one.probability for one in found] == [one.probability for one in expected]
+    beside.write_text("{}")
+    with pytest.raises(errors.WeightsError, match="calibration"):
+        Detector.load(file)
 
 
 def test_missing_pixels_hold_no_wake(detector: Detector) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .errors import ArrayError, OptionError
+from .errors import ArrayError, OptionError, TooLargeError
 
 LARGEST_SEED = 2**64 - 1
 
@@ -76,5 +76,8 @@ def array(name: str, value: Any, dimensions: int, dtype: npt.DTypeLike) -> npt.N
         shape = " x ".join(map(str, found.shape)) or "no dimension"
         raise ArrayError(f"{name} has the shape {shape}, expected {dimensions} dimensions")
     # Numbers too large for `dtype` become infinite, and are refused or left out where they are used.
-    with np.errstate(over="ignore"):
-        return np.ascontiguousarray(found, dtype=dtype)
+    try:
+        with np.errstate(over="ignore"):
+            return np.ascontiguousarray(found, dtype=dtype)
+    except MemoryError as error:
+        raise TooLargeError(f"{name} does not fit in memory: {error}") from None

@@ -120,7 +120,7 @@ class Dataset:
     ) -> None:
         seed = _check.whole("seed", seed, 0, _check.LARGEST_SEED)
         if count is None:
-            count = 3456 if recipe == "paper" else 100
+            count = 3456 if isinstance(recipe, str) and recipe == "paper" else 100
         self._count = _check.whole("count", count, 1, 10**12)
         self._threads = _check.threads(threads)
         values = dict(changes or {})
@@ -166,6 +166,13 @@ class Dataset:
     def without_image(self, index: int) -> Item:
         """As ``dataset[index]``, with an image of no pixels: it is not simulated."""
         return _item(self._inner.without_image(self._position(index)))
+
+    def files(self, index: int) -> dict[str, bytes]:
+        """Image number ``index`` as the files of a WebDataset sample, as ``wake dataset --webdataset`` has them.
+
+        ``png`` is the image of 8 bits, ``txt`` the prompt, ``json`` the line of ``metadata.jsonl``: labels, values, scene.
+        """
+        return self._inner.files(self._position(index), self._pool())
 
     def batches(self, size: int, *, start: int = 0) -> Iterator[Batch]:
         """The images in order, ``size`` at a time; the last batch may be smaller.
@@ -284,6 +291,11 @@ class Dataset:
         if self._threads is None and _is_worker():
             return 1
         return self._threads
+
+    def _on(self, threads: int) -> Dataset:
+        """The same data set, made by so many threads."""
+        source, seed, count, values, _ = self._arguments
+        return _again(source, seed, count, values, threads)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _again, self._arguments

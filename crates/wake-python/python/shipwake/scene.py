@@ -126,7 +126,7 @@ class Scene:
         >>> Scene(ship=None).prompt("brief")
         'SAR open sea, no ship, wind 5 mps toward 90 degrees, fetch 40000 meter, incidence 32 degrees.'
         """
-        if wording not in _WORDINGS:
+        if not isinstance(wording, str) or wording not in _WORDINGS:
             raise OptionError(f"wording is {wording!r:.80}, expected one of {', '.join(_WORDINGS)}")
         return self._inner.prompt(_WORDINGS.index(wording))
 
