@@ -1,8 +1,8 @@
-//! What an image tells of its scene: heading and speed of the ship, wind, fetch and incidence.
+//! Heading and speed of the ship, wind, fetch and incidence, measured in one image.
 //!
-//! The measurements judge images, simulated or generated, by physics instead of by pixels. Each takes one image of
-//! intensity before speckle and gives a value with a confidence; an image that does not carry the quantity gives a
-//! value that is not measurable.
+//! The measurements evaluate simulated and generated images by physics instead of by pixels. Each takes one image of
+//! intensity before speckle and returns a value with a confidence; a quantity that the image does not show is not
+//! measurable.
 //!
 //! ```text
 //! image ─► wake arms ─► heading ─► stationary waves ─► heading, speed

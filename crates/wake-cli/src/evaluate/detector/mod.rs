@@ -20,7 +20,7 @@ use real_sea::HELD_OUT;
 use recall::{by_scene, by_visibility};
 use report::Report;
 
-/// Measure how well wakes are found in held-out simulated images and in real tiles.
+/// Evaluate the detector on held-out simulated images and on real tiles.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
     /// Simulated images of each recipe
