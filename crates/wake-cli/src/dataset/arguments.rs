@@ -7,17 +7,17 @@ use wake_dataset::Shard;
 /// Simulate a labelled data set of ship wakes.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), detector (what satellites
-    /// deliver), or a TOML file
+    /// paper (the 3,456 scenes of the paper), ranges (random scenes like the paper's), satellites, detector (satellite images
+    /// as published), model, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "ranges")]
     pub(crate) grid: String,
     /// Change one value of the recipe, such as speckle=true; may be repeated; keys: see docs/dataset.md
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
-    /// Number of images of the whole set [default: 100; 3456 for the paper's grid]
+    /// Number of images of the set [default: 100; 3456 for the paper's grid]
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     pub(crate) count: Option<u64>,
-    /// Seed of the whole set
+    /// Seed of the set
     #[arg(long, default_value_t = 7)]
     pub(crate) seed: u64,
     /// Share of validation images, 0 to 1
@@ -43,7 +43,7 @@ pub(crate) struct Arguments {
     /// card
     #[arg(long, value_name = "DIR", conflicts_with = "shard")]
     pub(crate) webdataset: Option<PathBuf>,
-    /// Most images of such a tar file
+    /// Most images per tar file
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) per_tar: u64,
     /// Images computed in parallel [default: one per core]

@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     /// Also write every field as a file of its own, for NumPy or as TIFF
     #[arg(long, value_enum, value_delimiter = ',')]
     pub(crate) export: Vec<Export>,
-    /// Folder of the results, made if absent; of several scenes each has a folder of its name in it
+    /// Folder of the results, made if absent; with several scenes, a folder per scene in it
     #[arg(long, value_name = "DIR", default_value = "out/simulate")]
     pub(crate) out: PathBuf,
     /// Compare open sea and wakes with those of the PNG images of a folder (grey linear in amplitude; the axes of wakes in

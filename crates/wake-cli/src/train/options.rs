@@ -13,7 +13,7 @@ pub(crate) struct Place {
     /// Steps between checkpoints and results
     #[arg(long, visible_alias = "checkpoint-every", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) every: u32,
-    /// Checkpoints that are kept
+    /// Checkpoints to keep
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) keep: u16,
     /// Seed of all random numbers, simulated pairs included
@@ -78,7 +78,7 @@ impl Place {
         Ok(devices.collect::<wake_nn::Result<_>>()?)
     }
 
-    /// How a stage runs that takes what is usual for it.
+    /// Options of a stage with its defaults.
     pub(crate) fn stage(&self, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
             grad_accumulation_steps: usize::from(thrift.accumulation),
@@ -93,7 +93,7 @@ impl Place {
         })
     }
 
-    /// How a stage runs at a pace.
+    /// Options of a stage at a pace.
     pub(crate) fn paced(&self, pace: &Pace, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
             steps: Some(pace.steps as usize),
