@@ -18,7 +18,7 @@ pub(crate) struct StageDefaults {
     pub steps: usize,
     /// Examples of a batch.
     pub batch: usize,
-    /// Largest step of the optimizer.
+    /// Peak learning rate.
     pub rate: f64,
 }
 
@@ -29,7 +29,7 @@ pub struct StageOptions {
     pub steps: Option<usize>,
     /// Examples of a batch; `None`: the usual number.
     pub batch: Option<usize>,
-    /// Largest step of the optimizer; `None`: the usual one.
+    /// Peak learning rate; `None`: the default of the stage.
     pub rate: Option<f64>,
     /// Parts of a batch that a device takes one after the other, to save memory.
     pub grad_accumulation_steps: usize,

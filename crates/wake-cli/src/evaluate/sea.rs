@@ -126,7 +126,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
 
 /// The kinds of sea beside a learnt one.
 ///
-/// - `told`: how often windows are told from the right halves
+/// - `told`: accuracy of a classifier of the windows and of the right halves
 fn beside_learnt(
     pairs: &[SeaPair],
     right: &[Field],

@@ -18,7 +18,7 @@ pub(crate) struct SeaReport {
     pub(crate) rows: Vec<SeaRow>,
 }
 
-/// How often the open sea of a recipe is told from real windows.
+/// Accuracy of classifiers of the open sea of a recipe and of real windows.
 #[derive(Debug, Serialize)]
 pub(crate) struct RecipeRow {
     pub(crate) recipe: String,
@@ -41,7 +41,7 @@ pub(crate) fn markdown(report: &SeaReport) -> String {
         + &recipes(report)
 }
 
-/// How often the seas of recipes are told from real ones.
+/// The table of the seas of recipes.
 fn recipes(report: &SeaReport) -> String {
     let mut text = format!(
         "Share of windows of 128 x 128 pixels of open sea that are classified right, simulated or real: 0.5 where the kinds are \
@@ -83,7 +83,7 @@ fn learnt(report: &SeaReport) -> String {
          drawn like a left window has its median.\n\n\
          ![Gaussian noise of four styles, and below it what the flow makes of the same noise](learned_sea.png)\n\n\
          Four styles: above, Gaussian noise with their correlations; below, what the flow makes of the same noise.\n\n\
-         | sea | told from real | spectrum dB | along rows 1, 2 | along columns 1, 2 | skewness | blocks of 8, 32 |\n\
+         | sea | classifier accuracy | spectrum dB | along rows 1, 2 | along columns 1, 2 | skewness | blocks of 8, 32 |\n\
          | --- | --- | --- | --- | --- | --- | --- |\n",
         finding(report),
         report.windows,
@@ -98,7 +98,7 @@ fn learnt(report: &SeaReport) -> String {
             row.kind, row.spectrum_db, row.skewness
         );
     }
-    text + "\nTold from real: accuracy of a small network, trained on half of the windows, on patches of 64² pixels of the others, \
+    text + "\nClassifier accuracy: that of a small network, trained on half of the windows, on patches of 64² pixels of the others, \
         with its 95 % interval over the windows ([evaluation](evaluation.md#two-sample-test-and-shape-of-the-sea)); variation \
         between trainings is not included. Spectrum: root mean square difference of the radial spectrum over all rings. \
         Correlations, skewness and the variation of block means are those of `measure::texture`, means over the windows. Gaussian \

@@ -49,7 +49,7 @@ pub(crate) fn sheet() -> Result<Picture> {
             &signed(&all.radial_velocity),
             &format!("4 Velocity, rms {:.2} m/s", all.radial_velocity.rms()),
         ),
-        panel(&filling(&all.sigma0), "5 Backscatter σ0"),
+        panel(&filling(&all.sigma0), "5 Backscatter (NRCS)"),
         panel(&filling(&sharp.intensity), "6 Image if nothing moved"),
         panel(&filling(&all.intensity), "7 Velocity bunching and blur"),
         labelled.captioned("8 Speckle of 2 looks; labels"),

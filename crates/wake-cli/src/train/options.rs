@@ -1,4 +1,4 @@
-//! What every run is told on the command line.
+//! Options of every training on the command line.
 
 use std::path::PathBuf;
 

@@ -47,7 +47,7 @@ impl Comparison {
 
     /// Draws scenes in every way and counts the images against simulated ones.
     ///
-    /// - `model`: what is judged, told sentence and numbers
+    /// - `model`: the source to evaluate, conditioned on sentence and numbers
     /// - `beside`: other sources, whose pixels count alone
     ///
     /// # Errors

@@ -14,7 +14,7 @@ use crate::error::Result;
 pub struct ControllabilityRow {
     /// Name of the quantity that was changed.
     pub quantity: &'static str,
-    /// What the images' source was told; "simulator" for the simulator with another sea.
+    /// Inputs of the source: "both", "text", "numbers" or "paraphrase"; "simulator" for the simulator with another sea.
     pub told: &'static str,
     /// Pairs that were drawn.
     pub pairs: usize,

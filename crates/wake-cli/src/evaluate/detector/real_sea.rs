@@ -53,7 +53,7 @@ fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
     Ok(pairs.into_iter().map(levels).collect())
 }
 
-/// How often real windows are told from those of each recipe, and the recipe detector from itself: the floor.
+/// Accuracy of a classifier of real windows and those of each recipe, and of the recipe and itself: the floor.
 pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
     let device = device_named("flex")?;
     let sea = |plain: bool, seed: u64| -> Outcome<Vec<Field>> {

@@ -12,7 +12,7 @@ use super::recall::Recall;
 use super::{plot, real_sea};
 use crate::exit::Outcome;
 
-/// False alarms an image at which recall is told.
+/// False alarms per image at which recall is reported.
 pub(crate) const FALSE_ALARMS: f64 = 0.5;
 
 /// One row a finder and set of images.
@@ -21,7 +21,7 @@ pub(crate) struct Report {
     pub(crate) rows: Vec<Value>,
     /// Names of other runs.
     pub(crate) rungs: Vec<String>,
-    /// What was told apart.
+    /// Accuracies of the two-sample test.
     pub(crate) sea: Vec<Value>,
     /// Recall by visibility.
     pub(crate) visibility: Recall,

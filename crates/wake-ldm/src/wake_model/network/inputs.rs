@@ -68,7 +68,7 @@ impl ConditioningInputs {
     }
 }
 
-/// Logarithms of deviations are told in this unit.
+/// Unit of the logarithms of deviations.
 const LOG_DEVIATION: f64 = 3.0;
 
 /// Side of the image that stands for the mean of an open sea that is the same everywhere [pixels].

@@ -32,7 +32,7 @@ pub struct WakeImage {
     pub speckled: Field,
     /// Where ship and wake are in [`scene`](Self::scene).
     pub labels: Labels,
-    /// What was drawn: the scene that was told, and the default values of what was left open.
+    /// The scene of the image: the given values, and defaults for those left open.
     pub scene: Scene,
     /// The mapping between intensity and grey.
     pub scale: GreyScale,

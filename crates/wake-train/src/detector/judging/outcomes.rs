@@ -37,13 +37,13 @@ pub struct KnownImages {
 /// Images searched at a time.
 const AT_ONCE: u64 = 16;
 
-/// What a detector is told of the distance between the pixels of an image \[m\]; `None` for nothing.
+/// Pixel spacing given to the detector \[m\]; `None`: unknown.
 pub type Spacing<'a> = dyn Fn(&Scene) -> Option<f32> + Sync + 'a;
 
 impl KnownImages {
     /// Searches the first `count` images of a source, all of them square, once for each of the spacings.
     ///
-    /// - `done`: told the number of images after some of them
+    /// - `done`: called with the number of images after some of them
     ///
     /// # Errors
     ///

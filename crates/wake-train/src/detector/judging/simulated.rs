@@ -48,7 +48,7 @@ pub struct Searched {
 impl Searched {
     /// Searches the first `count` images of a source, all of them square.
     ///
-    /// - `done`: told each image with its wakes and what each finder has found, in order
+    /// - `done`: called with each image, its wakes and what each finder has found, in order
     ///
     /// # Errors
     ///

@@ -31,7 +31,7 @@ struct Frame {
     half_length: f64,
     /// How far the wedge reaches astern where it is 1 m wide on one side \[m\].
     slope: f64,
-    /// What lengths are divided by: pixels are told as if they were of 4 m.
+    /// Divisor of lengths: pixels count as if they had 4 m.
     scale: f64,
 }
 
