@@ -19,6 +19,7 @@ pub(crate) fn sheet() -> Result<Picture> {
         "ship.heading=50",
         "ship.position=[190, 160]",
         "ship.echo=true",
+        "ship.steepness=0.2",
         "radar.looks=2",
         "model.terms=all",
     ])?;
