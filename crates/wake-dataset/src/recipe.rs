@@ -46,13 +46,13 @@ pub struct Recipe {
     /// The mapping from σ⁰ to grey, unless the recipe draws quick-looks.
     #[serde(default)]
     pub grey: GreyScale,
-    /// How scenes are chosen.
+    /// Choice of the scenes.
     pub draw: Draw,
     /// The values that are not drawn.
     pub scene: Scene,
 }
 
-/// How scenes are chosen.
+/// Choice of the scenes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
     /// The 3,456 scenes of the paper's grid in a fixed mixed order, then again with other seas: `"paper-grid"`.

@@ -22,7 +22,7 @@ pub(crate) struct StageDefaults {
     pub rate: f64,
 }
 
-/// How a stage of training runs.
+/// Options of a stage of training.
 #[derive(Debug, Clone)]
 pub struct StageOptions {
     /// Steps in all; `None`: the usual number.
@@ -45,7 +45,7 @@ pub struct StageOptions {
     pub checkpointing: bool,
     /// Whether losses and gradients are computed in bfloat16; weights keep 32 bits.
     pub bf16: bool,
-    /// What it computes on, outside autodiff: at least one.
+    /// Devices, outside autodiff: at least one.
     pub devices: Vec<Device>,
 }
 

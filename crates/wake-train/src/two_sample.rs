@@ -28,7 +28,7 @@ const MOST: u64 = 1024;
 /// Patches classified per image.
 const JUDGED: usize = 8;
 
-/// How the test is made.
+/// Options of the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoSampleOptions {
     /// Rows and columns of a patch, a multiple of 8, no larger than the images.
@@ -52,7 +52,7 @@ impl Default for TwoSampleOptions {
     }
 }
 
-/// What came of a test.
+/// Result of a test.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct TwoSample {
     /// Share of patches of unseen images that the network calls right: ½ where the kinds are alike, 1 where every patch

@@ -39,7 +39,7 @@ pub use wake::{WakeMeasurement, kelvin_wedge, measure_wake};
 
 use serde::Serialize;
 
-/// What is known of the ship from elsewhere (its echo, a chart, or the labels of the scene).
+/// Data on the ship from another source (its echo, a chart, or the labels of the scene).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShipPlace {
     /// Midship (x, y) \[m\].
@@ -55,7 +55,7 @@ pub struct ShipPlace {
 pub struct Measured {
     /// The value, in the unit of its measurement; NaN where there is none.
     pub value: f64,
-    /// How clearly the image shows it, at least 0; the unit is the measurement's own.
+    /// Confidence, at least 0; each measurement has its own unit.
     pub confidence: f64,
     /// Whether the confidence reaches the measurement's threshold.
     pub measurable: bool,

@@ -18,7 +18,7 @@ use crate::error::Result;
 /// Side of the squares of pixels that the wake model draws by.
 const SQUARE: usize = 8;
 
-/// What one kind of image has of a sea, means over the scenes.
+/// Figures of the sea in one kind of image, means over the scenes.
 #[derive(Debug, Clone, Serialize)]
 pub struct AblationRow {
     /// Kind of image.

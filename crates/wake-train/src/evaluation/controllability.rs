@@ -9,7 +9,7 @@ use super::source::{ImageSource, Told};
 use super::view::View;
 use crate::error::Result;
 
-/// How often a measured value followed.
+/// Share of pairs in which a measured value follows.
 #[derive(Debug, Clone, Serialize)]
 pub struct ControllabilityRow {
     /// Name of the quantity that was changed.

@@ -24,7 +24,7 @@ const FIRST_CHANGED: u64 = 1 << 20;
 /// A source of images to evaluate, and the number of scenes.
 #[derive(Clone)]
 pub struct Evaluation<'a> {
-    /// What draws the images.
+    /// Source of the images.
     pub source: &'a dyn ImageSource,
     /// Its name in the report.
     pub name: &'static str,
@@ -34,7 +34,7 @@ pub struct Evaluation<'a> {
     pub beside: Vec<Named<'a>>,
     /// The scenes.
     pub held_out: HeldOut,
-    /// How images are looked at.
+    /// View of the images: grey and speckle.
     pub view: View,
     /// Conditions to evaluate besides sentence and numbers together; none for the simulator.
     pub conditions: Vec<Told>,
@@ -57,7 +57,7 @@ pub struct Figures {
     pub speckle: Speckle,
     /// Mean images of a wake over many seas.
     pub wake_correlation: WakeCorrelation,
-    /// What can be read from the images.
+    /// Values measured in the images.
     pub measurements: Vec<MeasurementRow>,
     /// The same under other conditions.
     pub conditions: Vec<ConditionRow>,
@@ -81,7 +81,7 @@ pub struct Speckle {
 pub struct ConditionRow {
     /// Inputs of the source.
     pub told: &'static str,
-    /// What can be read from its images then.
+    /// Values measured in its images then.
     pub measurements: Vec<MeasurementRow>,
 }
 
@@ -124,7 +124,7 @@ impl<'a> Evaluation<'a> {
         self.scenes.div_ceil(5)
     }
 
-    /// How much [`figures`](Self::figures) counts in all.
+    /// Number of steps that [`figures`](Self::figures) counts in all.
     #[must_use]
     pub fn steps(&self) -> u64 {
         let conditions = self.condition_scenes() * self.conditions.len();

@@ -79,7 +79,7 @@ impl KnownImages {
         Ok(all)
     }
 
-    /// What the detections of all images turned out to be; those that fit an ignored label best are left out.
+    /// Outcomes of the detections of all images; those that fit an ignored label best are left out.
     #[must_use]
     pub fn outcomes(&self) -> Vec<DetectionOutcome> {
         outcomes(&self.judged, &self.found)
@@ -112,7 +112,7 @@ fn judged(sample: &Sample) -> Judged {
     }
 }
 
-/// What the detections of some images turned out to be; those that fit an ignored label best are left out.
+/// Outcomes of the detections of some images; those that fit an ignored label best are left out.
 #[must_use]
 pub fn outcomes(images: &[Judged], found: &[Vec<Detection>]) -> Vec<DetectionOutcome> {
     let either_way = |(image, found): (&Judged, &Vec<Detection>)| {

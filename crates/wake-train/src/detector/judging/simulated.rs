@@ -41,7 +41,7 @@ pub struct Searched {
     pub wakes: Vec<Vec<Wake>>,
     /// The scene of each image.
     pub scenes: Vec<Scene>,
-    /// What the first finder takes for an image while no other works \[s\].
+    /// Seconds per image of the first finder, working alone.
     pub seconds: f64,
 }
 

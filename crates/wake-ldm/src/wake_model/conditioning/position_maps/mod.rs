@@ -35,7 +35,7 @@ struct Frame {
     scale: f64,
 }
 
-/// Where some latent pixels lie in the frame of the ship in whose wedge they lie deepest; all zero where no ship moves.
+/// Places of latent pixels in the frame of the ship in whose wedge they lie deepest; all zero where no ship moves.
 ///
 /// Distances along and across the track, in the image's axes and from the ship, in the wedge of the bow's waves or not, how
 /// far from its edge, and a band behind the stern. The wedge opens as the wake does at this speed and depth.
