@@ -11,6 +11,7 @@
 //! An input that broke something is kept in `fuzz/corpus/TARGET/`, where every run replays it.
 
 mod attack;
+mod models;
 mod mutation;
 
 use std::path::Path;

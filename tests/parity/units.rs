@@ -1,9 +1,8 @@
 //! Single layers and formulas against torch.
 
-use burn::tensor::activation::{gelu, silu};
 use burn::tensor::{Device, Tensor};
 use wake_ldm::autoencoder::GaussianPosterior;
-use wake_nn::activation::quick_gelu;
+use wake_nn::activation::{gelu, quick_gelu, silu};
 use wake_nn::norm::GroupNorm;
 use wake_nn::resample::nearest;
 use wake_nn::timestep::sinusoidal_embedding;

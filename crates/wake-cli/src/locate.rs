@@ -17,13 +17,13 @@ pub(crate) struct Arguments {
     /// Pixels, counted from 0
     #[arg(required = true, value_name = "LINE,PIXEL", value_parser = pixel)]
     places: Vec<(usize, usize)>,
-    /// Compute σ⁰ of this digital number, not of the measurement's
+    /// Compute σ⁰ of this digital number instead of the measurement's
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     dn: Option<f64>,
     /// VV, HH, VH or HV, by default the first of these that the product has
     #[arg(long, value_parser = polarization)]
     polarization: Option<Polarization>,
-    /// Print one JSON object a line for each place, and nothing else
+    /// Print one JSON object per line for each place, and nothing else
     #[arg(long)]
     json: bool,
 }

@@ -12,17 +12,17 @@ use crate::exit::{self, Outcome};
 #[derive(Args)]
 #[command(after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md")]
 pub(crate) struct Arguments {
-    /// Scene file (TOML); without it and without --text, the default scene.
+    /// Scene file (TOML); without it and without --text, the default scene
     #[arg(long, value_name = "FILE", conflicts_with = "text")]
     scene: Option<PathBuf>,
-    /// A prompt of your own instead of a scene.
+    /// Prompt, instead of a scene
     #[arg(long, value_name = "TEXT")]
     text: Option<String>,
-    /// Sets a value of the scene, such as ship.speed=12; may be repeated.
+    /// Change one value of the scene, such as ship.speed=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "text")]
     set: Vec<String>,
-    /// Prints one JSON object: prompt, ids, count, whether cut off, the stated values, the scene with them (null if
-    /// none is stated), and the parts of the prompt that stay unread.
+    /// Print one JSON object: prompt, ids, count, whether cut off, the stated values, the scene with them (null if
+    /// none is stated), and the unread parts of the prompt
     #[arg(long)]
     json: bool,
 }

@@ -1,4 +1,4 @@
-//! The images of a folder that a sea is learnt from, or judged by.
+//! The images of a folder to learn a sea from, or to compare it with.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
 //! Pictures for people: an image with its labels drawn on it, captions, and sheets of several.
 
-use font8x8::{BASIC_FONTS, GREEK_FONTS, LATIN_FONTS, UnicodeFonts};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use std::path::Path;
 use wake_physics::labels::{Labels, Line, Pixel};
 use wake_physics::{Error, output};
@@ -17,14 +17,14 @@ const ARMS: Colour = [64, 224, 128];
 /// Boxes of ships.
 const SHIP: Colour = [255, 96, 176];
 /// Behind captions and between the pictures of a sheet.
-const PAPER: Colour = [24, 24, 24];
+pub(crate) const PAPER: Colour = [24, 24, 24];
 /// Letters.
-const INK: Colour = [240, 240, 240];
+pub(crate) const INK: Colour = [240, 240, 240];
 
-/// Sides of a letter \[pixels\].
-const LETTER: usize = 8;
+/// Width of a letter \[pixels\].
+pub(crate) const LETTER: usize = get_raster_width(FontWeight::Regular, RasterHeight::Size16);
 /// From one line of letters to the next \[pixels\].
-const LINE: usize = 11;
+pub(crate) const LINE: usize = 18;
 /// Between the pictures of a sheet \[pixels\].
 const GAP: usize = 4;
 /// Pixels drawn and left out in turn, so that what lies under a line can be seen.
@@ -199,24 +199,66 @@ impl Picture {
         self.pixels = pixels;
         self.rows += above;
         for (k, line) in lines.iter().enumerate() {
-            for (n, letter) in line.chars().enumerate() {
-                self.write_letter(letter, k * LINE + 1, n * LETTER);
-            }
+            self.write_text(line, k * LINE + 1, 0);
         }
         self
     }
 
+    /// Writes a line of text over the picture, cut at its right and lower side; letters that the font lacks are blank.
+    ///
+    /// - `top`, `left`: of its first letter
+    pub(crate) fn write_text(&mut self, text: &str, top: usize, left: usize) {
+        for (n, letter) in text.chars().enumerate() {
+            self.write_letter(letter, top, left + n * LETTER);
+        }
+    }
+
     fn write_letter(&mut self, letter: char, top: usize, left: usize) {
-        let fonts = [
-            BASIC_FONTS.get(letter),
-            LATIN_FONTS.get(letter),
-            GREEK_FONTS.get(letter),
-        ];
-        let shape = fonts.into_iter().flatten().next().unwrap_or([0; LETTER]);
-        for (row, bits) in shape.iter().enumerate() {
-            for column in (0..LETTER).filter(|column| bits >> column & 1 == 1) {
-                self.pixels[(top + row) * self.columns + left + column] = INK;
+        let Some(shape) = get_raster(letter, FontWeight::Regular, RasterHeight::Size16) else {
+            return;
+        };
+        for (row, line) in shape.rows().enumerate() {
+            for (column, &share) in line.iter().enumerate() {
+                let [i, j] = [top + row, left + column];
+                if i < self.rows && j < self.columns {
+                    let pixel = &mut self.pixels[i * self.columns + j];
+                    for (below, ink) in pixel.iter_mut().zip(INK) {
+                        let [under, over] = [*below, ink].map(u16::from);
+                        let share = u16::from(share);
+                        *below = ((under * (255 - share) + over * share) / 255) as u8;
+                    }
+                }
             }
+        }
+    }
+
+    /// Fills a rectangle, cut to the picture.
+    #[cfg(any(feature = "bench", test))]
+    pub(crate) fn fill(&mut self, [left, top, width, height]: [usize; 4], colour: Colour) {
+        let right = (left + width).min(self.columns);
+        for row in top..(top + height).min(self.rows) {
+            let line = &mut self.pixels[row * self.columns..][..self.columns];
+            if left < right {
+                line[left..right].fill(colour);
+            }
+        }
+    }
+
+    /// Sets another picture over this one, cut at the right and lower side.
+    #[cfg(any(feature = "bench", test))]
+    pub(crate) fn paste(&mut self, other: &Self, top: usize, left: usize) {
+        let wide = other.columns.min(self.columns.saturating_sub(left));
+        let lines = other.pixels.chunks(other.columns.max(1));
+        for (row, line) in (top..self.rows).zip(lines) {
+            self.pixels[row * self.columns + left..][..wide].copy_from_slice(&line[..wide]);
+        }
+    }
+
+    /// Draws a closed line through corners.
+    #[cfg(any(feature = "bench", test))]
+    pub(crate) fn draw_outline(&mut self, corners: &[Pixel], colour: Colour) {
+        for (n, &corner) in corners.iter().enumerate() {
+            self.draw_line([corner, corners[(n + 1) % corners.len()]], colour);
         }
     }
 
@@ -374,21 +416,36 @@ mod tests {
 
     #[test]
     fn captions_are_broken_and_stand_above() {
-        // 80 columns hold ten letters.
-        let picture = grey(5, 80).captioned("a wake at 45°, σ in dB");
-        assert_eq!(picture.size(), [5 + 3 * LINE, 80]);
+        let wide = 10 * LETTER;
+        let picture = grey(5, wide).captioned("a wake at 45°, σ in dB");
+        assert_eq!(picture.size(), [5 + 3 * LINE, wide]);
         assert_eq!(
             broken("a wake at 45°, σ in dB", 10),
             ["a wake at", "45°, σ in", "dB"]
         );
-        assert!(drawn(&picture, INK).iter().all(|&[i, _]| i < 3 * LINE));
-        assert_eq!(picture.at(3 * LINE, 0), [9; 3]);
-        // The bar of an L is at its left: the font's bits count from there.
-        let letter = grey(1, 8).captioned("L");
-        let columns: Vec<usize> = drawn(&letter, INK).iter().map(|p| p[1]).collect();
-        assert!(columns.iter().filter(|&&j| j < 4).count() > columns.len() / 2);
+        assert!((0..5).all(|i| (0..wide).all(|j| picture.at(3 * LINE + i, j) == [9; 3])));
+        // The bar of an L is at its left, and it is bright.
+        let letter = grey(1, LETTER).captioned("L");
+        let places = (0..LINE).flat_map(|i| (0..LETTER).map(move |j| [i, j]));
+        let bright = places.filter(|&[i, j]| letter.at(i, j)[0] > 140);
+        let columns: Vec<usize> = bright.map(|[_, j]| j).collect();
+        assert!(columns.len() > 8, "{columns:?}");
+        assert!(columns.iter().filter(|&&j| 2 * j < LETTER).count() > columns.len() / 2);
         assert_eq!(broken("", 4), [""]);
         assert_eq!(broken("overlong word", 4), ["over", "word"]);
+    }
+
+    #[test]
+    fn pictures_are_set_over_others_and_cut() {
+        let mut picture = grey(6, 8);
+        picture.paste(&Picture::from_levels(&[200; 12], 4), 4, 6);
+        assert_eq!(drawn(&picture, [200; 3]), [[4, 6], [4, 7], [5, 6], [5, 7]]);
+        picture.fill([0, 5, 2, 9], WAKE);
+        picture.fill([9, 0, 2, 2], SHIP);
+        assert_eq!(drawn(&picture, WAKE), [[5, 0], [5, 1]]);
+        assert_eq!(drawn(&picture, SHIP), Vec::<[usize; 2]>::new());
+        picture.write_text("wake", 30, 3);
+        assert_eq!(picture.size(), [6, 8]);
     }
 
     #[test]

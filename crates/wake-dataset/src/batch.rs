@@ -31,7 +31,7 @@ pub struct Batch {
     /// The upright boxes of all objects, `[objects, 6]`: the image's place in the batch, the class (0 wake, 1 ship), and
     /// left, top, width and height \[pixels\].
     pub boxes: Tensor<2>,
-    /// What a detector is to find in each image.
+    /// Labelled boxes of each image.
     pub objects: Vec<Vec<Object>>,
     /// The scene of each image.
     pub scenes: Vec<Scene>,

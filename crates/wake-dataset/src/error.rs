@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use whole_files::sentence;
 
-/// What a fallible function of this crate returns.
+/// Result of the functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// A data set that could not be described, made, written or read.

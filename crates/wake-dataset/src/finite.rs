@@ -10,7 +10,7 @@ use burn::data::dataset::{Dataset, DatasetError};
 pub struct Finite<S> {
     /// The source.
     pub source: S,
-    /// How many pairs.
+    /// Number of pairs.
     pub length: usize,
 }
 

@@ -47,7 +47,7 @@ impl Folder {
         })
     }
 
-    /// What the set is.
+    /// The manifest of the set.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }

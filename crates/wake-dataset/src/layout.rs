@@ -21,7 +21,7 @@ const VAL_SHARE: f64 = 0.1;
 /// Scenes that are planned to tell what a set costs.
 const PLANNED: u64 = 8;
 
-/// What a data set is: the content of its `dataset.json`, from which every other file follows.
+/// Manifest of a data set: the content of `dataset.json`, from which every other file follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -51,7 +51,7 @@ pub struct Manifest {
 pub struct Shard {
     /// Number of the share, 0 up to `of`.
     pub number: u64,
-    /// How many shares there are.
+    /// Number of shards.
     pub of: u64,
 }
 
@@ -125,7 +125,7 @@ impl Manifest {
         Simulated::new(self.recipe.clone(), self.seed)
     }
 
-    /// What an image of this folder costs, by the plans of its first eight scenes: seconds of a core.
+    /// Estimated seconds of one core per image, by the plans of the first eight scenes.
     ///
     /// # Errors
     ///

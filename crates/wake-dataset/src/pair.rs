@@ -18,7 +18,7 @@ pub struct Pair {
     pub prompt: String,
     /// The scene that was drawn.
     pub scene: Scene,
-    /// What is where.
+    /// Places of ships and wakes.
     pub labels: Labels,
     /// Of a quick-look: the amplitudes √σ⁰ of grey 0 and of grey 1, linear between; the first may be below 0.
     pub amplitudes: Option<[f64; 2]>,

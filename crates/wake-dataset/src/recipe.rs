@@ -46,13 +46,13 @@ pub struct Recipe {
     /// The mapping from σ⁰ to grey, unless the recipe draws quick-looks.
     #[serde(default)]
     pub grey: GreyScale,
-    /// How scenes are chosen.
+    /// Choice of the scenes.
     pub draw: Draw,
     /// The values that are not drawn.
     pub scene: Scene,
 }
 
-/// How scenes are chosen.
+/// Choice of the scenes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
     /// The 3,456 scenes of the paper's grid in a fixed mixed order, then again with other seas: `"paper-grid"`.
@@ -282,7 +282,7 @@ impl Recipe {
         self.changed(parsed(text)?, text)
     }
 
-    /// This recipe with the values of a table in the place of its own; `text`: what the table was read from.
+    /// This recipe with values replaced by those of a table; `text`: what the table was read from.
     fn changed(&self, mut changes: toml::Table, text: &str) -> Result<Self> {
         let fail = |message: String| Error::Recipe {
             message: sentence(&message),
@@ -386,7 +386,7 @@ fn with_stored_keys(changes: &mut toml::Table) {
     *radar = std::mem::take(radar).into_iter().map(stored).collect();
 }
 
-/// Puts the values of `changes` in the place of those of `table`, table by table.
+/// Replaces values of `table` by those of `changes`, table by table.
 fn merge(table: &mut toml::Table, changes: toml::Table) {
     for (key, change) in changes {
         match (table.get_mut(&key), change) {

@@ -106,7 +106,7 @@ impl Simulated {
         }
     }
 
-    /// How image number `index` is passed on; `None` where it is the product's own.
+    /// Delivery of image number `index`; `None` where the image is the product's own.
     pub fn delivery(&self, index: u64) -> Option<Delivery> {
         match &self.recipe.draw {
             Draw::PaperGrid => None,

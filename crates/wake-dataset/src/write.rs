@@ -12,7 +12,7 @@ use std::path::Path;
 use wake_physics::output;
 use whole_files::{FolderLock, checksum, failed};
 
-/// How far a data set is.
+/// Progress of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// Pairs that are there.

@@ -2,7 +2,7 @@
 
 use whole_files::quoted;
 
-/// What a fallible function of this crate returns.
+/// Result of the functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// A model that could not be built, read, written or run.

@@ -27,7 +27,7 @@ pub struct Search<'a> {
 
 /// The wakes of a product, the surest first, in its lines and pixels.
 ///
-/// - `done`: told after every tile how many of how many are done; may be called by several threads
+/// - `done`: called after every tile with the number of tiles done and in all; may be called by several threads
 ///
 /// # Errors
 ///

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use whole_files::{quoted, sentence};
 
-/// What a fallible function of this crate returns.
+/// Result of the functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Why a model could not be built, read, written or run.
@@ -150,9 +150,9 @@ pub struct Mismatch {
 pub struct Misshapen {
     /// Name of the tensor in the file.
     pub name: String,
-    /// What the model needs, for example `float [320, 4, 3, 3]`.
+    /// Tensor that the model needs, for example `float [320, 4, 3, 3]`.
     pub expected: String,
-    /// What the file holds, for example `I64 [1, 77]`.
+    /// Tensor in the file, for example `I64 [1, 77]`.
     pub found: String,
 }
 

@@ -24,7 +24,7 @@ pub struct GreyScale {
     pub darkest_db: f64,
     /// σ⁰ of grey 1 \[dB\], above `darkest_db`.
     pub brightest_db: f64,
-    /// What grey is linear in.
+    /// Quantity that grey is linear in.
     #[serde(default, skip_serializing_if = "Mapping::is_decibel")]
     pub mapping: Mapping,
 }

@@ -5,6 +5,7 @@
 //! | [`direct_quadrature`] | waves of a ship by the sum of plane waves |
 //! | [`matrix_product`], [`synthesize`] | [`harmonic_sum`](crate::waves::harmonic_sum): the same sum as a matrix product, and by non-uniform FFTs |
 //! | [`DirectImage`] | the fast image of moving pixels |
+//! | [`cmod5n`] | σ⁰ of the open sea at C band by the empirical model CMOD5.N |
 //! | [`seams`] | images that are put together from squares |
 //! | [`paper_grid`] | the scenes of the paper this project starts from |
 //!
@@ -16,6 +17,7 @@ pub use crate::measure::seams::seams;
 pub use crate::nufft::synthesize;
 pub use crate::sar::coherence::{azimuth_cutoff, coherence_time, cutoff_transfer};
 pub use crate::sar::dense::DirectImage;
+pub use crate::scattering::cmod5n::sigma0 as cmod5n;
 pub use crate::scene::paper::paper_grid;
 pub use crate::scene::sensor::slant_resolution;
 pub use crate::spectrum::{kitaigorodskii_factor, to_frequency, to_wavenumber};

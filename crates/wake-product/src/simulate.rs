@@ -47,7 +47,7 @@ const NUMBERS: [f64; 2] = [1.0, 65_535.0];
 /// Simulates the part of a product, and writes it with the ships' truth into a folder.
 ///
 /// - `template`: a Sentinel-1 product; its measurement is not needed
-/// - `done`: told the lines of every strip that is written
+/// - `done`: called with the lines of every written strip
 ///
 /// # Errors
 ///

@@ -17,11 +17,11 @@ pub struct PartialScene {
     pub ship: Option<bool>,
     /// Ship speed in m/s.
     pub ship_speed: Option<f64>,
-    /// Where the ship moves to, in degrees clockwise from azimuth, 0 up to 360.
+    /// Heading of the ship, in degrees clockwise from azimuth, 0 up to 360.
     pub ship_heading: Option<f64>,
     /// Wind speed at 10 m height, in m/s.
     pub wind_speed: Option<f64>,
-    /// Where the wind blows to, in degrees clockwise from azimuth, 0 up to 360.
+    /// Direction toward which the wind blows, in degrees clockwise from azimuth, 0 up to 360.
     pub wind_toward: Option<f64>,
     /// Fetch in m.
     pub fetch: Option<f64>,

@@ -32,7 +32,7 @@ pub type Tensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 pub struct Checkpoint {
     /// Steps made.
     pub step: usize,
-    /// Those of them that changed the weights.
+    /// Steps that changed the weights.
     pub applied: usize,
     /// Whatever is no tensor.
     pub state: Value,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// What a fallible function of this crate returns.
+/// Result of the functions of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// A training or an evaluation that could not be started, continued or finished.

@@ -45,7 +45,7 @@ pub(crate) struct LatentSet {
 /// The patch transform that keeps most of what the first images of a source have beyond the expected ones, and what it keeps.
 ///
 /// - `config`: shapes the transform, and has the mapping of grey that the images have
-/// - `done`: told a number of images when they were looked at
+/// - `done`: called with a number of images when they were read
 ///
 /// # Errors
 ///
@@ -87,7 +87,7 @@ fn beyond(pair: Pair, config: &WakeModelConfig) -> Result<Vec<f32>> {
 impl LatentSet {
     /// The latents of the first pairs of a source, and what physics foresees of their scenes.
     ///
-    /// - `done`: told a number of pairs when they are in the set
+    /// - `done`: called with a number of pairs when they are in the set
     ///
     /// # Errors
     ///

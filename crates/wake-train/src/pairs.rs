@@ -25,7 +25,7 @@ enum Pairs {
 }
 
 impl TrainingPairs {
-    /// Those of a folder, all of them.
+    /// All pairs of a folder.
     #[must_use]
     pub fn folder(folder: Folder) -> Self {
         Self {
@@ -48,7 +48,7 @@ impl TrainingPairs {
         })
     }
 
-    /// Where the pairs come from.
+    /// Source of the pairs.
     pub fn source(&self) -> &dyn Source {
         match &self.pairs {
             Pairs::Folder(folder) => folder.as_ref(),
@@ -84,7 +84,7 @@ impl TrainingPairs {
         self.count == 0
     }
 
-    /// What the pairs are, as a run notes it.
+    /// Identity of the pairs, as a run notes it.
     #[must_use]
     pub fn identity(&self) -> Value {
         json!({"set": self.set, "shard": self.set.shard})

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 /// Parts of a loss by name.
 pub type Terms = Vec<(&'static str, f64)>;
 
-/// What a part of a model learns.
+/// Training task of a part of a model.
 ///
 /// Step s takes the positions s · batch … (s + 1) · batch − 1, however many devices and parts share them: what is drawn for a
 /// position follows from the position alone.
@@ -65,7 +65,7 @@ pub struct RunOptions {
     pub batch: usize,
     /// Seed of everything that is drawn.
     pub seed: u64,
-    /// What the run learns from, such as the manifest of its data set: a checkpoint of another is refused.
+    /// Identity of the training data, such as the manifest of a data set: a checkpoint of another is refused.
     pub identity: Value,
     /// The loop.
     pub trainer: TrainerOptions,

@@ -111,7 +111,7 @@ impl Patch {
 /// Albergo, Boffi & Vanden-Eijnden (2023), "Stochastic Interpolants".
 #[derive(Debug)]
 pub(crate) struct SeaTask<'a> {
-    /// What is learnt from, at least one patch.
+    /// Training patches, at least one.
     pub patches: &'a SeaPatches,
     /// Seed of order, noise and noise levels.
     pub seed: u64,

@@ -28,16 +28,16 @@ const EMA_DECAY: f64 = 0.995;
 const WEIGHTS: &str = "sea.safetensors";
 const SHEET: &str = "sea.png";
 
-/// How a sea is learnt from patches of images that nobody labelled.
+/// Training of a learnt sea on patches of unlabelled images.
 #[derive(Debug, Clone)]
 pub struct SeaTraining<'a> {
-    /// What it learns from, at least one patch.
+    /// Training patches, at least one.
     pub patches: &'a SeaPatches,
     /// Side of their pixels \[m\], where it is known: then scenes of other pixels are refused.
     pub spacing: Option<f64>,
-    /// What the patches were cut from: a checkpoint of another run is refused.
+    /// Identity of the images: a checkpoint of another run is refused.
     pub identity: Value,
-    /// How the run is made.
+    /// Options of the run.
     pub options: StageOptions,
 }
 

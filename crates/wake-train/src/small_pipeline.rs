@@ -49,10 +49,10 @@ const DRAWN: usize = 25;
 /// Channels of a token.
 const TOKENS: usize = 128;
 
-/// How a small model of Stable Diffusion's kind is learnt from images and prompts alone.
+/// Training of a small model of Stable Diffusion's kind on images and prompts alone.
 #[derive(Debug, Clone)]
 pub struct PipelineTraining<'a> {
-    /// What it learns from.
+    /// Training pairs.
     pub pairs: &'a TrainingPairs,
     /// Steps of the autoencoder; `None`: the usual number.
     pub autoencoder_steps: Option<usize>,
@@ -60,7 +60,7 @@ pub struct PipelineTraining<'a> {
     pub latents: LatentShape,
     /// Steps of text encoder and U-Net after which it stops, to go on later; `None`: all.
     pub stop_after: Option<usize>,
-    /// How the stages run; the steps are those of text encoder and U-Net.
+    /// Options of the stages; the steps are those of text encoder and U-Net.
     pub options: StageOptions,
 }
 

@@ -30,7 +30,7 @@ pub(crate) struct Stage<'a> {
 impl Stage<'_> {
     /// Makes all steps.
     ///
-    /// - `progress`: told of every step
+    /// - `progress`: called after every step
     /// - `show`: writes the results, after every checkpoint; and at the start, where a kill has left those of an earlier one
     ///
     /// # Errors

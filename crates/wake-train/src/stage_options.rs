@@ -18,18 +18,18 @@ pub(crate) struct StageDefaults {
     pub steps: usize,
     /// Examples of a batch.
     pub batch: usize,
-    /// Largest step of the optimizer.
+    /// Peak learning rate.
     pub rate: f64,
 }
 
-/// How a stage of training runs.
+/// Options of a stage of training.
 #[derive(Debug, Clone)]
 pub struct StageOptions {
     /// Steps in all; `None`: the usual number.
     pub steps: Option<usize>,
     /// Examples of a batch; `None`: the usual number.
     pub batch: Option<usize>,
-    /// Largest step of the optimizer; `None`: the usual one.
+    /// Peak learning rate; `None`: the default of the stage.
     pub rate: Option<f64>,
     /// Parts of a batch that a device takes one after the other, to save memory.
     pub grad_accumulation_steps: usize,
@@ -45,7 +45,7 @@ pub struct StageOptions {
     pub checkpointing: bool,
     /// Whether losses and gradients are computed in bfloat16; weights keep 32 bits.
     pub bf16: bool,
-    /// What it computes on, outside autodiff: at least one.
+    /// Devices, outside autodiff: at least one.
     pub devices: Vec<Device>,
 }
 

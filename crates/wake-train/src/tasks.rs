@@ -219,7 +219,7 @@ pub(super) fn interpolate(
 pub(crate) struct FlowTask<'a> {
     /// The residuals.
     pub set: &'a LatentSet,
-    /// What they were encoded with, outside autodiff.
+    /// Transform that encoded them, outside autodiff.
     pub patches: &'a PatchTransform,
     /// Seed of order, noise and noise levels.
     pub seed: u64,

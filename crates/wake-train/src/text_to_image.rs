@@ -235,7 +235,7 @@ pub(crate) struct TextToImage {
 pub(crate) struct TextToImageTask<'a> {
     /// The latents, at least one.
     pub set: &'a PromptedLatents,
-    /// How much noise each step has.
+    /// Noise of each step.
     pub schedule: &'a NoiseSchedule,
     /// Seed of order, noise, steps, and of which prompts are left out.
     pub seed: u64,

@@ -19,16 +19,16 @@ use wake_nn::resample::Downsample;
 const WIDTHS: [usize; 3] = [16, 32, 64];
 const GROUPS: usize = 8;
 const EPSILON: f64 = 1e-5;
-/// Largest step of the optimizer.
+/// Peak learning rate.
 const RATE: f64 = 4e-3;
 /// Standard errors on each side of the interval: 95 of 100 normal numbers.
 const STANDARD_ERRORS: f64 = 1.96;
 /// Largest number of patches of one kind in a step.
 const MOST: u64 = 1024;
-/// Patches of each image that are judged.
+/// Patches classified per image.
 const JUDGED: usize = 8;
 
-/// How the test is made.
+/// Options of the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoSampleOptions {
     /// Rows and columns of a patch, a multiple of 8, no larger than the images.
@@ -52,7 +52,7 @@ impl Default for TwoSampleOptions {
     }
 }
 
-/// What came of a test.
+/// Result of a test.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct TwoSample {
     /// Share of patches of unseen images that the network calls right: ½ where the kinds are alike, 1 where every patch

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {action} {}: {source}", path.display())]
 pub struct Error {
-    /// What was tried, such as "write".
+    /// Attempted action, such as "write".
     pub action: &'static str,
-    /// Where.
+    /// File or folder.
     pub path: PathBuf,
-    /// What the system says.
+    /// Error of the system.
     pub source: std::io::Error,
 }
 

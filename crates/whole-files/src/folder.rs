@@ -18,15 +18,15 @@ pub fn make_folder(folder: &Path) -> Result<()> {
     sweep(folder)
 }
 
-/// A folder that only one process works in, until this is dropped.
+/// Exclusive lock of this process on a folder, released when dropped.
 #[derive(Debug)]
 pub struct FolderLock {
     _folder: Option<File>,
 }
 
-/// Makes a folder, and takes it for this process alone.
+/// Makes a folder and locks it for this process.
 ///
-/// Where the system cannot lock a folder nothing is locked.
+/// On systems that cannot lock folders nothing is locked.
 ///
 /// # Errors
 ///
@@ -52,7 +52,7 @@ pub fn lock_folder(folder: &Path) -> Result<FolderLock> {
     }
 }
 
-/// What a folder holds, in the order of names.
+/// Paths of the entries of a folder, sorted by name.
 ///
 /// # Errors
 ///
@@ -66,7 +66,7 @@ pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Removes what killed processes left half-written in a folder, and nothing that a living one writes.
+/// Removes temporary files of killed processes from a folder; keeps those of running ones.
 ///
 /// # Errors
 ///

@@ -34,6 +34,6 @@ pub(crate) enum Part {
     Simulator,
     /// The model
     Model,
-    /// Images a second through the data set's loader
+    /// Images per second of the data set's loader
     Loader,
 }

@@ -30,7 +30,7 @@ use serde_json::{Value, json};
 use crate::exit::{self, Outcome};
 use crate::progress;
 
-/// Writes `report.json`, `simulator.md`, `spacing.md`, `model.md`, `loader.md`, `frontier.svg` and `model.svg` (log-log).
+/// Writes `report.json`, `simulator.md`, `simulator.csv`, `spacing.md`, `model.md`, `loader.md`, `frontier.svg` and `model.svg` (log-log).
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let out = &arguments.out;
     whole_files::make_folder(out)?;
@@ -43,6 +43,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         let measured = sweep::measure(arguments.largest as usize, &arguments.stage)?;
         plot::draw(&out.join("frontier.svg"), &plot::SIMULATOR, &measured)?;
         parts.push(("simulator.md", sweep::table(&measured)));
+        let all = sweep::csv(&measured);
+        whole_files::write_atomically(&out.join("simulator.csv"), all.as_bytes())?;
         add(&mut rows, &measured)?;
     }
     if asked(Part::Simulator) && arguments.stage.is_empty() {

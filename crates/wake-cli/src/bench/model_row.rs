@@ -1,4 +1,4 @@
-//! What is told of the model: one row for each way to draw.
+//! Rows of the model: one per number of steps, batch size and rounding.
 
 use super::row::Row;
 use serde::Serialize;

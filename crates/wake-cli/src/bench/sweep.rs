@@ -42,28 +42,29 @@ pub(crate) fn measure(largest: usize, stages: &[String]) -> wake_physics::Result
     Ok(rows)
 }
 
-/// The rows as a table in Markdown, under the instruction set that they were measured with.
+/// The rows of [`plot::FRONTIER_SIZE`] at the default tolerance as a table in Markdown, under the instruction set that they were
+/// measured with.
 pub(crate) fn table(rows: &[Row]) -> String {
     let threads = rayon::current_num_threads();
+    let size = plot::FRONTIER_SIZE;
     let mut text = format!(
-        "{} threads, {}.\n\n\
-         | stage | size | tolerance | fast ms | oracle s | product ms | ratio | pixels | max error | rms error |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-        threads,
+        "{threads} threads, {}; {size} x {size} pixels, tolerance {DEFAULT_TOLERANCE:.0e} where the method has one.\n\n\
+         | stage | fast ms | oracle s | product ms | ratio | pixels | max error | rms error |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         instruction_set()
     );
-    for r in rows {
-        let tolerance = r.tolerance.map_or(String::new(), |t| format!("{t:.0e}"));
-        let product = r
-            .matrix_product_seconds
-            .map_or(String::new(), |s| figures(1e3 * s));
+    let shown = |row: &&Row| {
+        let tolerance = row.tolerance.unwrap_or(DEFAULT_TOLERANCE);
+        row.size == size && tolerance == DEFAULT_TOLERANCE
+    };
+    for r in rows.iter().filter(shown) {
         text += &format!(
-            "| {} | {} | {tolerance} | {} | {}{} | {product} | {} | {} | {:.1e} | {:.1e} |\n",
+            "| {} | {} | {}{} | {} | {} | {} | {:.1e} | {:.1e} |\n",
             r.stage,
-            r.size,
             figures(1e3 * r.fast_seconds),
             figures(r.oracle_seconds),
             if r.extrapolated() { "*" } else { "" },
+            product(r),
             figures(r.ratio),
             r.pixels,
             r.max_error,
@@ -71,6 +72,36 @@ pub(crate) fn table(rows: &[Row]) -> String {
         );
     }
     text + "\n\\* extrapolated: the oracle ran at that many random pixels of this size, where the errors are measured.\n"
+}
+
+/// All rows as CSV.
+pub(crate) fn csv(rows: &[Row]) -> String {
+    let mut text =
+        "stage,size,tolerance,fast_ms,oracle_s,oracle_extrapolated,product_ms,ratio,pixels,max_error,rms_error\n"
+            .to_owned();
+    for r in rows {
+        let tolerance = r.tolerance.map_or(String::new(), |t| format!("{t:.0e}"));
+        text += &format!(
+            "{},{},{tolerance},{},{},{},{},{},{},{:.1e},{:.1e}\n",
+            r.stage,
+            r.size,
+            figures(1e3 * r.fast_seconds),
+            figures(r.oracle_seconds),
+            r.extrapolated(),
+            product(r),
+            figures(r.ratio),
+            r.pixels,
+            r.max_error,
+            r.rms_error
+        );
+    }
+    text
+}
+
+/// Milliseconds of the matrix product, where there is one.
+fn product(row: &Row) -> String {
+    let seconds = row.matrix_product_seconds;
+    seconds.map_or(String::new(), |s| figures(1e3 * s))
 }
 
 /// A number in at most three figures, so that none seems surer than it is.

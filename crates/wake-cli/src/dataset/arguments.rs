@@ -7,30 +7,30 @@ use wake_dataset::Shard;
 /// Simulate a labelled data set of ship wakes.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// paper (the 3,456 scenes of the paper), ranges (random scenes for a small model), detector (what satellites
-    /// deliver), or a TOML file
+    /// paper (the 3,456 scenes of the paper), ranges (random scenes like the paper's), satellites, detector (satellite images
+    /// as published), model, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "ranges")]
     pub(crate) grid: String,
     /// Change one value of the recipe, such as speckle=true; may be repeated; keys: see docs/dataset.md
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
-    /// Number of images of the whole set [default: 100; 3456 for the paper's grid]
+    /// Number of images of the set [default: 100; 3456 for the paper's grid]
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     pub(crate) count: Option<u64>,
-    /// Seed of the whole set
+    /// Seed of the set
     #[arg(long, default_value_t = 7)]
     pub(crate) seed: u64,
-    /// Share of the images that are for validation, 0 to 1
+    /// Share of validation images, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     pub(crate) val_share: f64,
-    /// Draw the scenes on a sea learnt from real images: a file that `wake train sea` wrote
+    /// Learnt sea to draw the scenes on: a file of `wake train sea`
     #[cfg(feature = "generate")]
     #[arg(long, value_name = "FILE", conflicts_with = "merge")]
     pub(crate) sea: Option<PathBuf>,
-    /// Make only share i of n, into the folder shard-i
+    /// Make only shard i of n, into the folder shard-i
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<Shard>,
-    /// Join the shards made before
+    /// Join the shards
     #[arg(long, conflicts_with_all = ["shard", "count", "set"])]
     pub(crate) merge: bool,
     /// Also write README.md into the folder, the card of the set with its columns for Hugging Face
@@ -39,14 +39,14 @@ pub(crate) struct Arguments {
     /// Licence of the images that the card states, by its name on Hugging Face
     #[arg(long, value_name = "NAME", default_value = "cc0-1.0", value_parser = license)]
     pub(crate) license: String,
-    /// Also write the set as tar files for the library webdataset (train-000000.tar, …) into this folder; with --card a card
-    /// there, too
+    /// Also write the set as tar files for the library webdataset (train-000000.tar, …) into this folder; with --card also a
+    /// card
     #[arg(long, value_name = "DIR", conflicts_with = "shard")]
     pub(crate) webdataset: Option<PathBuf>,
-    /// Most images of such a tar file
+    /// Most images per tar file
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) per_tar: u64,
-    /// Images made at the same time [default: one for each core]
+    /// Images computed in parallel [default: one per core]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) jobs: Option<u16>,
     /// Folder of the set, made if absent

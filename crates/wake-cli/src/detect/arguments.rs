@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{locate, named};
 
-/// How wakes are looked for.
+/// The method of the search.
 #[derive(clap::ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Method {
     /// The trained network
@@ -20,10 +20,10 @@ pub(crate) struct Arguments {
     /// product: a Sentinel-1 .SAFE folder or .zip, or a GeoTIFF
     #[arg(required = true, value_name = "FILE|DIR")]
     pub(super) images: Vec<PathBuf>,
-    /// Pixel spacing [m]; without it the scale comes from the image
+    /// Pixel spacing [m]; without it the scale is estimated from the speckle
     #[arg(long, value_parser = named::spacing)]
     pub(super) spacing: Option<f32>,
-    /// How wakes are looked for
+    /// Method of the search
     #[arg(long, value_enum, default_value_t = Method::Network)]
     pub(super) method: Method,
     /// Weights of the network, by default those in the repository
@@ -55,7 +55,7 @@ pub(crate) struct ProductArguments {
     /// Polygons of land (GeoJSON), instead of the built-in coast of Natural Earth
     #[arg(long, value_name = "FILE")]
     pub(super) land: Option<PathBuf>,
-    /// Search land, too
+    /// Search land too
     #[arg(long, conflicts_with = "land")]
     pub(super) no_land: bool,
     /// Sea closer to land than this is left out [m]

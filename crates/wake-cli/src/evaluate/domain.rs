@@ -19,13 +19,13 @@ const SEED: u64 = 1 << 40;
 /// Compare the model with the simulator over all scenes of a recipe.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// paper, ranges, satellites, detector or model, or a recipe file: the scenes
+    /// Recipe of the scenes: paper, ranges, satellites, detector, model, or a file
     #[arg(long, default_value = "satellites")]
     recipe: String,
     /// Folder of a small model that `wake train` wrote; without it, the model in the crate
     #[arg(long, value_name = "DIR")]
     weights: Option<PathBuf>,
-    /// Steps from noise to image; without it, the sampler's own number
+    /// Sampling steps; without it, the sampler's default
     #[arg(long)]
     steps: Option<usize>,
     /// Scenes

@@ -27,7 +27,7 @@ pub(crate) fn markdown(report: &Report) -> String {
         })
     };
     let mut text = format!(
-        "{} scenes of the recipe `{}`.\n\n| image | told apart, before speckle | with speckle | seconds an image |\n|---|---|---|---|\n",
+        "{} scenes of the recipe `{}`.\n\n| image | classifier accuracy, before speckle | with speckle | seconds an image |\n|---|---|---|---|\n",
         report.scenes, report.recipe
     );
     for row in &report.rows {

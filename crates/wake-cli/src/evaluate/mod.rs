@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     }
 }
 
-/// Writes `report.json`, `report.md`, `ablation.png`, `spectrum.svg` and `wake_correlation.svg`; `docs/evaluation.md` says what
+/// Writes `report.json`, `report.md`, `ablation.png`, `spectrum.svg` and `wake_correlation.svg`; `docs/reports/evaluation.md` says what
 /// each figure means.
 fn models(arguments: &Arguments) -> Outcome<()> {
     let common = &arguments.common;

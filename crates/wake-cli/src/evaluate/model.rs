@@ -1,4 +1,4 @@
-//! The wake model that is judged.
+//! The wake model to evaluate.
 
 use crate::exit::Outcome;
 use std::path::Path;

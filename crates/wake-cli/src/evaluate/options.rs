@@ -17,7 +17,7 @@ pub(crate) struct Arguments {
     /// Folder of a small model that `wake train` wrote; without it, the model in the crate
     #[arg(long, value_name = "DIR", conflicts_with = "simulator_only")]
     pub(crate) weights: Option<PathBuf>,
-    /// Steps from noise to image; without it, the sampler's own number
+    /// Sampling steps; without it, the sampler's default
     #[arg(long, conflicts_with = "simulator_only")]
     pub(crate) steps: Option<usize>,
     #[command(flatten)]

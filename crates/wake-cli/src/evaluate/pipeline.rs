@@ -26,18 +26,18 @@ const EXTENT: f64 = 1280.0;
 
 /// Evaluate a text-to-image model in diffusers layout, at the size of its images.
 ///
-/// Scenes, pixels, grey and speckle are those of the data set that the model learnt from. Writes what `wake evaluate` writes,
-/// and `effects.png` (single values of a scene changed) and `radial.svg` (radial spectra in three bands). The row `its autoencoder
-/// alone` encodes and decodes the simulated images themselves: the best that the model could draw.
+/// Scenes, pixels, grey and speckle are those of the model's data set. Writes what `wake evaluate` writes, and `effects.png`
+/// (single values of a scene changed) and `radial.svg` (radial spectra in three bands). The row `its autoencoder alone` encodes and
+/// decodes the simulated images themselves: the best that the model can do.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Folder of the model in diffusers layout, such as one that `wake train` wrote
     #[arg(long, value_name = "DIR")]
     weights: PathBuf,
-    /// Low-rank adaptation that is merged into the model
+    /// Low-rank adaptation to merge into the model
     #[arg(long, value_name = "FILE")]
     lora: Option<PathBuf>,
-    /// Data set that the model learnt from [default: that of `wake train`, or the paper's scenes at 1,280 m a side with speckle]
+    /// Data set that the model was trained on [default: that of `wake train`, or the paper's scenes at 1,280 m a side with speckle]
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Whether the model draws speckle [default: as the data set has it]
@@ -52,13 +52,13 @@ pub(crate) struct Options {
     /// Steps of DDIM whose images are the reference of every scheduler's error [default: none]
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..=1000))]
     reference: Option<u32>,
-    /// How strongly to follow the prompt; up to 1: as often as the data set does
+    /// Guidance scale; 1 or less: no guidance
     #[arg(long, default_value_t = 1.0)]
     guidance: f64,
     /// Append the figures to this file of JSON lines
     #[arg(long, value_name = "FILE", requires = "samples")]
     curve: Option<PathBuf>,
-    /// Images that the model has seen in training, for --curve
+    /// Number of training images, for --curve
     #[arg(long, requires = "curve")]
     samples: Option<u64>,
     #[command(flatten)]

@@ -26,16 +26,16 @@ const SHOWN: usize = 4;
 /// Compare simulated seas, and one learnt from real images, with the right halves of these images.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Folder of real images, and `NAME_mask.png` of what does not count
+    /// Folder of real images; pixels marked in `NAME_mask.png` are left out
     #[arg(long, value_name = "DIR")]
     real: PathBuf,
-    /// A sea that `wake train sea --half left` learnt from the left halves of these images
+    /// Learnt sea of `wake train sea --half left` on these images
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Recipes whose open seas are compared: satellites, detector or a TOML file
     #[arg(long, value_name = "NAME", default_values = ["satellites", "detector"])]
     recipe: Vec<String>,
-    /// Windows of open sea of each half of an image, at most
+    /// Most windows of open sea per half image
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..))]
     windows: u8,
     /// flex, ndarray, wgpu or cuda, where compiled in
@@ -126,7 +126,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
 
 /// The kinds of sea beside a learnt one.
 ///
-/// - `told`: how often windows are told from the right halves
+/// - `told`: accuracy of a classifier of the windows and of the right halves
 fn beside_learnt(
     pairs: &[SeaPair],
     right: &[Field],

@@ -18,7 +18,7 @@ pub(crate) struct SeaReport {
     pub(crate) rows: Vec<SeaRow>,
 }
 
-/// How often the open sea of a recipe is told from real windows.
+/// Accuracy of classifiers of the open sea of a recipe and of real windows.
 #[derive(Debug, Serialize)]
 pub(crate) struct RecipeRow {
     pub(crate) recipe: String,
@@ -41,7 +41,7 @@ pub(crate) fn markdown(report: &SeaReport) -> String {
         + &recipes(report)
 }
 
-/// How often the seas of recipes are told from real ones.
+/// The table of the seas of recipes.
 fn recipes(report: &SeaReport) -> String {
     let mut text = format!(
         "Share of windows of 128 x 128 pixels of open sea that are classified right, simulated or real: 0.5 where the kinds are \
@@ -78,12 +78,12 @@ fn recipes(report: &SeaReport) -> String {
 fn learnt(report: &SeaReport) -> String {
     let mut text = format!(
         "{}\n\n\
-         {} windows of 128 x 128 pixels of open sea of the right halves of {} real images stand against as many of each kind. \
-         Learnt was from the left halves alone (`wake train sea --half left`), without labels. All kinds are levels of 8 bits; \
-         what is drawn like a left window has its median.\n\n\
+         {} windows of 128 x 128 pixels of open sea of the right halves of {} real images are compared with as many of each kind, \
+         as levels of 8 bits. The sea was learnt from the left halves alone (`wake train sea --half left`), without labels. What is \
+         drawn like a left window has its median.\n\n\
          ![Gaussian noise of four styles, and below it what the flow makes of the same noise](learned_sea.png)\n\n\
          Four styles: above, Gaussian noise with their correlations; below, what the flow makes of the same noise.\n\n\
-         | sea | told from real | spectrum dB | along rows 1, 2 | along columns 1, 2 | skewness | blocks of 8, 32 |\n\
+         | sea | classifier accuracy | spectrum dB | along rows 1, 2 | along columns 1, 2 | skewness | blocks of 8, 32 |\n\
          | --- | --- | --- | --- | --- | --- | --- |\n",
         finding(report),
         report.windows,
@@ -98,15 +98,14 @@ fn learnt(report: &SeaReport) -> String {
             row.kind, row.spectrum_db, row.skewness
         );
     }
-    text + "\nTold from real: how often a small network, trained on half of the windows, is right on patches of 64² pixels of \
-        the others, with its 95 % interval ([evaluation](../evaluation.md)): 0.5 where nothing tells the two kinds apart. \
-        Spectrum: root mean square difference of the radial spectrum over all rings. Correlations, skewness and the variation of \
-        the means of blocks are those of `measure::texture`, means over the windows. Gaussian noise has the mean, spread \
-        and correlations of one left window each, 32 pixels far; the learnt sea told the same windows starts from that very noise. \
-        With its own styles the learnt sea shows those of patches that chance takes from its file, so images and sensors come in \
-        other shares than among the windows, which is seen too. Intervals are those of the windows: how the judge's own training \
-        turns out is not in them. Windows of both halves leave out what `wake train sea` leaves out; wakes that nobody masked are in \
-        both.\n"
+    text + "\nClassifier accuracy: that of a small network, trained on half of the windows, on patches of 64² pixels of the others, \
+        with its 95 % interval over the windows ([evaluation](evaluation.md#two-sample-test-and-shape-of-the-sea)); variation \
+        between trainings is not included. Spectrum: root mean square difference of the radial spectrum over all rings. \
+        Correlations, skewness and the variation of block means are those of `measure::texture`, means over the windows. Gaussian \
+        noise has the mean, spread and correlations (to 32 pixels) of one left window each; the learnt sea in the styles of the \
+        left windows starts from that noise. With its own styles it draws those of random patches of its file, so images and \
+        sensors have other shares than among the windows, which the network notices too. Windows leave out what `wake train sea` \
+        leaves out; unmasked wakes are in both halves.\n"
 }
 
 fn accuracy(found: &TwoSample) -> String {
@@ -132,30 +131,30 @@ fn finding(report: &SeaReport) -> String {
     // Two independent intervals of 95 %.
     let doubt = gaussian.1.half_width.hypot(learnt.1.half_width);
     let verdict = if gain > doubt {
-        "so the flow adds what a judge can see beyond a spectrum"
+        "the flow adds what a classifier sees beyond a spectrum"
     } else if gain < -doubt {
-        "so to a judge the flow takes more away than it adds"
+        "the flow makes the sea less like the real one"
     } else {
-        "so a judge sees no difference: Gaussian noise with measured correlations does as well"
+        "the flow adds nothing that a classifier sees"
     };
     let skewness = |row: &SeaRow| format!("{:.2}", row.skewness);
     format!(
-        "A small network tells the learnt sea from the real one in {} of all patches, Gaussian noise with the correlations of \
-         the same windows in {}, {verdict}. Gaussian noise is made of those correlations and has the real spectrum to {:.2} dB, \
-         the learnt sea to {:.2} dB. Skewness is {} in real windows, {} in learnt and {} in Gaussian ones; means of blocks of 32 \
-         pixels vary by {:.3}, {:.3} and {:.3}. The simulated sea of the recipe satellites, which knows nothing of these sensors, \
-         is told in {}; the other halves of the same images in {}, the floor.",
+        "A classifier tells the learnt sea from the real one on {} of the patches (0.5: indistinguishable), Gaussian noise with the \
+         same correlations on {}: {verdict}. The simulated sea of the recipe satellites, which was not fitted to these images, is \
+         recognised on {}, the other halves of the same images on {}. Skewness is {} in real windows, {} in learnt and {} in \
+         Gaussian ones; means of blocks of 32 pixels vary by {:.3}, {:.3} and {:.3}; the spectrum is {:.2} dB off, that of Gaussian \
+         noise {:.2} dB.",
         accuracy(&learnt.1),
         accuracy(&gaussian.1),
-        gaussian.0.spectrum_db,
-        learnt.0.spectrum_db,
+        accuracy(&simulated.1),
+        accuracy(&floor.1),
         skewness(real),
         skewness(learnt.0),
         skewness(gaussian.0),
         real.block_variation[1],
         learnt.0.block_variation[1],
         gaussian.0.block_variation[1],
-        accuracy(&simulated.1),
-        accuracy(&floor.1),
+        learnt.0.spectrum_db,
+        gaussian.0.spectrum_db,
     )
 }

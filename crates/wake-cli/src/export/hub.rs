@@ -23,9 +23,9 @@ pub(crate) struct Arguments {
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 enum Model {
-    /// The network that finds wakes, as safetensors and ONNX
+    /// The detector's network, as safetensors and ONNX
     Detector,
-    /// The small model that draws images
+    /// The wake model
     WakeModel,
 }
 

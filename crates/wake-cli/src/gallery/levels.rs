@@ -16,3 +16,10 @@ pub(crate) fn signed(field: &Field) -> Vec<u8> {
     let level = |&value: &f32| (127.5 * (1.0 + f64::from(value) / scale)).clamp(0.0, 255.0) as u8;
     field.values.iter().map(level).collect()
 }
+
+/// Levels linear in amplitude, as in quick-looks.
+pub(crate) fn amplitude(field: &Field) -> Vec<u8> {
+    let grey = GreyScale::amplitude_around(field.mean());
+    let level = |&value: &f32| grey.level(f64::from(value));
+    field.values.iter().map(level).collect()
+}

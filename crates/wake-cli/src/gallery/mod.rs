@@ -1,21 +1,23 @@
-//! `wake gallery`: the pictures of the documentation: the gallery, the stages from hull to image, and twenty seconds of a wake.
+//! `wake gallery`: the pictures of the documentation: the gallery, the stages from hull to image, σ⁰ against incidence, and twenty
+//! seconds of a wake.
 
 mod film;
+mod found;
 mod levels;
+mod panel;
+mod sigma0;
 mod stages;
 
 use crate::sheet::Picture;
 use clap::Args;
 use std::path::PathBuf;
-use wake_detector::drawing::Drawing;
-use wake_detector::{Detector, GreyImage};
 use wake_ldm::WakeSampler;
 use wake_nn::device_named;
-use wake_physics::{Scene, Simulation, simulate};
+use wake_physics::{Scene, simulate};
 
 use crate::exit::{self, Outcome};
 use crate::progress;
-use levels::filling;
+use panel::{SIDE, enlarged, labelled};
 
 /// Draw the pictures of the documentation.
 #[derive(Args)]
@@ -25,48 +27,71 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
-/// Sides of a picture of the gallery \[pixels\].
-const SIDE: usize = 256;
 /// Pictures in a row.
 const ACROSS: usize = 3;
 
-/// Scenes of the gallery: a file or the default, what is changed, and what is written above.
+/// Scenes of the gallery: a file, what is changed, and the caption.
 const SCENES: [(&str, &[&str], &str); 4] = [
-    (
-        "default",
-        &["sea.wind_speed=3", "ship.position=[250, 250]"],
-        "X band, 2.5 m pixels, 4 looks; wind 3 m/s",
-    ),
     (
         "airborne",
         &[
-            "ship.heading=250",
-            "ship.position=[-130, -45]",
-            "ship.speed=7",
-            "sea.wind_speed=4",
+            "grid.spacing=2",
+            "ship.heading=240",
+            "ship.position=[-230, -120]",
+            "ship.speed=8",
+            "ship.echo=true",
+            "sea.wind_speed=3.5",
+            "radar.azimuth_resolution=2",
         ],
-        "Aircraft, 1.5 m pixels; a ship of 120 m, wind 4 m/s",
+        "Airborne, X band VV, 2 m pixels, wind 3.5 m/s: Kelvin wake of a ship of 120 m",
     ),
     (
-        "satellite/terrasar_x",
-        &["ship.position=[-90, -220]", "sea.wind_speed=3"],
-        "TerraSAR-X, 2.5 m pixels, 5 looks; a ship of 60 m, its echo off its track",
+        "satellite/alos_2",
+        &["ship.position=[1400, 650]"],
+        "ALOS-2, L band HH, 10 m pixels, wind 4 m/s: dark line with a bright edge, both arms",
     ),
     (
         "satellite/sentinel_1",
-        &["ship.position=[350, 900]"],
-        "Sentinel-1, 10 m pixels; the dark strip of turbulent water",
+        &[
+            "ship.position=[1250, 1250]",
+            "ship.heading=50",
+            "ship.length=250",
+            "ship.beam=36",
+            "ship.draft=12",
+            "ship.recovery=wind",
+            "ship.damping=0.85",
+        ],
+        "Sentinel-1 IW, C band VV, 10 m pixels, wind 5 m/s: dark strip, displaced echo",
+    ),
+    (
+        "satellite/terrasar_x",
+        &[
+            "grid.spacing=3",
+            "ship.length=150",
+            "ship.beam=24",
+            "ship.draft=8",
+            "ship.speed=9",
+            "ship.heading=25",
+            "ship.position=[190, 460]",
+        ],
+        "TerraSAR-X stripmap, X band VV, 3 m pixels, wind 4 m/s: dark line, displaced echo",
     ),
 ];
+/// The generated image: a prompt, and the caption.
+const PROMPT: &str = "a ship at 10 m/s toward 120 degrees, wind 3 m/s toward 60 degrees";
+const GENERATED: &str = "Generated from a sentence by the diffusion model, X band VV, 4 m pixels, wind 3 m/s";
+const FOUND: &str = "Found by the detector, with probabilities: Sentinel-1 IW, wind 4.5 m/s, four ships, slicks";
 
-/// Writes `gallery.png`, `stages.png` and `wake.gif`.
+/// Writes `gallery.png`, `stages.png`, `sigma0.svg` and `wake.gif`.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     whole_files::make_folder(&arguments.out)?;
-    let bar = progress::bar(3, "pictures");
+    let bar = progress::bar(4, "pictures");
     let out = |name: &str| arguments.out.join(name);
     gallery()?.write(&out("gallery.png"))?;
     bar.inc(1);
     stages::sheet()?.write(&out("stages.png"))?;
+    bar.inc(1);
+    sigma0::draw(&out("sigma0.svg"))?;
     bar.inc(1);
     whole_files::write_atomically(&out("wake.gif"), &film::film()?)?;
     bar.finish_and_clear();
@@ -82,44 +107,22 @@ fn gallery() -> Outcome<Picture> {
     for (file, changes, caption) in SCENES {
         let scene = Scene::read(&PathBuf::from(format!("assets/scenes/{file}.toml")))?;
         let scene = scene.with_assignments(&size)?.with_assignments(changes)?;
-        pictures.push(labelled(&simulate(&scene)?).captioned(caption));
+        let simulation = simulate(&scene)?;
+        let levels = simulation.levels(&simulation.quick_look());
+        let panel = labelled(&levels, scene.grid.spacing, &simulation.labels);
+        pictures.push(panel.captioned(caption));
     }
-    let sampler = WakeSampler::pretrained(&device_named("flex")?)?;
-    let image = sampler.sample(
-        "a ship at 10 m/s toward 120 degrees, wind 3 m/s toward 60 degrees",
-        7,
-    )?;
-    let mut picture = Picture::from_levels(&filling(&image.speckled), SIDE);
-    picture.draw_labels(&image.labels);
-    pictures.push(picture.captioned("Generated from a sentence by the diffusion model"));
-    pictures.push(found()?.captioned("Found by the detector in a simulated image"));
+    pictures.push(generated()?.captioned(GENERATED));
+    pictures.push(found::panel()?.captioned(FOUND));
     Ok(Picture::sheet(&pictures, ACROSS))
 }
 
-/// The image with its labels.
-fn labelled(simulation: &Simulation) -> Picture {
-    let mut picture =
-        Picture::from_levels(&filling(&simulation.speckled), simulation.raster.columns);
-    picture.draw_labels(&simulation.labels);
-    picture
-}
-
-/// What the detector finds in a simulated image.
-fn found() -> Outcome<Picture> {
-    let scene = Scene::default().with_assignments(&[
-        "grid.rows=256",
-        "grid.columns=256",
-        "grid.spacing=4",
-        "sea.wind_speed=4",
-        "ship.heading=200",
-        "ship.position=[-120, -250]",
-    ])?;
-    let simulation = simulate(&scene)?;
-    let levels = simulation.levels(&simulation.quick_look());
-    let image = GreyImage::eight_bits(SIDE, SIDE, levels)?;
-    let detector = Detector::pretrained(&device_named("flex")?)?;
-    let mut drawing = Drawing::new(&image);
-    drawing.found(detector.find(&image).iter());
-    let drawn = drawing.into_picture();
-    Ok(Picture::from_rgb(drawn.as_raw(), drawn.width() as usize))
+/// An image of the wake model, as large as the others.
+fn generated() -> Outcome<Picture> {
+    let sampler = WakeSampler::pretrained(&device_named("flex")?)?;
+    let image = sampler.sample(PROMPT, 7)?;
+    let side = image.speckled.columns;
+    let levels = levels::amplitude(&image.speckled);
+    let spacing = image.scene.grid.spacing * side as f64 / SIDE as f64;
+    Ok(panel::marked(&enlarged(&levels, side), spacing))
 }

@@ -19,6 +19,7 @@ pub(crate) fn sheet() -> Result<Picture> {
         "ship.heading=50",
         "ship.position=[190, 160]",
         "ship.echo=true",
+        "ship.steepness=0.2",
         "radar.looks=2",
         "model.terms=all",
     ])?;
@@ -49,7 +50,7 @@ pub(crate) fn sheet() -> Result<Picture> {
             &signed(&all.radial_velocity),
             &format!("4 Velocity, rms {:.2} m/s", all.radial_velocity.rms()),
         ),
-        panel(&filling(&all.sigma0), "5 Backscatter σ0"),
+        panel(&filling(&all.sigma0), "5 Backscatter (NRCS)"),
         panel(&filling(&sharp.intensity), "6 Image if nothing moved"),
         panel(&filling(&all.intensity), "7 Velocity bunching and blur"),
         labelled.captioned("8 Speckle of 2 looks; labels"),

@@ -9,10 +9,10 @@ use wake_physics::Scene;
 #[derive(Args)]
 #[command(after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md")]
 pub(crate) struct Arguments {
-    /// What the image shows; without it and without --scene, the default scene in words.
+    /// Prompt; without it and without --scene, that of the default scene
     #[arg(long, value_name = "TEXT", conflicts_with = "scene")]
     pub(super) prompt: Option<String>,
-    /// Scene file (TOML) to put into words.
+    /// Scene file (TOML), instead of a prompt
     #[arg(long, value_name = "FILE")]
     pub(super) scene: Option<PathBuf>,
     /// Change one value of the scene, such as ship.speed=8; may be repeated; without --scene, of the model's own scene
@@ -21,47 +21,47 @@ pub(crate) struct Arguments {
     /// Folder of a model: one that `wake train` wrote, or one in diffusers layout [default: the model in `wake-ldm`]
     #[arg(long, value_name = "DIR")]
     pub(super) weights: Option<PathBuf>,
-    /// Diffusers layout: a low-rank adaptation that is merged into the model
+    /// Diffusers layout: low-rank adaptation to merge into the model
     #[arg(long, value_name = "FILE", requires = "weights")]
     pub(super) lora: Option<PathBuf>,
-    /// Draw on a sea learnt from real images: a file that `wake train sea` wrote; not in diffusers layout
+    /// Learnt sea to draw on: a file of `wake train sea`; not in diffusers layout
     #[arg(long, value_name = "FILE", conflicts_with = "steps")]
     pub(super) sea: Option<PathBuf>,
-    /// Steps from noise to image [default: 4, or 50 in diffusers layout]
+    /// Sampling steps [default: 3, or 50 in diffusers layout]
     #[arg(long)]
     pub(super) steps: Option<usize>,
     /// Diffusers layout: ddpm, ddim, pndm, euler, euler-ancestral, dpm++, heun, lms, unipc, lcm or flow-match-euler
     /// [default: the model's own]
     #[arg(long, value_name = "NAME")]
     pub(super) scheduler: Option<String>,
-    /// Diffusers layout: how strongly to follow the prompt; up to 1: as the model does by itself [default: 7.5]
+    /// Diffusers layout: guidance scale; 1 or less: no guidance [default: 7.5]
     #[arg(long, allow_negative_numbers = true)]
     pub(super) guidance: Option<f64>,
-    /// Diffusers layout: what the image should not show.
+    /// Diffusers layout: negative prompt
     #[arg(long, value_name = "TEXT")]
     pub(super) negative: Option<String>,
-    /// Image k has this seed plus k.
+    /// Image k has this seed plus k
     #[arg(long, default_value_t = 7)]
     pub(super) seed: u64,
-    /// Number of images.
+    /// Number of images
     #[arg(long, default_value_t = 1)]
     pub(super) count: usize,
-    /// flex, ndarray, wgpu or cuda, where compiled in; a GPU's number may follow, as in cuda:1.
+    /// flex, ndarray, wgpu or cuda, where compiled in; a GPU's number may follow, as in cuda:1
     #[arg(long, default_value = "flex")]
     pub(super) device: String,
-    /// Also write the images with boxes, arms and tips drawn on them.
+    /// Also write the images with boxes, arms and tips drawn on them
     #[arg(long)]
     pub(super) overlay: bool,
-    /// Folder of the results, made if absent.
+    /// Folder of the results, made if absent
     #[arg(long, value_name = "DIR", default_value = "out/generate")]
     pub(super) out: PathBuf,
-    /// Print the report as JSON on standard output, and nothing else.
+    /// Print the report as JSON on standard output, and nothing else
     #[arg(long)]
     pub(super) json: bool,
 }
 
 impl Arguments {
-    /// The scene that is asked for as one, on the base of a model's own where no file is named.
+    /// The scene of --scene and --set, on the model's own where no file is named.
     pub(super) fn scene(
         &self,
         base: impl FnOnce() -> Scene,
@@ -74,7 +74,7 @@ impl Arguments {
         scene.with_assignments(&self.set).map(Some)
     }
 
-    /// The prompt as given, or a scene in words, by default the default scene.
+    /// The prompt as given, or that of the scene.
     pub(super) fn prompt(&self, scene: Option<&Scene>) -> wake_text::Result<String> {
         match &self.prompt {
             Some(prompt) => Ok(prompt.clone()),

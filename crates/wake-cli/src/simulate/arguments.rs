@@ -17,10 +17,10 @@ pub(crate) struct Arguments {
     /// Change one value of the scene, such as ship.speed=8; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
-    /// How fields are computed: the fast methods, or the slow oracles they are checked against
+    /// Fast methods, or the slow oracles that they are checked against
     #[arg(long, value_enum, default_value = "fast")]
     pub(crate) method: MethodName,
-    /// What the grey of the picture is linear in: decibels on one scale for all scenes, or amplitude as in quick-looks
+    /// Grey scale of the picture: decibels on one scale for all scenes, or amplitude as in quick-looks
     #[arg(long, value_enum, default_value = "decibel")]
     pub(crate) grey: GreyName,
     /// Write image.png alone: no fields, labels or report
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     /// Also write every field as a file of its own, for NumPy or as TIFF
     #[arg(long, value_enum, value_delimiter = ',')]
     pub(crate) export: Vec<Export>,
-    /// Folder of the results, made if absent; of several scenes each has a folder of its name in it
+    /// Folder of the results, made if absent; with several scenes, a folder per scene in it
     #[arg(long, value_name = "DIR", default_value = "out/simulate")]
     pub(crate) out: PathBuf,
     /// Compare open sea and wakes with those of the PNG images of a folder (grey linear in amplitude; the axes of wakes in

@@ -39,16 +39,16 @@ pub(crate) struct ProductArguments {
         default_value_if("product", clap::builder::ArgPredicate::IsPresent, "90")
     )]
     wind_toward: Option<f64>,
-    /// Lines of the part that is simulated, counted from 0, the last not included; by default all
+    /// Range of lines to simulate, counted from 0, the last not included; by default all
     #[arg(long, value_name = "A..B", requires = "product", value_parser = range)]
     lines: Option<Range<usize>>,
-    /// Pixels of the part that is simulated; by default all
+    /// Range of pixels to simulate; by default all
     #[arg(long, value_name = "C..D", requires = "product", value_parser = range)]
     pixels: Option<Range<usize>>,
     /// VV or HH, by default the first of these that the product has
     #[arg(long, requires = "product", value_parser = polarization)]
     polarization: Option<wake_geo::Polarization>,
-    /// Seed of all that is drawn
+    /// Seed of all random numbers
     #[arg(
         long,
         value_name = "N",

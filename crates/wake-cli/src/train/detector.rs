@@ -22,22 +22,22 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 /// Train the detector on images made on the fly.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// What the images show
+    /// Recipe of the training images
     #[arg(long, default_value = ImageRecipe::Mixed.name(), value_parser = named::recipe())]
     recipe: ImageRecipe,
-    /// Different images, which come again when all were seen; by default all are different
+    /// Number of different images, repeated in turn; by default all are different
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     distinct: Option<u32>,
-    /// Folder of labelled images (labels.json beside them) to learn from instead of a recipe
+    /// Folder of labelled images (with labels.json) to train on instead of a recipe
     #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct"])]
     labelled: Option<PathBuf>,
-    /// Labelled image that is left out
+    /// Labelled image to leave out
     #[arg(long, value_name = "NAME", requires = "labelled")]
     without: Option<String>,
-    /// Labelled images: the next ones by name after the one that is left out
+    /// Number of labelled images: the next ones by name after the one left out
     #[arg(long, value_name = "COUNT", requires = "labelled", value_parser = clap::value_parser!(u32).range(1..))]
     tiles: Option<u32>,
-    /// Weights to begin with, by default random ones
+    /// Initial weights, by default random
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     #[command(flatten)]

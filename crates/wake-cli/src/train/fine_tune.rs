@@ -31,16 +31,16 @@ pub(crate) struct Options {
     /// Folder of the model in diffusers layout
     #[arg(long, value_name = "DIR")]
     weights: PathBuf,
-    /// Folder that `wake dataset` wrote
+    /// Folder of a data set of `wake dataset`
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// Learn changes of this rank of the attentions, and leave all else [default: the whole U-Net learns]
+    /// Train a low-rank adaptation of the attention layers of this rank [default: train the whole U-Net]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     rank: Option<u16>,
-    /// How often every pair is seen, instead of --steps; the paper has 4000
+    /// Epochs, instead of --steps; the paper has 4000
     #[arg(long, conflicts_with = "steps", value_parser = epochs)]
     epochs: Option<f64>,
-    /// γ of the weights by signal-to-noise ratio [default: all steps count the same]
+    /// γ of the min-SNR loss weights [default: equal weights]
     #[arg(long, value_name = "GAMMA")]
     snr_gamma: Option<f64>,
     #[command(flatten)]

@@ -14,7 +14,7 @@ use options::defaults;
 
 use crate::exit::Outcome;
 
-/// Train the models: each goes on where it was stopped.
+/// Train the models; a stopped run continues.
 ///
 /// A folder belongs to one run: other data, another model, seed, rate or batch, and a new beginning, are refused by name.
 #[derive(Args)]

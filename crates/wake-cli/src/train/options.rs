@@ -1,4 +1,4 @@
-//! What every run is told on the command line.
+//! Options of every training on the command line.
 
 use std::path::PathBuf;
 
@@ -10,16 +10,16 @@ use wake_train::{Result, StageOptions};
 /// Where a run begins and ends, and what it computes on.
 #[derive(Args, Clone)]
 pub(crate) struct Place {
-    /// Steps between checkpoints, and what is written of the results
+    /// Steps between checkpoints and results
     #[arg(long, visible_alias = "checkpoint-every", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) every: u32,
-    /// Checkpoints that are kept
+    /// Checkpoints to keep
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) keep: u16,
-    /// Seed of everything that is drawn, simulated pairs included
+    /// Seed of all random numbers, simulated pairs included
     #[arg(long, default_value_t = 7)]
     pub(crate) seed: u64,
-    /// Go on from the newest checkpoint in --out
+    /// Continue from the newest checkpoint in --out
     #[arg(long)]
     pub(crate) resume: bool,
     /// flex, ndarray, wgpu or cuda, where compiled in; a comma between several
@@ -36,21 +36,21 @@ pub(crate) struct Pace {
     /// Steps
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) steps: u32,
-    /// Examples of a batch
+    /// Examples per batch
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) batch: u16,
-    /// Largest step of the optimizer
+    /// Peak learning rate
     #[arg(long)]
     rate: f64,
 }
 
-/// What spares memory, and some precision.
+/// Options that save memory.
 #[derive(Args, Clone)]
 pub(crate) struct Thrift {
-    /// Parts of a batch that are computed one after the other, to save memory
+    /// Gradient accumulation: parts of a batch computed one after the other, to save memory
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     accumulation: u16,
-    /// Keep less for the way back through the model, and compute it again; slower
+    /// Gradient checkpointing: less memory, slower
     #[arg(long)]
     checkpointing: bool,
     /// Compute losses and gradients in bfloat16, where the device can; weights keep 32 bits
@@ -78,7 +78,7 @@ impl Place {
         Ok(devices.collect::<wake_nn::Result<_>>()?)
     }
 
-    /// How a stage runs that takes what is usual for it.
+    /// Options of a stage with its defaults.
     pub(crate) fn stage(&self, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
             grad_accumulation_steps: usize::from(thrift.accumulation),
@@ -93,7 +93,7 @@ impl Place {
         })
     }
 
-    /// How a stage runs at a pace.
+    /// Options of a stage at a pace.
     pub(crate) fn paced(&self, pace: &Pace, thrift: &Thrift) -> Result<StageOptions> {
         Ok(StageOptions {
             steps: Some(pace.steps as usize),

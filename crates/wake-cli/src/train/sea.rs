@@ -36,13 +36,13 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 /// Writes `sea.safetensors`, which `wake generate --sea` and `wake dataset --sea` draw scenes on.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Folder of radar images of 8 or 16 bits, grey by amplitude; what `NAME_mask.png` marks is left out
+    /// Folder of radar images of 8 or 16 bits, grey linear in amplitude; pixels marked in `NAME_mask.png` are left out
     #[arg(long, value_name = "DIR")]
     images: PathBuf,
-    /// Side of their pixels [m], where it is known: then scenes of other pixels are refused
+    /// Pixel spacing [m], if known: scenes of other pixels are then refused
     #[arg(long, value_name = "METRES")]
     spacing: Option<f64>,
-    /// Learn from one half of every image alone, so that the other can judge
+    /// Train on one half of every image, to evaluate on the other
     #[arg(long, value_enum)]
     half: Option<Half>,
     #[command(flatten)]

@@ -42,19 +42,19 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
 /// `wake train fine-tune --weights` read the model.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// Folder that `wake dataset` wrote; without it, pairs are simulated first
+    /// Folder of a data set of `wake dataset`; without it, pairs are simulated first
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Pairs to simulate where there is no --data
+    /// Pairs to simulate without --data
     #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u64).range(8..=10_000_000))]
     count: u64,
     /// Steps of the autoencoder; --steps are those of text encoder and U-Net
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
     autoencoder_steps: u32,
-    /// Stop after these of --steps, to go on with --resume
+    /// Stop after this many of --steps, to continue with --resume
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..))]
     stop_after: Option<u32>,
-    /// Pixels that a latent pixel stands for along each axis: 4, 8 or 16
+    /// Pixels per latent pixel along each axis: 4, 8 or 16
     #[arg(long, default_value = "16", value_parser = ["4", "8", "16"])]
     downsampling: String,
     /// Channels of a latent pixel

@@ -19,11 +19,11 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[("every", "500"), ("out", "out/tr
 enum Trained {
     /// Fit the linear autoencoder, in closed form
     Patches,
-    /// Train the reader of prompts
+    /// Train the prompt parser
     Parser,
     /// Train the mean and the standard deviation of the latents
     Prior,
-    /// Train the flow that draws the sea
+    /// Train the flow
     Flow,
 }
 
@@ -39,16 +39,16 @@ pub(crate) struct Options {
     part: Trained,
     #[command(flatten)]
     pairs: Pairs,
-    /// JSON file with the widths of the model [default: those of the model that ships]
+    /// JSON file with the widths of the model [default: those of the shipped model]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Steps in all [default: parser 4000, prior 6000, flow 6000]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     steps: Option<u32>,
-    /// Examples of a batch [default: parser 128, prior 32, flow 8]
+    /// Examples per batch [default: parser 128, prior 32, flow 8]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     batch: Option<u16>,
-    /// Largest step of the optimizer [default: parser 1e-3, prior 2e-3, flow 1e-3]
+    /// Peak learning rate [default: parser 1e-3, prior 2e-3, flow 1e-3]
     #[arg(long)]
     rate: Option<f64>,
     #[command(flatten)]

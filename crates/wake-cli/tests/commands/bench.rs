@@ -22,7 +22,13 @@ fn rows(arguments: &[&str], files: &[&str]) -> Vec<Value> {
 #[test]
 fn a_stage_is_measured_against_its_oracle() {
     let arguments = ["--stage", "bunching", "--largest", "128"];
-    let rows = rows(&arguments, &["report.json", "simulator.md", "frontier.svg"]);
+    let files = [
+        "report.json",
+        "simulator.md",
+        "simulator.csv",
+        "frontier.svg",
+    ];
+    let rows = rows(&arguments, &files);
     assert!(rows.len() > 1);
     for row in rows {
         assert_eq!(row["stage"], "bunching");
@@ -51,5 +57,8 @@ fn the_pictures_of_the_documentation_are_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
     done("gallery", &[], folder.path());
     let drawn = names(folder.path());
-    assert_eq!(drawn, ["gallery.png", "stages.png", "wake.gif"]);
+    assert_eq!(
+        drawn,
+        ["gallery.png", "sigma0.svg", "stages.png", "wake.gif"]
+    );
 }

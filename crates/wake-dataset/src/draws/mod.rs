@@ -19,7 +19,7 @@ use whole_files::sentence;
 /// Distributions by the path of their value, such as `ship.speed`.
 type Values = BTreeMap<String, Distribution>;
 
-/// What is drawn, and how.
+/// Random values of a recipe with their distributions.
 ///
 /// ```toml
 /// count = [0, 5]                                     # ships, each drawn on its own

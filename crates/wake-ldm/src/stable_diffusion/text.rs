@@ -180,7 +180,7 @@ impl ClipTextConfig {
     }
 }
 
-/// What a prompt becomes.
+/// Embedding of a prompt.
 #[derive(Debug, Clone)]
 pub struct ClipTextOutput {
     /// All tokens after the last layer and its normalisation, `[batch, tokens, hidden_size]`: what
@@ -217,7 +217,7 @@ impl ClipText {
         load(config.init(device), Layout::ClipText, folder)
     }
 
-    /// What the model was built from.
+    /// The configuration of the model.
     pub fn config(&self) -> &ClipTextConfig {
         &self.config
     }

@@ -20,7 +20,7 @@ use wake_nn::weights::{Layout, load};
 
 pub use config::UNetConfig;
 
-/// What a U-Net looks at.
+/// Inputs of a U-Net.
 #[derive(Debug, Clone)]
 pub struct UNetInput {
     /// The noisy latent image, `[batch, in_channels, rows, columns]`.
@@ -102,7 +102,7 @@ impl UNet {
         load(config.init(device), Layout::Diffusers, folder)
     }
 
-    /// What the model was built from.
+    /// The configuration of the model.
     pub fn config(&self) -> &UNetConfig {
         &self.config
     }

@@ -1,4 +1,4 @@
-//! The wake model: what it is told, its networks, and the sampler that joins them.
+//! The wake model: its inputs, its networks, and the sampler.
 
 pub mod conditioning;
 pub mod network;

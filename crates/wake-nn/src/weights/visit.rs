@@ -15,7 +15,7 @@ pub struct Weight {
     pub shape: Vec<usize>,
     /// Whether the model holds the transpose: the matrices of linear layers.
     pub transposed: bool,
-    /// Where the parameter lies.
+    /// Device of the parameter.
     pub device: Device,
 }
 
@@ -78,7 +78,7 @@ fn as_in_file<const D: usize>(tensor: Tensor<D>, transposed: bool) -> Tensor<D> 
     }
 }
 
-/// What becomes of a parameter.
+/// Change of a parameter.
 #[derive(Debug)]
 pub enum Change {
     /// Nothing.

@@ -3,7 +3,7 @@
 use crate::raster::{Field, Raster};
 use crate::track::Track;
 
-/// Part of the free waves that is shown at ξ forward of midship.
+/// Factor on the free waves at ξ forward of midship.
 ///
 /// ```text
 /// s = (L/2 − ξ)/L brought into [0, 1],     fade = s³ (10 − 15 s + 6 s²)

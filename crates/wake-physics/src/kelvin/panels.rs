@@ -23,7 +23,7 @@ pub struct Zone {
     pub nodes: usize,
 }
 
-/// How the wake integral is computed on a raster: its range of directions and its nodes.
+/// Quadrature of the wake integral on a raster: its range of directions and its nodes.
 ///
 /// A plan without nodes stands for a wake that cannot be seen: no wave is long enough for the pixels, the
 /// ship is at rest, or the whole raster lies ahead of the bow.

@@ -61,7 +61,7 @@ impl Class {
 /// One thing that a detector is to find.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Object {
-    /// What it is.
+    /// Class of the object.
     pub class: Class,
     /// Box (x, y, width, height), cut to the image.
     pub box_px: [f64; 4],
@@ -76,7 +76,7 @@ pub struct Object {
     pub half_angle_deg: f64,
     /// Length along the axis from the tip, seen in the image \[pixels\]; of a ship the whole.
     pub length_px: f64,
-    /// How clearly it is seen; `None` for a ship.
+    /// Visibility of a wake; `None` for a ship.
     pub visibility: Option<Visibility>,
 }
 
@@ -105,7 +105,7 @@ pub struct LabelledShip {
     pub wake: WakeLabel,
 }
 
-/// Where a ship is, and where its echo appears.
+/// Place of a ship and of its echo.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShipLabel {
@@ -124,7 +124,7 @@ pub struct ShipLabel {
     /// the image.
     #[serde(with = "empty_list")]
     pub echo_oriented_box_px: Option<[Pixel; 4]>,
-    /// Where it moves to at the time of the image [deg clockwise from azimuth].
+    /// Direction of motion at the time of the image [deg clockwise from azimuth].
     pub heading: f64,
     /// Speed [m/s].
     pub speed: f64,
@@ -134,7 +134,7 @@ pub struct ShipLabel {
     pub azimuth_displacement_m: f64,
 }
 
-/// Where a wake is, and how far it is seen.
+/// Place of a wake and its visible extent.
 ///
 /// Arms, centreline and boxes end where the wake does: at the last window that shows waves or the dark line clearly
 /// enough, not at the edge of the image.
@@ -156,7 +156,7 @@ pub struct WakeLabel {
     pub centreline_px: Line,
     /// Distance along the axis from the tip to the end of what is seen in the image \[pixels\]; 0 if nothing is.
     pub length_px: f64,
-    /// How clearly the wake is seen; null where it does not meet the image.
+    /// Visibility of the wake; null where it does not meet the image.
     pub visibility: Option<Visibility>,
     /// Box (x, y, width, height) of what is seen: the wedge between the arms, the dark line, or both.
     #[serde(with = "empty_list")]
@@ -167,7 +167,7 @@ pub struct WakeLabel {
     pub oriented_box_px: Option<[Pixel; 4]>,
 }
 
-/// Where ships and wakes are in the image of a scene, without simulating it; a valid scene.
+/// Labels of a valid scene, without simulating it.
 ///
 /// An echo is displaced by the ship's own motion, a wake is not: its water only oscillates, so that the mean
 /// displacement over a wave is zero in linear theory.
@@ -213,7 +213,7 @@ pub(crate) fn echo_displacement(scene: &Scene, ship: &Ship) -> f64 {
 }
 
 impl Labels {
-    /// What a detector is to find: the wakes that can be seen, and the ships whose echo is drawn.
+    /// Objects to detect: visible wakes, and ships whose echo is drawn.
     #[must_use]
     pub fn objects(&self) -> Vec<Object> {
         let of = |one: &LabelledShip| [one.wake.object(), one.ship.object()];

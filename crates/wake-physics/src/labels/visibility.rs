@@ -35,7 +35,7 @@ const OF_HALF_POWER: f64 = 1.886_718_667_752_793_6;
 /// Least standard deviation of a pixel that counts: the rounding of the fields.
 const LEAST_NOISE: f64 = 1e-6;
 
-/// How clearly a wake is seen.
+/// Visibility of a wake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Visibility {

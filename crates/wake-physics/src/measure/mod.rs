@@ -1,8 +1,8 @@
-//! What an image tells of its scene: heading and speed of the ship, wind, fetch and incidence.
+//! Heading and speed of the ship, wind, fetch and incidence, measured in one image.
 //!
-//! The measurements judge images, simulated or generated, by physics instead of by pixels. Each takes one image of
-//! intensity before speckle and gives a value with a confidence; an image that does not carry the quantity gives a
-//! value that is not measurable.
+//! The measurements evaluate simulated and generated images by physics instead of by pixels. Each takes one image of
+//! intensity before speckle and returns a value with a confidence; a quantity that the image does not show is not
+//! measurable.
 //!
 //! ```text
 //! image ─► wake arms ─► heading ─► stationary waves ─► heading, speed
@@ -39,7 +39,7 @@ pub use wake::{WakeMeasurement, kelvin_wedge, measure_wake};
 
 use serde::Serialize;
 
-/// What is known of the ship from elsewhere (its echo, a chart, or the labels of the scene).
+/// Data on the ship from another source (its echo, a chart, or the labels of the scene).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShipPlace {
     /// Midship (x, y) \[m\].
@@ -55,7 +55,7 @@ pub struct ShipPlace {
 pub struct Measured {
     /// The value, in the unit of its measurement; NaN where there is none.
     pub value: f64,
-    /// How clearly the image shows it, at least 0; the unit is the measurement's own.
+    /// Confidence, at least 0; each measurement has its own unit.
     pub confidence: f64,
     /// Whether the confidence reaches the measurement's threshold.
     pub measurable: bool,

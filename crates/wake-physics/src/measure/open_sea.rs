@@ -1,4 +1,4 @@
-//! The sea away from the wake: how bright, how rough, how its waves lie.
+//! Brightness, contrast and wave direction of the sea away from the wake.
 
 use super::spectrum::{PowerSpectrum, window};
 use super::wake::decibel;
@@ -6,7 +6,7 @@ use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 use serde::Serialize;
 
-/// What an image shows of its sea.
+/// Brightness, contrast and wave direction of the open sea in an image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OpenSea {
     /// Mean intensity, in the unit of σ⁰ \[1\].

@@ -5,7 +5,7 @@ use crate::fft::Synthesis;
 use crate::raster::Field;
 use num_complex::Complex64;
 
-/// How a radius in the plane of wavenumbers becomes the number of a ring.
+/// Assignment of wavenumbers to rings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Binning {
     /// The whole number below.

@@ -13,7 +13,7 @@ const SHIP: f64 = 8.0;
 /// Sides of the blocks whose means are compared \[pixels\].
 const BLOCKS: [usize; 2] = [8, 32];
 
-/// Most looks that are told apart: at these the amplitude varies by 1.6 %.
+/// Most looks that can be distinguished: at these the amplitude varies by 1.6 %.
 const MOST_LOOKS: f64 = 1e3;
 
 /// Texture of an image of amplitude: medians over its windows of open sea.

@@ -7,10 +7,10 @@ use crate::raster::{Field, Raster};
 use crate::sar::geometry::direction;
 use serde::Serialize;
 
-/// What the wake in an image tells of its ship.
+/// Heading and speed of a ship, measured from its wake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WakeMeasurement {
-    /// Where the ship moves to [deg clockwise from azimuth].
+    /// Heading of the ship [deg clockwise from azimuth].
     pub heading: Measured,
     /// Speed of the ship [m/s].
     pub speed: Measured,

@@ -6,7 +6,7 @@ use std::fmt;
 /// Seconds of a core above which a user should know first: chosen.
 const HIGH: f64 = 1.0;
 
-/// What a simulation by the fast methods costs; says what to change when it is written out.
+/// Estimated cost of a simulation by the fast methods; its text says what to change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Rows and columns computed, margins included.

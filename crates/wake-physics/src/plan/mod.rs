@@ -31,9 +31,9 @@ use work::{Counts, Work};
 pub struct Plan {
     /// Every term: used or not, an estimate of what leaving it out changes, and why.
     pub terms: Vec<PlannedTerm>,
-    /// How much is computed.
+    /// Numbers of pixels, waves and nodes.
     pub sizes: Sizes,
-    /// What a user should know about this scene.
+    /// Notes for the user about this scene.
     pub notes: Vec<String>,
     /// Pixels of the image.
     pub(crate) image_pixels: usize,
@@ -54,7 +54,7 @@ impl Plan {
         self.terms.iter().any(|t| t.term == term && t.used)
     }
 
-    /// What a simulation costs by this plan.
+    /// Estimated cost of a simulation by this plan.
     #[must_use]
     pub fn cost(&self) -> Cost {
         Cost::new(self.sizes.computed, self.image_pixels, &self.work)

@@ -7,7 +7,7 @@ use serde::Serialize;
 /// gibibyte of fields, and an image of 4096 × 4096 pixels is one strip).
 const MOST_AT_ONCE: usize = 1 << 25;
 
-/// How much is computed.
+/// Numbers of pixels, waves and nodes of a simulation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sizes {
     /// Spacing of the computed pixels \[m\]: that of the image or an integer fraction of it.

@@ -40,7 +40,7 @@ pub struct PlannedTerm {
     pub term: Term,
     /// Whether it is computed.
     pub used: bool,
-    /// What leaving it out changes, by estimate: three times the root mean square that linear theory gives of the
+    /// Estimated change without the term: three times the root mean square that linear theory gives of the
     /// change of the intensity before speckle, relative to its mean; for speckle itself, of the speckled image.
     /// 0 where the scene has nothing of it. No estimate: the image is not linear.
     pub estimate: f64,

@@ -16,7 +16,7 @@ pub struct Imaging {
     pub resolution: AzimuthResolution,
 }
 
-/// What the radar looks at: fields on a raster that has a margin around the image, all finite.
+/// Imaged fields, on a raster with a margin around the image, all finite.
 ///
 /// An absent field is an absent effect, and costs nothing.
 #[derive(Debug, Clone, Copy)]

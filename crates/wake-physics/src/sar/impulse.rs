@@ -69,20 +69,20 @@ pub struct ImpulseResponse {
 /// A point that scatters coherently.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointTarget {
-    /// Where it is imaged, (x, y) \[m\].
+    /// Imaged place (x, y) \[m\].
     pub position: [f64; 2],
     /// Radar cross section \[m²\], at least 0.
     pub cross_section: f64,
 }
 
-/// What the radar looks at.
+/// Imaged surface and points.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflectivity<'a> {
     /// Places of the intensity; at least the image and its guard.
     pub raster: &'a Raster,
     /// Mean intensity of the rough surface, noise included, in the unit of σ⁰.
     pub intensity: &'a Field,
-    /// Ships and their ghosts.
+    /// Ships and their azimuth ambiguities.
     pub points: &'a [PointTarget],
 }
 

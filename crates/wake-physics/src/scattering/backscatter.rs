@@ -84,7 +84,7 @@ pub struct Backscatter {
     pub specular: Specular,
 }
 
-/// What σ⁰ would lose without a term: root mean square over the sea, relative to the mean σ⁰ \[1\].
+/// Change of σ⁰ without a term: root mean square over the sea, relative to the mean σ⁰ \[1\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensitivity {
     /// Mean Bragg and specular σ⁰ \[1\].
@@ -158,7 +158,7 @@ impl Backscatter {
         ]
     }
 
-    /// How much each term of σ⁰ matters over resolved Gaussian slopes.
+    /// Change of σ⁰ without each of its terms, over resolved Gaussian slopes.
     ///
     /// The specular return has a closed form. The tilt average is taken away on three by three Gauss–Hermite nodes
     /// of the resolved slopes: within 10 % at 32°, a third too low at 18°, where few facets near nadir dominate.

@@ -1,4 +1,4 @@
-//! CMOD5.N, an empirical model of C-band VV backscatter: an oracle from outside, for tests only.
+//! CMOD5.N, an empirical model of C-band VV backscatter: an oracle from outside.
 
 /// Coefficients c1 to c28 (Hersbach 2010).
 const C: [f64; 28] = [
@@ -7,12 +7,18 @@ const C: [f64; 28] = [
     6.2437, 2.3893, 0.3249, 4.1590, 1.6930,
 ];
 
-/// σ⁰ at 5.3 GHz VV for a wind of v m/s, φ radians from upwind, at an incidence in degrees.
+/// σ⁰ of the sea at C band (5.3 GHz), VV, by CMOD5.N: fitted to satellite scatterometers, without physics.
+///
+/// - `v` neutral wind speed at 10 m \[m/s\], 1 to 30
+/// - `phi` angle between the look direction and upwind \[rad\]
+/// - `incidence` \[deg\], 17 to 66
+/// - returns σ⁰ \[1\]
 ///
 /// # References
 ///
 /// Hersbach (2010), J. Atmos. Oceanic Technol. 27, 721; the form is that of CMOD5, Hersbach et al. (2007).
-pub(crate) fn sigma0(v: f64, phi: f64, incidence: f64) -> f64 {
+#[must_use]
+pub fn sigma0(v: f64, phi: f64, incidence: f64) -> f64 {
     let x = (incidence - 40.0) / 25.0;
     let b1 = C[13] * (1.0 + x) - C[14] * v * (0.5 + x - (4.0 * (x + C[15] + C[16] * v)).tanh());
     let b1 = b1 / (1.0 + (0.34 * (v - C[17])).exp());

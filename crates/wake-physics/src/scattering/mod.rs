@@ -26,8 +26,7 @@ mod two_scale;
 
 mod backscatter;
 mod bicubic;
-#[cfg(test)]
-mod cmod5n;
+pub(crate) mod cmod5n;
 
 pub use backscatter::{Backscatter, FacetFields, Sensitivity};
 pub use slopes::SlopeCovariance;

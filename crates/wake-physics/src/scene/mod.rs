@@ -99,7 +99,7 @@ pub struct Sea {
     pub fetch: f64,
     /// Spectrum of the resolved waves.
     pub spectrum: SpectrumModel,
-    /// How the resolved waves spread around the wind.
+    /// Directional spreading of the resolved waves.
     pub spreading: SpreadingModel,
     /// Water depth \[m\], 1 to infinite (`inf`, or the word "infinite" where a format has no infinity).
     #[serde(with = "forms::depth")]
@@ -200,9 +200,9 @@ pub struct Ship {
     pub draft: f64,
     /// Speed U [m/s], 0 to 40.
     pub speed: f64,
-    /// Where it moves to at time 0 [deg clockwise from azimuth].
+    /// Direction of travel at time 0 [deg clockwise from azimuth].
     pub heading: f64,
-    /// How fast it turns [deg/s], −10 to 10, positive to starboard; 0: straight on. It has turned by half a circle, and came
+    /// Turn rate [deg/s], −10 to 10, positive to starboard; 0: straight on. It has turned by half a circle, and came
     /// straight before. The radius is at least two lengths of the ship and of its transverse waves, at most 100 km.
     pub turn_rate: f64,
     /// Midship (x, y) at time 0 \[m\].
@@ -308,7 +308,7 @@ pub enum HullForm {
 /// and `pulse_rate`; [`Scene::to_toml`] writes the names of the fields, and every reader accepts both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Radar {
-    /// The satellite that set what follows, where no key beside it did.
+    /// Satellite mode that sets the radar keys below and `grid.spacing`, unless the scene sets them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<Sensor>,
     /// Frequency \[Hz\], 1e9 to 2e10.

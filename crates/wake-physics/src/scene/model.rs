@@ -46,7 +46,7 @@ pub enum Terms {
     List(Vec<Term>),
 }
 
-/// How terms are chosen.
+/// Choice of the terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TermRule {

@@ -23,7 +23,7 @@ pub enum RangeResolution {
     Ground(f64),
 }
 
-/// What a sensor sets.
+/// Values that a sensor sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct SensorMode {

@@ -91,7 +91,7 @@ impl Reached {
     }
 }
 
-/// What the numerical methods reached; absent is what was not computed, or computed directly.
+/// Errors of the numerical methods; absent for fields that were not computed, or computed directly.
 ///
 /// The kernels of the imaging always keep their share of the tolerance, and FFTs their rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]

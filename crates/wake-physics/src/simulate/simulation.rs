@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 #[cfg(feature = "png")]
 use std::path::Path;
 
-/// How fields are computed.
+/// Method by which fields are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -57,15 +57,15 @@ pub struct Simulation {
     /// Single-look complex image, `[rows, columns]` of the image, where it has an impulse response and one look: its
     /// squared modulus is [`Self::speckled`].
     pub slc: Option<Vec<Complex32>>,
-    /// Where ship and wake are.
+    /// Labels of ships and wakes.
     pub labels: Labels,
-    /// What was computed, and estimates of what was not.
+    /// Computed terms, and estimates of the omitted ones.
     pub plan: Plan,
-    /// What the numerical methods reached.
+    /// Errors of the numerical methods.
     pub accuracy: Accuracy,
     /// Seconds by stage.
     pub seconds: Seconds,
-    /// How fields were computed.
+    /// Method by which fields were computed.
     pub method: Method,
     /// The scene.
     pub scene: Scene,
@@ -77,11 +77,11 @@ pub struct SarImage {
     /// Intensity before speckle, linear, in the unit of σ⁰, `[rows, columns]`: the same bits as
     /// [`Simulation::intensity`].
     pub intensity: Field,
-    /// Where ship and wake are.
+    /// Labels of ships and wakes.
     pub labels: Labels,
-    /// What was computed, and estimates of what was not.
+    /// Computed terms, and estimates of the omitted ones.
     pub plan: Plan,
-    /// What the numerical methods reached.
+    /// Errors of the numerical methods.
     pub accuracy: Accuracy,
     pub(super) speckling: Speckling,
 }

@@ -1,4 +1,4 @@
-//! The current across a turbulent wake, and the bright edges it makes. A phenomenological model.
+//! The current across a turbulent wake, and its bright edges. A phenomenological model.
 //!
 //! ```text
 //! v(d, η) = [V_o z e^{½ − z²/2} − V_d e^{−z²/2}] e^{−t/T},     z = η/W(d), t = d/U
@@ -87,7 +87,7 @@ impl WakeCurrent {
     }
 }
 
-/// The current behind a ship on its track, and what it makes of σ⁰.
+/// The current behind a ship on its track, and its factor on σ⁰.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WakeEdge {
     /// The current at the stern.

@@ -1,4 +1,4 @@
-//! Plane waves, what each carries, and the slow sum of them that everything fast is checked against.
+//! Plane waves, their fields, and the slow harmonic sum that fast sums are compared with.
 
 pub(crate) mod matrix_product;
 
@@ -181,7 +181,7 @@ impl Transfer {
     }
 }
 
-/// Sums plane waves pixel by pixel: slow, obviously right, the oracle of every fast sum.
+/// Sums plane waves pixel by pixel: slow, the oracle of every fast sum.
 ///
 /// `pixels` are (row, column) pairs. The cost is waves × pixels sines and cosines, once for all quantities.
 ///

@@ -9,7 +9,7 @@ use wake_ldm::{Sampled, WakeSampler};
 use super::cluttered::Cluttered;
 use super::painted::Painted;
 
-/// What the images of a training run, or of an evaluation, show.
+/// Images of a training or an evaluation of the detector.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum ImageRecipe {
     /// Painted lines, streaks and blobs, no physics
@@ -86,7 +86,7 @@ impl ImageRecipe {
         }
     }
 
-    /// What its images show, in a line.
+    /// One-line description of its images.
     #[must_use]
     pub fn about(self) -> &'static str {
         match self {

@@ -110,10 +110,10 @@ impl Task<Network> for DetectorTask {
     }
 }
 
-/// How a detector is learnt from images made on the fly.
+/// Training of a detector on images made on the fly.
 #[derive(Debug, Clone, Default)]
 pub struct DetectorTraining {
-    /// What the images show.
+    /// Recipe of the images.
     pub recipe: ImageRecipe,
     /// Labelled images instead of those of the recipe.
     pub labelled: Option<LabelledImages>,
@@ -121,7 +121,7 @@ pub struct DetectorTraining {
     pub distinct: Option<usize>,
     /// Weights to begin with; `None`: random ones.
     pub weights: Option<PathBuf>,
-    /// How it runs.
+    /// Options of the run.
     pub options: StageOptions,
 }
 

@@ -18,7 +18,7 @@ use crate::error::Result;
 /// Side of the squares of pixels that the wake model draws by.
 const SQUARE: usize = 8;
 
-/// What one kind of image has of a sea, means over the scenes.
+/// Figures of the sea in one kind of image, means over the scenes.
 #[derive(Debug, Clone, Serialize)]
 pub struct AblationRow {
     /// Kind of image.
@@ -42,11 +42,11 @@ pub struct AblationRow {
     pub two_sample: Option<TwoSample>,
 }
 
-/// The figures of every rung, and last of the simulated images that they stand against, which have a third sea.
+/// The figures of every kind of image, and last of the simulated images that they are compared with, which have a third sea.
 ///
-/// - `kinds`: names and sources, told sentence and numbers
-/// - `device`: of the judge, one that holds no gradients
-/// - `step`: called once before the first rung, and after each
+/// - `kinds`: names and sources, conditioned on sentence and numbers
+/// - `device`: of the classifier, one without autodiff
+/// - `step`: called once before the first kind, and after each
 ///
 /// # Errors
 ///

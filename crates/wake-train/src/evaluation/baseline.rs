@@ -6,7 +6,7 @@ use super::source::{ImageSource, Told};
 use crate::error::Result;
 use wake_nn::noise::NoiseSource;
 
-/// A source that knows the scene, whatever it is told: from the dumbest to the simulator itself.
+/// Sources that know the scene and ignore the prompt: from a constant to the simulator itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Baseline {
     /// The same value everywhere: the mean of the expected image.

@@ -27,11 +27,11 @@ pub(super) struct Comparison {
     view: View,
     /// The model, the kinds in [`KINDS`], and whatever stands beside.
     tallies: Vec<PixelTally>,
-    /// What is read from simulated images, scene by scene.
+    /// Values measured in simulated images, scene by scene.
     pub simulated: Vec<Reading>,
-    /// What is read from the model's.
+    /// Values measured in the model's images.
     pub generated: Vec<Reading>,
-    /// What is read from expected images with a Gaussian sea.
+    /// Values measured in expected images with a Gaussian sea.
     pub gaussian: Vec<Reading>,
     looks: [Vec<f64>; 2],
 }
@@ -47,7 +47,7 @@ impl Comparison {
 
     /// Draws scenes in every way and counts the images against simulated ones.
     ///
-    /// - `model`: what is judged, told sentence and numbers
+    /// - `model`: the source to evaluate, conditioned on sentence and numbers
     /// - `beside`: other sources, whose pixels count alone
     ///
     /// # Errors

@@ -9,12 +9,12 @@ use super::source::{ImageSource, Told};
 use super::view::View;
 use crate::error::Result;
 
-/// How often a measured value followed.
+/// Share of pairs in which a measured value follows.
 #[derive(Debug, Clone, Serialize)]
 pub struct ControllabilityRow {
     /// Name of the quantity that was changed.
     pub quantity: &'static str,
-    /// What the images' source was told; "simulator" for the simulator with another sea.
+    /// Inputs of the source: "both", "text", "numbers" or "paraphrase"; "simulator" for the simulator with another sea.
     pub told: &'static str,
     /// Pairs that were drawn.
     pub pairs: usize,

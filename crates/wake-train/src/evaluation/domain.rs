@@ -19,7 +19,7 @@ use wake_ldm::sampler::speckled;
 pub struct DomainRow {
     /// Kind of image.
     pub image: &'static str,
-    /// The judge's finding on grey before speckle; `None` of less than four scenes.
+    /// Two-sample test of grey before speckle; `None` for fewer than four scenes.
     pub before_speckle: Option<TwoSample>,
     /// The same with the speckle of each scene's radar.
     pub with_speckle: Option<TwoSample>,
@@ -39,9 +39,9 @@ pub struct Views {
 }
 
 impl Views {
-    /// Draws scenes, of which the source is told all.
+    /// Draws scenes, given as a whole.
     ///
-    /// - `step`: told the number of images after each batch
+    /// - `step`: called with the number of images after each batch
     ///
     /// # Errors
     ///
@@ -58,9 +58,9 @@ impl Views {
         })
     }
 
-    /// How well a judge tells these images from simulated ones of the same scenes and other seas.
+    /// Two-sample tests of these images against simulated ones of the same scenes and other seas.
     ///
-    /// - `device`: of the judge, one that holds no gradients
+    /// - `device`: of the classifier, one without autodiff
     ///
     /// # Errors
     ///

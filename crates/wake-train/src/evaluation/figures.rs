@@ -21,10 +21,10 @@ use crate::metrics::Lpips;
 /// First index of the scenes whose values are changed: apart from those of the other figures.
 const FIRST_CHANGED: u64 = 1 << 20;
 
-/// What is judged, and how much is drawn for it.
+/// A source of images to evaluate, and the number of scenes.
 #[derive(Clone)]
 pub struct Evaluation<'a> {
-    /// What draws the images.
+    /// Source of the images.
     pub source: &'a dyn ImageSource,
     /// Its name in the report.
     pub name: &'static str,
@@ -34,9 +34,9 @@ pub struct Evaluation<'a> {
     pub beside: Vec<Named<'a>>,
     /// The scenes.
     pub held_out: HeldOut,
-    /// How images are looked at.
+    /// View of the images: grey and speckle.
     pub view: View,
-    /// What the source can be told besides sentence and numbers together; none for the simulator.
+    /// Conditions to evaluate besides sentence and numbers together; none for the simulator.
     pub conditions: Vec<Told>,
     /// Scenes; some figures take a share of them.
     pub scenes: usize,
@@ -45,7 +45,7 @@ pub struct Evaluation<'a> {
 /// Every figure of an [`Evaluation`].
 #[derive(Debug, Serialize)]
 pub struct Figures {
-    /// What was judged.
+    /// Name of the evaluated source.
     pub judged: &'static str,
     /// Number of scenes.
     pub scenes: usize,
@@ -57,9 +57,9 @@ pub struct Figures {
     pub speckle: Speckle,
     /// Mean images of a wake over many seas.
     pub wake_correlation: WakeCorrelation,
-    /// What can be read from the images.
+    /// Values measured in the images.
     pub measurements: Vec<MeasurementRow>,
-    /// The same when the source is told less.
+    /// The same under other conditions.
     pub conditions: Vec<ConditionRow>,
     /// Whether images follow a value that is changed.
     pub controllability: Vec<ControllabilityRow>,
@@ -79,9 +79,9 @@ pub struct Speckle {
 /// The measurements under one condition.
 #[derive(Debug, Serialize)]
 pub struct ConditionRow {
-    /// What the source was told.
+    /// Inputs of the source.
     pub told: &'static str,
-    /// What can be read from its images then.
+    /// Values measured in its images then.
     pub measurements: Vec<MeasurementRow>,
 }
 
@@ -124,7 +124,7 @@ impl<'a> Evaluation<'a> {
         self.scenes.div_ceil(5)
     }
 
-    /// How much [`figures`](Self::figures) counts in all.
+    /// Number of steps that [`figures`](Self::figures) counts in all.
     #[must_use]
     pub fn steps(&self) -> u64 {
         let conditions = self.condition_scenes() * self.conditions.len();
@@ -136,8 +136,8 @@ impl<'a> Evaluation<'a> {
     /// Draws everything and counts.
     ///
     /// - `lpips`: compares pixels as the paper does, if it is there
-    /// - `device`: of the judges, one that holds no gradients
-    /// - `step`: told what is drawn, and how much more of it was done
+    /// - `device`: of the classifiers, one without autodiff
+    /// - `step`: called with the name of a part, and how much more of it is done
     ///
     /// # Errors
     ///
@@ -190,7 +190,7 @@ impl<'a> Evaluation<'a> {
         })
     }
 
-    /// The measurements when the source is told less.
+    /// The measurements under other conditions.
     fn conditions(
         &self,
         scenes: &[Scene],

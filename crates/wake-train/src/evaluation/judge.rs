@@ -1,4 +1,4 @@
-//! The judge of two kinds of images: the best of a few two-sample tests.
+//! Two kinds of images, classified: the best of a few two-sample tests.
 
 use burn::tensor::Device;
 use wake_physics::Field;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! scenes ─► ImageSource ─► intensity ─► readings of heading, speed, wind, fetch and incidence ─► rows of errors, controllability
-//!                              └─► grey ─► pixels, ablation, wake correlation, two-sample judge, domain
+//!                              └─► grey ─► pixels, ablation, wake correlation, two-sample test, domain
 //! real images ─► pairs of windows ─► kinds of sea ─► rows
 //! ```
 //!
@@ -11,7 +11,7 @@
 //! what comes as close to a simulated image as another simulated image does.
 //!
 //! Every type whose name ends in `Row` is a line of a report, and is serialized under the names of its fields. Whatever draws
-//! images can be judged, see [`ImageSource`]:
+//! images can be evaluated, see [`ImageSource`]:
 //!
 //! ```
 //! use wake_train::evaluation::{Baseline, ImageSource, Quantity, Reading, Told};

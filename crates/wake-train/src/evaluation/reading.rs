@@ -9,7 +9,7 @@ use wake_physics::{Field, Raster, Scene};
 
 use crate::error::Result;
 
-/// What can be read from an image.
+/// Quantities that can be measured in an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Heading of the scene's first ship \[deg clockwise from azimuth\].
@@ -140,7 +140,7 @@ impl Reading {
         })
     }
 
-    /// What was read of a quantity.
+    /// The measured value of a quantity.
     #[must_use]
     pub fn value(&self, quantity: Quantity) -> Measured {
         self.values[quantity as usize]

@@ -11,7 +11,7 @@ use wake_ldm::sampler::{PromptMode, WakeSampler};
 /// Images that a source is asked for at once.
 pub(super) const BATCH: usize = 8;
 
-/// What a model is told about a scene.
+/// Inputs that describe a scene to a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Told {
     /// The paper's sentence, and its numbers.
@@ -44,11 +44,11 @@ impl Told {
 /// Draws images of scenes.
 pub trait ImageSource: Debug {
     /// Intensity before speckle of each scene, in the unit of σ⁰ and of the scene's rows and columns; `scene.seed` decides the
-    /// random sea. What knows the scene anyway may overhear what it is told.
+    /// random sea. Sources that know the scene ignore the prompt.
     ///
     /// # Errors
     ///
-    /// If one cannot be drawn. Another number of images, or another size, is refused by whatever judges them.
+    /// If one cannot be drawn. Another number of images, or another size, is refused by the evaluation.
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>>;
 
     /// Whether its images have speckle already, as those of a model that learnt speckled images.
@@ -57,7 +57,7 @@ pub trait ImageSource: Debug {
     }
 }
 
-/// The wake model is told what is asked for, whatever [`PromptMode`] it has; [`Told::Scene`] is told with its own.
+/// The wake model takes the inputs of the call, whatever [`PromptMode`] it has; for [`Told::Scene`] it uses its own.
 impl ImageSource for WakeSampler {
     fn draw(&self, scenes: &[Scene], told: Told) -> Result<Vec<Field>> {
         let (told, wording) = match told {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// How well one quantity was measured over many scenes.
+/// Errors of one quantity over many scenes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AbsoluteErrors {
     /// Scenes that count.

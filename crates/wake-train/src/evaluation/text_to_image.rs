@@ -21,7 +21,7 @@ pub struct TextToImage<'a> {
     pub scheduler: Option<SchedulerConfig>,
     /// Steps of the scheduler.
     pub steps: usize,
-    /// How strongly to follow the sentence; up to 1: as often as the training images did.
+    /// Guidance scale; 1 or less: no guidance.
     pub guidance: f64,
     /// The mapping from σ⁰ to grey of the images that it learnt.
     pub grey: GreyScale,
@@ -59,7 +59,7 @@ impl ImageSource for TextToImage<'_> {
 pub struct Reconstructed<'a> {
     /// The pipeline.
     pub pipeline: &'a Pipeline,
-    /// How its images are looked at.
+    /// View of its images: grey and speckle.
     pub view: View,
 }
 

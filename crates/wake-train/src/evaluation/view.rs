@@ -40,7 +40,7 @@ impl View {
 
     /// All images of a source, some at once.
     ///
-    /// - `step`: told the number of images after each batch
+    /// - `step`: called with the number of images after each batch
     pub(super) fn draw_all(
         &self,
         source: &dyn ImageSource,

@@ -32,7 +32,7 @@ pub struct WakeCorrelation {
 
 /// Measures the correlation of grey over scenes, each of which is drawn with eight seas, in the wedge of its first ship.
 ///
-/// - `model`: told sentence and numbers
+/// - `model`: conditioned on sentence and numbers
 /// - `step`: called after each scene
 ///
 /// # Errors

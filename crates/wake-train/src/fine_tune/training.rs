@@ -37,19 +37,19 @@ const INDEX: &str = "model_index.json";
 const UNET: &str = "unet/diffusion_pytorch_model.safetensors";
 const CHANGES: &str = "pytorch_lora_weights.safetensors";
 
-/// How a model in the layout of diffusers is fitted to the pairs of a folder: its whole U-Net and nothing else, or low-rank
+/// Fine-tuning of a model in diffusers layout on the pairs of a folder: its whole U-Net and nothing else, or low-rank
 /// changes of that.
 #[derive(Debug, Clone)]
 pub struct FineTuning<'a> {
     /// Folder of the model that is begun with.
     pub weights: &'a Path,
-    /// What it learns from: the pairs of its `trainset.txt`.
+    /// Training data: the pairs of its `trainset.txt`.
     pub data: &'a Folder,
     /// Rank of the changes of the attentions; `None`: the whole U-Net learns.
     pub rank: Option<usize>,
     /// γ of the weights by signal-to-noise ratio, Hang et al. (2023), "Efficient Diffusion Training via Min-SNR Weighting Strategy".
     pub snr_gamma: Option<f64>,
-    /// How it runs.
+    /// Options of the run.
     pub options: StageOptions,
 }
 

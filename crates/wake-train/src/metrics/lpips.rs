@@ -203,7 +203,7 @@ impl Lpips {
         })
     }
 
-    /// Where it computes: images must lie there.
+    /// Device of the computation; images must be on it.
     #[must_use]
     pub fn device(&self) -> &Device {
         &self.device

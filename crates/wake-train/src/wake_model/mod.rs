@@ -94,7 +94,7 @@ impl<'a> WakeTraining<'a> {
     /// Takes the folder for one stage; whatever is refused is refused before anything is written.
     ///
     /// - `pairs`: what is learnt from, all of them scenes and images that the model can have; the parser alone needs none
-    /// - `progress`: told what is done; residuals are computed by several threads
+    /// - `progress`: called with what is done; residuals are computed by several threads
     ///
     /// # Errors
     ///

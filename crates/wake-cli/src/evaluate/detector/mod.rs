@@ -1,5 +1,6 @@
 //! `wake evaluate detector`: how well wakes are found in simulated images that were held out, and in real tiles.
 
+mod plot;
 pub(crate) mod real;
 pub(crate) mod real_sea;
 mod recall;
@@ -19,22 +20,22 @@ use real_sea::HELD_OUT;
 use recall::{by_scene, by_visibility};
 use report::Report;
 
-/// Measure how well wakes are found, in simulated images that were held out and in real tiles.
+/// Evaluate the detector on held-out simulated images and on real tiles.
 #[derive(clap::Args, Debug, Clone)]
 pub(crate) struct Options {
     /// Simulated images of each recipe
     #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     images: u32,
-    /// Folder of real tiles with labels.json, which are then searched, too
+    /// Folder of real tiles with labels.json, to be searched too
     #[arg(long, value_name = "DIR")]
     real: Option<PathBuf>,
     /// Weights of the network, by default those in the repository
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Weights of another run, as a row of the table of what transfer needs; may be repeated
+    /// Weights of another training, as a row of the transfer table; may be repeated
     #[arg(long, value_name = "NAME=FILE", value_parser = rung)]
     rung: Vec<(String, PathBuf)>,
-    /// Runs that each left a tile out, as rows of the real tiles: TILE by DIR/TILE/detector.safetensors; may be repeated
+    /// Trainings that each left out a tile: evaluates TILE with DIR/TILE/detector.safetensors; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = rung, requires = "real")]
     left_out: Vec<(String, PathBuf)>,
     /// flex, ndarray, wgpu or cuda, where compiled in
@@ -49,7 +50,7 @@ pub(crate) struct Options {
 fn rung(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
         Some((name, file))
-            if !name.is_empty() && !name.contains(['/', '\\']) && !file.is_empty() =>
+            if !name.is_empty() && !name.contains(['/', '\\', ',']) && !file.is_empty() =>
         {
             Ok((name.to_owned(), PathBuf::from(file)))
         }
@@ -66,7 +67,7 @@ const CLEAR: f64 = 1.0;
 /// Images drawn of each recipe.
 const PICTURES: usize = 24;
 
-/// Searches, and writes `report.md`, `report.json` and pictures into the folder.
+/// Searches, and writes `report.md`, `report.json`, `recall.csv`, a plot and pictures into the folder.
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let network = |weights: Option<&Path>| -> Outcome<Box<dyn Finder>> {
         let detector = named::network(weights, &options.device, LEAST_SCORE)?;
@@ -156,7 +157,7 @@ fn simulated(
     }
     let names: Vec<&str> = finders.iter().map(|(name, _)| *name).collect();
     let by_visibility = by_visibility(recipe, &names, &searched);
-    report.visibility.push(by_visibility);
+    report.visibility.add(&by_visibility);
     if recipe == ImageRecipe::Detector {
         report.scenes = by_scene(recipe, &names, &searched);
     }

@@ -53,7 +53,7 @@ fn simulated(source: &Arc<dyn Source>, count: usize) -> Outcome<Vec<Field>> {
     Ok(pairs.into_iter().map(levels).collect())
 }
 
-/// How often real windows are told from those of each recipe, and the recipe detector from itself: the floor.
+/// Accuracy of a classifier of real windows and those of each recipe, and of the recipe and itself: the floor.
 pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
     let device = device_named("flex")?;
     let sea = |plain: bool, seed: u64| -> Outcome<Vec<Field>> {
@@ -85,9 +85,8 @@ pub(crate) fn told_apart(real: &[Field]) -> Outcome<Vec<Value>> {
 
 /// A table of how often a small network tells one sea from another.
 pub(crate) fn table(rows: &[Value]) -> String {
-    let mut text = "\n## The open sea\n\nHow often a small network, trained on windows of the left halves of the real tiles, is \
-         right on patches of 64² pixels of the right halves (docs/evaluation.md; 0.5: nothing tells the two kinds apart). \
-         The tiles come from other sensors and in other stretches of grey than the recipe has.\n\n\
+    let mut text = "\n## The open sea\n\nAccuracy of a small network, trained on windows of the left halves of the real tiles, on patches of 64² \
+         pixels of the right halves (docs/reports/evaluation.md; 0.5: indistinguishable).\n\n\
          | kinds | right | windows |\n| --- | --- | --- |\n"
         .to_owned();
     for row in rows {

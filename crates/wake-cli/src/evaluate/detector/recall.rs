@@ -19,32 +19,66 @@ const SIGNALS: [f64; 7] = [15.0, 18.0, 21.0, 24.0, 28.0, 32.0, 40.0];
 const WINDS: [f64; 6] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0];
 const ANGLES: [f64; 4] = [0.0, 30.0, 60.0, 91.0];
 
-/// A table of recall, at the score that allows half a false alarm an image.
+/// Finders whose recall stands in the report: the network and the classical detector. Those of other runs are in the CSV file.
+const SHOWN: usize = 2;
+
+/// Recall as tables in Markdown, and of all finders as lines of CSV.
+#[derive(Debug, Default)]
+pub(crate) struct Recall {
+    pub(crate) text: String,
+    pub(crate) csv: String,
+}
+
+impl Recall {
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.text.push_str(&other.text);
+        self.csv.push_str(&other.csv);
+    }
+}
+
+/// Recall at the score that allows half a false alarm an image.
 ///
+/// - `images`, `by`: the recipe, and the quantity of the columns with its unit
 /// - `value`: of a wake, by the numbers of its image and of the wake in it
 /// - `bounds`: of the columns
 fn table(
-    title: &str,
+    [images, by]: [&str; 2],
     columns: &[String],
     bounds: &[f64],
     searched: (&[&str], &Searched),
     value: impl Fn(usize, usize) -> f64 + Copy,
-) -> String {
+) -> Recall {
     let rule = " --- |".repeat(columns.len() + 1);
-    let mut text = format!("\n| {title} | {} |\n|{rule}\n", columns.join(" | "));
+    let quantity = by.replace('[', "\\[").replace(']', "\\]");
+    let head = columns.join(" | ");
+    let mut recall = Recall {
+        text: format!("\n| {images}, {quantity} | {head} |\n|{rule}\n"),
+        csv: String::new(),
+    };
     let (finders, searched) = searched;
-    for (name, images) in finders.iter().zip(&searched.judged) {
-        // Writing into a string cannot fail.
-        let _ = write!(text, "| {name} |");
-        for [right, all] in found_by(images, Rule::Ray, FALSE_ALARMS, bounds, value) {
+    for (number, (name, judged)) in finders.iter().zip(&searched.judged).enumerate() {
+        let mut row = format!("| {name} |");
+        let found = found_by(judged, Rule::Ray, FALSE_ALARMS, bounds, value);
+        for ([right, all], column) in found.into_iter().zip(columns) {
+            let share = right as f64 / all as f64;
+            // Writing into a string cannot fail.
             let _ = match all {
-                0 => write!(text, " – |"),
-                _ => write!(text, " {:.2} of {all} |", right as f64 / all as f64),
+                0 => write!(row, " – |"),
+                _ => write!(row, " {share:.2} of {all} |"),
             };
+            if all > 0 {
+                let _ = writeln!(
+                    recall.csv,
+                    "{images},{by},{column},{name},{share:.2},{all}"
+                );
+            }
         }
-        text.push('\n');
+        if number < SHOWN {
+            recall.text.push_str(&row);
+            recall.text.push('\n');
+        }
     }
-    text
+    recall
 }
 
 fn spans(bounds: &[f64]) -> Vec<String> {
@@ -53,22 +87,22 @@ fn spans(bounds: &[f64]) -> Vec<String> {
 }
 
 /// A table of recall by visibility.
-pub(crate) fn by_visibility(recipe: ImageRecipe, finders: &[&str], searched: &Searched) -> String {
+pub(crate) fn by_visibility(recipe: ImageRecipe, finders: &[&str], searched: &Searched) -> Recall {
     let (bounds, what) = match recipe {
-        ImageRecipe::Painted => (SIGNALS, "signal over noise"),
-        _ => (CONTRASTS, "contrast"),
+        ImageRecipe::Painted => (SIGNALS, "signal over noise [dB]"),
+        _ => (CONTRASTS, "contrast [dB]"),
     };
     let decibel = |wake: &Wake| match (recipe, wake.contrast_db) {
         (ImageRecipe::Painted, _) | (_, None) => 20.0 * f64::from(wake.snr).log10(),
         (_, Some(db)) => f64::from(db),
     };
-    let title = format!("{}, {what} \\[dB\\]", recipe.name());
     let value = |image: usize, wake: usize| decibel(&searched.wakes[image][wake]);
-    table(&title, &spans(&bounds), &bounds, (finders, searched), value)
+    let title = [recipe.name(), what];
+    table(title, &spans(&bounds), &bounds, (finders, searched), value)
 }
 
 /// Tables of recall by sensor, wind, and the angle between a wake and the flight of the radar, which is along the image's rows.
-pub(crate) fn by_scene(recipe: ImageRecipe, finders: &[&str], searched: &Searched) -> String {
+pub(crate) fn by_scene(recipe: ImageRecipe, finders: &[&str], searched: &Searched) -> Recall {
     let scene = |image: usize| -> &Scene { &searched.scenes[image] };
     let used = |sensor: &Sensor| {
         let mut scenes = searched.scenes.iter();
@@ -87,27 +121,21 @@ pub(crate) fn by_scene(recipe: ImageRecipe, finders: &[&str], searched: &Searche
         let axis = f64::from(searched.wakes[image][wake].axis_deg);
         axis.to_radians().cos().abs().acos().to_degrees()
     };
-    let (all, title) = ((finders, searched), recipe.name());
+    let (all, images) = ((finders, searched), recipe.name());
     let mut angles = spans(&ANGLES[..3]);
     angles.push("60 to 90".to_owned());
-    [
-        table(&format!("{title}, sensor"), &names, &numbers, all, sensor),
-        table(
-            &format!("{title}, wind \\[m/s\\]"),
-            &spans(&WINDS),
-            &WINDS,
-            all,
-            wind,
-        ),
-        table(
-            &format!("{title}, wake to flight \\[deg\\]"),
-            &angles,
-            &ANGLES,
-            all,
-            angle,
-        ),
-    ]
-    .concat()
+    let mut recall = table([images, "sensor"], &names, &numbers, all, sensor);
+    let by_wind = table([images, "wind [m/s]"], &spans(&WINDS), &WINDS, all, wind);
+    recall.add(&by_wind);
+    let by_angle = table(
+        [images, "wake to flight [deg]"],
+        &angles,
+        &ANGLES,
+        all,
+        angle,
+    );
+    recall.add(&by_angle);
+    recall
 }
 
 /// The name of a sensor in scene files.

@@ -8,9 +8,11 @@ use serde_json::{Value, json};
 use wake_detector::score::{Curve, Judged, Rule};
 use whole_files::write_atomically;
 
-use super::real_sea;
+use super::recall::Recall;
+use super::{plot, real_sea};
+use crate::exit::Outcome;
 
-/// False alarms an image at which recall is told.
+/// False alarms per image at which recall is reported.
 pub(crate) const FALSE_ALARMS: f64 = 0.5;
 
 /// One row a finder and set of images.
@@ -19,12 +21,12 @@ pub(crate) struct Report {
     pub(crate) rows: Vec<Value>,
     /// Names of other runs.
     pub(crate) rungs: Vec<String>,
-    /// What was told apart.
+    /// Accuracies of the two-sample test.
     pub(crate) sea: Vec<Value>,
-    /// Tables of recall by visibility.
-    pub(crate) visibility: Vec<String>,
-    /// Tables of recall by sensor, wind and heading.
-    pub(crate) scenes: String,
+    /// Recall by visibility.
+    pub(crate) visibility: Recall,
+    /// Recall by sensor, wind and heading.
+    pub(crate) scenes: Recall,
 }
 
 impl Report {
@@ -41,13 +43,75 @@ impl Report {
         }));
     }
 
-    /// Writes `report.json` and `report.md` into a folder.
-    pub(crate) fn write(&self, folder: &Path) -> whole_files::Result<()> {
+    /// Writes `report.json`, `report.md`, `recall.csv` and, with other runs, `transfer.svg` into a folder.
+    pub(crate) fn write(&self, folder: &Path) -> Outcome<()> {
         let rows = format!("{:#}\n", json!({"rows": self.rows, "sea": self.sea}));
-        for (name, text) in [("report.json", rows), ("report.md", self.text())] {
+        let recall = format!(
+            "images,by,range,found by,recall,wakes\n{}{}",
+            self.visibility.csv, self.scenes.csv
+        );
+        let files = [
+            ("report.json", rows),
+            ("report.md", self.text()),
+            ("recall.csv", recall),
+        ];
+        for (name, text) in files {
             write_atomically(&folder.join(name), text.as_bytes())?;
         }
+        let dots = self.dots();
+        if !dots.is_empty() {
+            plot::transfer(&folder.join("transfer.svg"), &dots)?;
+        }
         Ok(())
+    }
+
+    /// The row of a set of images and a finder.
+    fn row(&self, images: &str, finder: &str) -> Option<&Value> {
+        let found = |row: &&Value| row["images"] == images && row["finder"] == finder;
+        self.rows.iter().find(found)
+    }
+
+    /// Average precision on simulated and on real images of other runs and of the network.
+    fn dots(&self) -> Vec<(String, [f64; 2])> {
+        let finders = self.rungs.iter().map(String::as_str).chain(["network"]);
+        let dot = |finder: &str| {
+            let of = |images| self.row(images, finder)?["average_precision"].as_f64();
+            let simulated = of("satellites, above 1 dB")?;
+            Some((finder.to_owned(), [simulated, of("real, clear wakes")?]))
+        };
+        match self.rungs.is_empty() {
+            true => Vec::new(),
+            false => finders.filter_map(dot).collect(),
+        }
+    }
+
+    /// The first paragraph: the results.
+    fn lead(&self) -> String {
+        let pair = |images| Some([self.row(images, "network")?, self.row(images, "Radon")?]);
+        let number = |row: &Value, key: &str| row[key].as_f64().unwrap_or(f64::NAN);
+        let precisions = |rows: [&Value; 2]| rows.map(|row| number(row, "average_precision"));
+        let mut text = String::new();
+        if let Some(rows) = pair("real, clear wakes") {
+            let [network, radon] = precisions(rows);
+            let [found, classical] = rows.map(|row| number(row, "recall_at_half_false_alarm"));
+            // Writing into a string cannot fail.
+            let _ = write!(
+                text,
+                "On {} real tiles with {} clear wakes the network reaches an average precision of {network:.2} and finds \
+                 {found:.2} of the wakes with at most half a false alarm an image; the classical Radon transform reaches \
+                 {radon:.2} and {classical:.2}. ",
+                rows[0]["count"], rows[0]["wakes"],
+            );
+        }
+        if let Some(rows) = pair("satellites") {
+            let [network, radon] = precisions(rows);
+            let _ = write!(
+                text,
+                "On {} simulated images with {} visible wakes they reach {network:.2} and {radon:.2}. ",
+                rows[0]["count"], rows[0]["wakes"],
+            );
+        }
+        text + "`tests/foreign/real_tiles.py` gives the intervals over the tiles."
     }
 
     pub(crate) fn text(&self) -> String {
@@ -58,11 +122,12 @@ impl Report {
             false => " --rung NAME=FILE …",
         };
         let mut text = format!(
-            "<!-- Written by: wake evaluate detector --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n\
+            "<!-- Written by: wake evaluate detector --images {count} --real DIR{rungs} -->\n\n# Finding wakes\n\n{}\n\n\
              AP: average precision by the ray rule (axis within 10°; tip within 60 pixels, or axis line within 25 pixels of tip \
              and middle). AP boxes: oriented boxes from the tip to the end of what is visible, IoU 0.5. Recall: with at most half \
              a false alarm an image.\n\n\
              | images | number | wakes | found by | AP | AP boxes | recall | at score |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
+            self.lead()
         );
         let number = |value: &Value| value.as_f64().map_or("–".to_owned(), |x| format!("{x:.3}"));
         let told = |value: &Value| value.as_str().unwrap_or_default().to_owned();
@@ -83,15 +148,15 @@ impl Report {
             );
         }
         text.push_str(
-            "\nRecall by visibility, with at most half a false alarm an image: of simulated wakes by the expected change of the \
-             intensity (docs/labels.md), of painted ones by the signal over noise of a filter that knows the wake.\n",
+            "\n## Recall by visibility\n\nSimulated wakes by the expected change of the intensity (docs/labels.md), painted ones by the \
+             signal-to-noise ratio of a matched filter. Every trained network: [`detector_recall.csv`](detector_recall.csv).\n",
         );
-        text.push_str(&self.visibility.join(""));
+        text.push_str(&self.visibility.text);
         text.push_str(
-            "\nThe same recall of simulated wakes by sensor, by wind, and by the angle between the wake and the flight of the radar: at \
-             0° the ship sails along the flight, at 90° across it.\n",
+            "\n## Recall by scene\n\nSimulated wakes by sensor, wind, and the angle between wake and flight: at 0° the ship sails along \
+             the flight.\n",
         );
-        text.push_str(&self.scenes);
+        text.push_str(&self.scenes.text);
         if !self.rungs.is_empty() {
             text.push_str(&self.transfer());
         }
@@ -112,7 +177,9 @@ impl Report {
         let name = |set: &&&Value| set.as_str().unwrap_or_default().to_owned();
         let titles: Vec<String> = sets.iter().map(|set| name(&set)).collect();
         let mut text = format!(
-            "\n## What transfer needs\n\nThe same network trained on other images, AP by the ray rule (and recall).\n\n| trained on | {} |\n| --- |{}\n",
+            "\n## What transfer needs\n\nThe same network trained on other images: AP by the ray rule (and recall).\n\n\
+             ![Average precision on real tiles and on simulated images, by what the network was trained on](detector_transfer.svg)\n\n\
+             | trained on | {} |\n| --- |{}\n",
             titles.join(" | "),
             " --- |".repeat(titles.len()),
         );

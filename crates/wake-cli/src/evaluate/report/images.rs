@@ -8,11 +8,7 @@ fn ratio(model: Option<f64>, simulator: Option<f64>) -> String {
 }
 
 pub(super) fn ablation(report: &Report) -> String {
-    let mut text = "## Rungs\n\nWhat each kind of image has of a sea, means over the scenes: the shape of the grey that is left \
-        when the expected image is subtracted; variance on crests of the wake over that in its troughs; squared differences of neighbours across the borders of squares of \
-        8 pixels over those elsewhere; share of patches of \
-        unseen scenes that the best of up to three small networks tells from simulated ones, 0.5 where it cannot, and the distance of both kinds in the \
-        feature that it tells them by, in standard deviations; slope of the grey on that of the expected image inside the Kelvin wedge.\n\n\
+    let mut text = "## Ablation\n\nMeans over the scenes; 0.5 in the two-sample test: indistinguishable from simulated images.\n\n\
         | image | two-sample | distance | skewness | kurtosis | steepness range, azimuth, wind | grouping | crests | seams | wake |\n\
         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
         .to_owned();

@@ -23,7 +23,7 @@ fn markdown(report: &Report) -> String {
         images::ablation(report),
         images::pixels(report),
         images::wake(report),
-        values::measurements("Values read from the images", &report.figures.measurements),
+        values::measurements("Values measured in the images", &report.figures.measurements),
         values::conditions(report),
         values::controllability(report),
         images::schedulers(report),
@@ -69,8 +69,7 @@ fn papers(paper: &Paper) -> String {
          | SSIM | PSNR dB | LPIPS | seconds at 256 x 256 | over its simulator |\n| --- | --- | --- | --- | --- |\n\
          | {} | {} | {} | {} (RTX 3090) | up to {} times faster |\n\n\
          They cannot be compared with the figures above: they are of another simulator's images, in another mapping to grey, \
-         and of one sample a scene. Two seas of one scene differ, so a figure of pixels means something beside that of a \
-         second simulated image alone.\n",
+         and of one sample a scene.\n",
         paper.ssim, paper.psnr_db, paper.lpips, paper.seconds_256, paper.speed_up
     )
 }

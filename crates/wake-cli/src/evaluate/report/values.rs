@@ -14,8 +14,8 @@ fn errors(errors: &AbsoluteErrors) -> String {
 
 pub(super) fn measurements(title: &str, rows: &[MeasurementRow]) -> String {
     let mut text = format!(
-        "## {title}\n\nAbsolute error: median, 90th percentile, share measurable. The shares of the others are of the \
-         scenes in which the simulated image is measurable; the rest of these are misses.\n\n\
+        "## {title}\n\nAbsolute error: median, 90th percentile, share of scenes in which the value is measurable. For model and \
+         Gaussian sea the share is of the scenes that are measurable in the simulated image.\n\n\
          | value | unit | simulator median | p90 | share | model median | p90 | share | Gaussian sea median | p90 | share |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
     );
@@ -37,7 +37,7 @@ pub(super) fn conditions(report: &Report) -> String {
         return String::new();
     }
     let mut text =
-        "## What the model is told\n\nMedian absolute error (share measurable).\n\n| value |"
+        "## Conditions\n\nMedian absolute error (share measurable).\n\n| value |"
             .to_owned();
     for condition in &report.figures.conditions {
         text += &format!(" {} |", condition.told);
@@ -61,8 +61,8 @@ pub(super) fn conditions(report: &Report) -> String {
 }
 
 pub(super) fn controllability(report: &Report) -> String {
-    let mut text = "## One value changed\n\nShare of pairs in which the measured value follows, of those in which it \
-        follows on simulated images.\n\n| value | told | pairs | counted | right |\n| --- | --- | --- | --- | --- |\n"
+    let mut text = "## One value changed\n\nShare of pairs in which the measured value changes in the same direction, of the pairs \
+        in which it does on simulated images.\n\n| value | condition | pairs | counted | right |\n| --- | --- | --- | --- | --- |\n"
         .to_owned();
     for r in &report.figures.controllability {
         text += &format!(

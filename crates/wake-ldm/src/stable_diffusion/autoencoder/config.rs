@@ -43,10 +43,10 @@ pub struct AutoencoderKlConfig {
     /// Whether a 1 × 1 convolution precedes the decoder.
     #[config(default = true)]
     pub post_quant_conv: bool,
-    /// What latents are multiplied with before diffusion, to give them variance 1.
+    /// Factor on latents before diffusion, for variance 1.
     #[config(default = 0.18215)]
     pub scaling_factor: f64,
-    /// What is subtracted from latents before that.
+    /// Shift that is subtracted from latents before the scaling.
     #[config(default = 0.0)]
     pub shift_factor: f64,
     /// Rows and columns of the images that the model was trained on, and of the tiles of
@@ -78,7 +78,7 @@ impl AutoencoderKlConfig {
             .with_sample_size(256)
     }
 
-    /// How many pixels one latent pixel stands for, along each axis.
+    /// Pixels per latent pixel along each axis.
     ///
     /// ```text
     /// patch_size · 2^(levels − 1)

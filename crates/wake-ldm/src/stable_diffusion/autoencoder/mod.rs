@@ -82,7 +82,7 @@ impl AutoencoderKl {
         load(config.init(device), Layout::Diffusers, folder)
     }
 
-    /// What the model was built from.
+    /// The configuration of the model.
     pub fn config(&self) -> &AutoencoderKlConfig {
         &self.config
     }
@@ -199,12 +199,12 @@ impl AutoencoderKl {
         tiling::in_tiles(z, latents, pixels, |tile| self.decode(tile))
     }
 
-    /// What the diffusion model sees of z: shifted and scaled to variance 1.
+    /// Latents of the diffusion model: z shifted and scaled to variance 1.
     pub fn to_latents(&self, z: Tensor<4>) -> Tensor<4> {
         (z - self.config.shift_factor) * self.config.scaling_factor
     }
 
-    /// What the decoder sees of a latent image: the inverse of [`to_latents`](Self::to_latents).
+    /// Latents of the decoder: the inverse of [`to_latents`](Self::to_latents).
     pub fn from_latents(&self, latents: Tensor<4>) -> Tensor<4> {
         latents / self.config.scaling_factor + self.config.shift_factor
     }
@@ -219,12 +219,12 @@ impl AutoencoderKl {
         self
     }
 
-    /// What latents are multiplied with before diffusion.
+    /// Factor on latents before diffusion.
     pub fn scaling_factor(&self) -> f64 {
         self.config.scaling_factor
     }
 
-    /// How many pixels one latent pixel stands for, along each axis.
+    /// Pixels per latent pixel along each axis.
     pub fn downsampling(&self) -> usize {
         self.config.downsampling()
     }

@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor};
 
-/// How an image is cut into tiles.
+/// Tiles of an image.
 ///
 /// Neighbouring tiles overlap and fade into each other linearly. Normalisation and attention see
 /// one tile at a time, so the result differs a little from that of the whole image.

@@ -35,7 +35,7 @@ pub use sampling::{Progress, Sampling};
 /// How many prompts' embeddings are kept.
 const CACHED_PROMPTS: usize = 256;
 
-/// What a pipeline is made of.
+/// The models of a pipeline.
 #[derive(Debug, Clone)]
 pub struct PipelineParts {
     /// Turns prompts into token ids; `None`: CLIP's own.
@@ -96,7 +96,7 @@ impl Pipeline {
         })
     }
 
-    /// What the pipeline is made of.
+    /// The models of the pipeline.
     pub fn into_parts(self) -> PipelineParts {
         self.parts
     }

@@ -56,7 +56,7 @@ pub enum StartImage {
     Latents(Tensor<4>),
 }
 
-/// What a run is asked for: prompts, how strongly to follow them, and where to start.
+/// Options of a run: prompts, guidance, seeds, start image.
 ///
 /// ```
 /// use wake_ldm::pipeline::Request;
@@ -111,13 +111,13 @@ impl Request {
         }
     }
 
-    /// What the images should not show: one for all prompts, or one each. Default: the empty text.
+    /// Negative prompts: one for all prompts, or one each. Default: the empty text.
     pub fn with_negative(mut self, negative: impl Into<Prompts>) -> Self {
         self.negative = negative.into();
         self
     }
 
-    /// How strongly to follow the prompt, g in
+    /// Guidance scale, g in
     ///
     /// ```text
     /// ε = ε(negative) + g (ε(prompt) − ε(negative))
@@ -134,7 +134,7 @@ impl Request {
         self
     }
 
-    /// How much of the prediction's contrast to bring back to that without guidance, in [0, 1].
+    /// Guidance rescale: share by which the contrast of the prediction is reset to that without guidance, in [0, 1].
     ///
     /// # References
     ///
@@ -215,7 +215,7 @@ impl Request {
         self
     }
 
-    /// How many images go through the U-Net at once. With 1, the default, an image does not depend
+    /// Number of images per pass of the U-Net. With 1, the default, an image does not depend
     /// on those beside it to the last bit; GPUs want more.
     pub fn with_images_at_once(mut self, images: usize) -> Self {
         self.images_at_once = images;

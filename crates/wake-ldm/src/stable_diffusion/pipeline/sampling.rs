@@ -12,7 +12,7 @@ use crate::unet::UNetInput;
 use wake_nn::check_finite;
 use wake_nn::noise::{NoiseSource, normal_batch};
 
-/// How far a run is, and what it has so far.
+/// Progress of a run with its present latents.
 #[derive(Debug)]
 pub struct Progress {
     /// Calls of the model made.

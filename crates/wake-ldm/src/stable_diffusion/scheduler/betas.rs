@@ -65,7 +65,7 @@ impl BetaCurve {
     }
 }
 
-/// What becomes of the little signal that usually survives the last training step.
+/// Treatment of the signal that remains at the last training step.
 ///
 /// # References
 ///

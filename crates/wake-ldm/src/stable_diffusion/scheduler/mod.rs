@@ -53,7 +53,7 @@ pub use spacing::Spacing;
 pub struct StepInput {
     /// Which entry of [`Scheduler::timesteps`] this is.
     pub index: usize,
-    /// What the model predicted, shaped like the sample.
+    /// Prediction of the model, shaped like the sample.
     pub prediction: Tensor<4>,
     /// The noisy sample as it was before [`Scheduler::scale_model_input`].
     pub sample: Tensor<4>,
@@ -73,7 +73,7 @@ impl StepInput {
     }
 }
 
-/// What one step gives.
+/// Result of one step.
 #[derive(Debug)]
 pub struct StepOutput {
     /// The sample at the next noise level.

@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
 
-/// How much of the clean image and how much noise a noisy image holds.
+/// Amplitudes of clean image and noise in a noisy image.
 ///
 /// ```text
 /// x = α x₀ + σ n
@@ -35,7 +35,7 @@ impl NoiseLevel {
     }
 }
 
-/// What a model was trained to predict from x = α x₀ + σ n.
+/// Quantity that a model was trained to predict from x = α x₀ + σ n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Prediction {
     /// The noise n.
@@ -124,7 +124,7 @@ impl Prediction {
     }
 }
 
-/// How the clean image that a step sees is limited.
+/// Limits of the predicted clean image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Clipping {
     /// Not at all: what latent images need.

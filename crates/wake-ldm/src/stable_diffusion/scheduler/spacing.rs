@@ -3,7 +3,7 @@
 use crate::options::Options;
 use wake_nn::{Error, Result, check_range};
 
-/// How the visited steps are spread over the training steps.
+/// Spacing of the sampling steps among the training steps.
 ///
 /// # References
 ///

@@ -57,7 +57,7 @@ const LOG_SIZE: Range = Range::new(-0.5, 2.0);
 const NOISE: Range = Range::new(-40.0, 0.0);
 /// A depth beyond which no wave that matters feels the bottom \[m\].
 const DEEP: f64 = 1000.0;
-/// Side of the pixels that places are told in \[m\]: those of other sides are told as if they were of this one.
+/// Unit of places: a pixel of this side \[m\]. Places in pixels of other sides are given as if they had it.
 pub(super) const TOLD_SPACING: f64 = 4.0;
 
 /// Waves per number on an open range: each has a sine and a cosine.

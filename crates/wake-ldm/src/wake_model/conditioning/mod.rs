@@ -1,4 +1,4 @@
-//! What the small wake model is told about a scene: numbers, places in the ship's frame, and words.
+//! Inputs of the wake model: numbers of a scene, places in the ship's frame, and words.
 //!
 //! ```text
 //! prompt ─► token ids ─► compact ids ─► reader ─► numbers

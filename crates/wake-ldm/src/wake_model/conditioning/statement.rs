@@ -39,7 +39,7 @@ pub fn statement(said: &PartialScene) -> Vec<f32> {
     quantities.into_iter().flat_map(triple).collect()
 }
 
-/// What a [`statement`] says; a quantity counts as stated above ½, a number beyond its range as the end of it.
+/// Values of a [`statement`]; a quantity counts as stated above ½, a number beyond its range as the end of it.
 ///
 /// # Panics
 ///

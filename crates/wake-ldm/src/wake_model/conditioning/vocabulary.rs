@@ -29,7 +29,7 @@ impl Vocabulary {
         }
     }
 
-    /// What prompts about wakes can contain: the words of every [`Wording`], and every digit.
+    /// Vocabulary of prompts about wakes: the words of every [`Wording`], and every digit.
     ///
     /// # Errors
     ///

@@ -38,7 +38,7 @@ pub struct WakeModelConfig {
     pub norm_groups: usize,
     /// CLIP's ids that the parser knows.
     pub vocabulary: Vec<u32>,
-    /// What a prompt leaves open. Its grid is not looked at.
+    /// Scene with the values that a prompt leaves open. Its grid is ignored.
     #[serde(default)]
     pub scene: Scene,
     /// The scenes of all training images.
@@ -133,7 +133,7 @@ impl WakeModelConfig {
         Ok(self.unet().validate()?)
     }
 
-    /// What a prompt leaves open, on the pixels of the model.
+    /// Scene with the values that a prompt leaves open, on the pixels of the model.
     pub fn base_scene(&self) -> Scene {
         let mut scene = self.scene.clone();
         (scene.grid.rows, scene.grid.columns) = (self.image_size, self.image_size);

@@ -36,7 +36,7 @@ pub struct Flow {
     fold: usize,
 }
 
-/// What is known of some scenes, in the form that every step uses.
+/// Conditioning of some scenes in the form that every step uses.
 #[derive(Debug, Clone)]
 pub struct CachedConditioning {
     numbers: Tensor<2>,

@@ -10,12 +10,12 @@ use super::windows::ChannelWindows;
 use crate::error::Result;
 use crate::wake_model::conditioning::{FEATURES, MapGrid, PLACES, features, places};
 
-/// What is known of the scenes of a batch.
+/// Conditioning of a batch of scenes.
 #[derive(Debug, Clone)]
 pub struct ConditioningInputs {
     /// Their numbers, `[batch, FEATURES]`.
     pub numbers: Tensor<2>,
-    /// Where the pixels of the latents lie, `[batch, PLACES, rows, columns]`.
+    /// Places of the latent pixels, `[batch, PLACES, rows, columns]`.
     pub places: Tensor<4>,
     /// Latents of the images expected of them, `[batch, channels, rows, columns]`.
     pub wake: Tensor<4>,
@@ -24,7 +24,7 @@ pub struct ConditioningInputs {
 }
 
 impl ConditioningInputs {
-    /// What is known of some scenes at all their latent pixels.
+    /// Conditioning of scenes at all latent pixels.
     ///
     /// - `wake`: see [`PhysicsPrior`]; its device is that of the result
     /// - `log_deviations`: of the channels, see [`PhysicsPrior`], one scene after the other
@@ -36,7 +36,7 @@ impl ConditioningInputs {
         Self::of_cells(scenes, &cells, wake, log_deviations)
     }
 
-    /// What is known of some scenes at some of their latent pixels.
+    /// Conditioning of scenes at some latent pixels.
     ///
     /// - `cells`: which, for each scene
     /// - `wake`: at these pixels, `[batch, channels, rows, columns]`
@@ -68,13 +68,13 @@ impl ConditioningInputs {
     }
 }
 
-/// Logarithms of deviations are told in this unit.
+/// Unit of the logarithms of deviations.
 const LOG_DEVIATION: f64 = 3.0;
 
 /// Side of the image that stands for the mean of an open sea that is the same everywhere [pixels].
 const EVEN: usize = 32;
 
-/// What physics foresees of a scene's image.
+/// Expected image and deviations of a scene, by physics.
 #[derive(Debug, Clone)]
 pub struct PhysicsPrior {
     /// Grey of [`expected_intensity`], `[rows, columns]` of the scene.
@@ -84,7 +84,7 @@ pub struct PhysicsPrior {
 }
 
 impl PhysicsPrior {
-    /// That of a scene in the latents of a transform.
+    /// The prior of a scene in the latents of a transform.
     ///
     /// # Errors
     ///

@@ -32,7 +32,7 @@ pub struct PatchTransform {
     synthesis: Param<Tensor<2>>,
 }
 
-/// How much of the variance each principal component holds.
+/// Share of the variance of each principal component.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExplainedVariance {
     /// Variances in grey², the largest first.
@@ -105,7 +105,7 @@ impl PatchTransform {
         self.analysis.val().device()
     }
 
-    /// What each channel weighs the pixels of a square and of half its neighbours with, `[channels, 16 × 16]` in rows.
+    /// Weights of each channel for the pixels of a square and of half its neighbours, `[channels, 16 × 16]` in rows.
     pub fn windows(&self) -> Vec<f32> {
         let analysis = self.analysis.val();
         let [channels, _] = analysis.dims();

@@ -50,7 +50,7 @@ pub struct Prior {
     grey_out: Linear,
 }
 
-/// What a [`Prior`] says of the images of a batch.
+/// Mean and spread that a [`Prior`] gives for a batch.
 #[derive(Debug, Clone)]
 pub struct Expected {
     /// μ, `[batch, channels, rows, columns]`.
@@ -113,7 +113,7 @@ impl Prior {
 }
 
 impl Expected {
-    /// What the flow draws: (z − μ)/s.
+    /// Residual, which the flow draws: (z − μ)/s.
     pub fn residual(&self, latents: Tensor<4>) -> Tensor<4> {
         (latents - self.mean.clone()) * self.log_std.clone().neg().exp()
     }

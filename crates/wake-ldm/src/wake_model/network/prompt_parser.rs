@@ -61,7 +61,7 @@ impl PromptParser {
         }
     }
 
-    /// What prompts state, as [`statement`](crate::wake_model::conditioning::statement), in 32 bits.
+    /// Values that prompts state, as [`statement`](crate::wake_model::conditioning::statement), in 32 bits.
     ///
     /// # Shapes
     ///

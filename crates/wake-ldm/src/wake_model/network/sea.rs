@@ -71,7 +71,7 @@ pub struct SeaFields {
 }
 
 impl SeaFields {
-    /// Those of some scenes of one size, on all cores; scenes that follow on their equal are looked at once.
+    /// Spectra of scenes of one size, on all cores; equal scenes in succession are computed once.
     ///
     /// # Errors
     ///

@@ -45,7 +45,7 @@ struct Seen {
 }
 
 impl TrainingRanges {
-    /// That of some scenes.
+    /// Ranges of some scenes.
     ///
     /// # Errors
     ///

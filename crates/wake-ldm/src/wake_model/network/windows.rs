@@ -15,7 +15,7 @@ const LEAST_SHARE: f64 = 1e-5;
 /// speckle (chosen).
 const LEAST_GREY: f64 = 1e-3;
 
-/// What the channels of latents weigh pixels with, as far as their variance asks for it.
+/// Weights of the latent channels for pixels, as far as variances need them.
 #[derive(Debug, Clone)]
 pub struct ChannelWindows {
     /// Sums of w(p) w(p + d) over all pixels p of a window, by the distance d in rows and columns; of each channel.
@@ -23,7 +23,7 @@ pub struct ChannelWindows {
 }
 
 impl ChannelWindows {
-    /// Those of a transform.
+    /// Weights of a transform.
     pub fn new(patches: &PatchTransform) -> Self {
         let windows = patches.windows();
         let correlation = |window: &[f32]| {

@@ -30,9 +30,9 @@ pub struct WakeImage {
     pub intensity: Field,
     /// Intensity with speckle: times [`unit_speckle`], or of the learnt sea, which gets no second one.
     pub speckled: Field,
-    /// Where ship and wake are in [`scene`](Self::scene).
+    /// Labels of [`scene`](Self::scene).
     pub labels: Labels,
-    /// What was drawn: the scene that was told, and the default values of what was left open.
+    /// The scene of the image: the given values, and defaults for those left open.
     pub scene: Scene,
     /// The mapping between intensity and grey.
     pub scale: GreyScale,

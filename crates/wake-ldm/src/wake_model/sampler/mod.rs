@@ -30,7 +30,7 @@ use wake_nn::{check_finite, check_range};
 /// Steps from noise to image, unless others are asked for.
 const STEPS: usize = 3;
 
-/// What the model is told about a scene.
+/// Inputs that describe a scene to the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PromptMode {
     /// The numbers that [`wake_text`] reads from the words; where it leaves numbers or words of the field unread, also those
@@ -45,7 +45,7 @@ pub enum PromptMode {
 
 /// Draws radar images of ship wakes.
 ///
-/// What is told becomes one scene, which the result keeps: image, labels and speckle all follow from it, and
+/// Prompt and values become one scene, which the result keeps: image, labels and speckle all follow from it, and
 /// [`sample_scenes`](Self::sample_scenes) of it draws the same image again. Its seed is the image's seed.
 ///
 /// Images are grey in the mapping that the model was trained with, [`WakeModelConfig::grey`], free of speckle as the model makes them.
@@ -104,7 +104,7 @@ impl WakeSampler {
         }
     }
 
-    /// The same sampler with a sea that was learnt from real images, in the place of the model's own sea and of speckle.
+    /// The same sampler with a sea learnt from real images, instead of the model's own sea and of speckle.
     ///
     /// The image is then the one that physics expects of the scene, times a learnt sea of mean 1 with its speckle, and
     /// the echoes of the ships on it, see [`SeaTexture::image`]. Of the model the parser of prompts is used alone; steps

@@ -84,7 +84,7 @@ impl SeaFlow {
         }
     }
 
-    /// What shapes it, as a run notes it.
+    /// Its shape, as a run notes it.
     pub fn shape() -> Value {
         json!({"sea": {"fold": FOLD, "widths": WIDTHS, "features": FEATURES}})
     }

@@ -125,7 +125,7 @@ impl SeaStyle {
         self.correlation.values()
     }
 
-    /// What the flow is told: every number near 0, of order 1.
+    /// Conditions of the flow: numbers of mean about 0 and of order 1.
     pub fn features(&self) -> [f32; FEATURES] {
         let [_, spread, skewness, ref rest @ ..] = self.numbers;
         let [along @ .., fine, coarse] = rest;

@@ -356,7 +356,7 @@ fn ulps(y: &[f32], x: &[f32], weight: &[f32], g: &Geometry) -> f64 {
 /// Milliseconds on one core and errors, of `cargo test --release -p wake-nn --features autodiff --lib conv::tests::times -- --ignored
 /// --nocapture`.
 #[test]
-#[ignore = "prints the milliseconds of docs/performance.md, wants an idle machine, and has nothing to check"]
+#[ignore = "prints the milliseconds of docs/reports/performance.md, wants an idle machine, and has nothing to check"]
 #[expect(clippy::print_stdout, reason = "what it is for")]
 fn times() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();

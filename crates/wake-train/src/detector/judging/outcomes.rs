@@ -37,13 +37,13 @@ pub struct KnownImages {
 /// Images searched at a time.
 const AT_ONCE: u64 = 16;
 
-/// What a detector is told of the distance between the pixels of an image \[m\]; `None` for nothing.
+/// Pixel spacing given to the detector \[m\]; `None`: unknown.
 pub type Spacing<'a> = dyn Fn(&Scene) -> Option<f32> + Sync + 'a;
 
 impl KnownImages {
     /// Searches the first `count` images of a source, all of them square, once for each of the spacings.
     ///
-    /// - `done`: told the number of images after some of them
+    /// - `done`: called with the number of images after some of them
     ///
     /// # Errors
     ///
@@ -79,7 +79,7 @@ impl KnownImages {
         Ok(all)
     }
 
-    /// What the detections of all images turned out to be; those that fit an ignored label best are left out.
+    /// Outcomes of the detections of all images; those that fit an ignored label best are left out.
     #[must_use]
     pub fn outcomes(&self) -> Vec<DetectionOutcome> {
         outcomes(&self.judged, &self.found)
@@ -112,7 +112,7 @@ fn judged(sample: &Sample) -> Judged {
     }
 }
 
-/// What the detections of some images turned out to be; those that fit an ignored label best are left out.
+/// Outcomes of the detections of some images; those that fit an ignored label best are left out.
 #[must_use]
 pub fn outcomes(images: &[Judged], found: &[Vec<Detection>]) -> Vec<DetectionOutcome> {
     let either_way = |(image, found): (&Judged, &Vec<Detection>)| {

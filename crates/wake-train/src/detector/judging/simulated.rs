@@ -41,14 +41,14 @@ pub struct Searched {
     pub wakes: Vec<Vec<Wake>>,
     /// The scene of each image.
     pub scenes: Vec<Scene>,
-    /// What the first finder takes for an image while no other works \[s\].
+    /// Seconds per image of the first finder, working alone.
     pub seconds: f64,
 }
 
 impl Searched {
     /// Searches the first `count` images of a source, all of them square.
     ///
-    /// - `done`: told each image with its wakes and what each finder has found, in order
+    /// - `done`: called with each image, its wakes and what each finder has found, in order
     ///
     /// # Errors
     ///

@@ -10,7 +10,7 @@ const RIDGE: f64 = 0.1;
 /// Standard errors on each side of the interval: 95 of 100 normal numbers.
 const STANDARD_ERRORS: f64 = 1.96;
 
-/// How often a linear discriminant of a group of features is right.
+/// Accuracy of a linear discriminant of a group of features.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GroupAccuracy {
     /// Name of the group, or "all".

@@ -1,4 +1,4 @@
-//! The kinds of sea that stand against a real one.
+//! Kinds of sea that are compared with a real one.
 
 use rayon::prelude::*;
 use wake_physics::measure::{median, texture};

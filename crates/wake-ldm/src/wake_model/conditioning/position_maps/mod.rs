@@ -31,11 +31,11 @@ struct Frame {
     half_length: f64,
     /// How far the wedge reaches astern where it is 1 m wide on one side \[m\].
     slope: f64,
-    /// What lengths are divided by: pixels are told as if they were of 4 m.
+    /// Divisor of lengths: pixels count as if they had 4 m.
     scale: f64,
 }
 
-/// Where some latent pixels lie in the frame of the ship in whose wedge they lie deepest; all zero where no ship moves.
+/// Places of latent pixels in the frame of the ship in whose wedge they lie deepest; all zero where no ship moves.
 ///
 /// Distances along and across the track, in the image's axes and from the ship, in the wedge of the bow's waves or not, how
 /// far from its edge, and a band behind the stern. The wedge opens as the wake does at this speed and depth.

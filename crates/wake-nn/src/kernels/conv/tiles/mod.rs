@@ -1,4 +1,4 @@
-//! Convolutions with kernels of 3 × 3 by tiles of 2 × 2 pixels, with four products a pixel in the place of nine, and their gradients
+//! Convolutions with kernels of 3 × 3 by tiles of 2 × 2 pixels, with four products a pixel instead of nine, and their gradients
 //! to the weights by the same places.
 //!
 //! ```text

@@ -1,0 +1,73 @@
+//! Average precision by what a network was trained on.
+
+use std::path::Path;
+
+use plotters::prelude::*;
+
+use crate::exit::Outcome;
+
+/// On simulated and on real images.
+const COLOURS: [RGBColor; 2] = [RGBColor(31, 119, 180), RGBColor(214, 39, 40)];
+const NAMES: [&str; 2] = ["simulated wakes above 1 dB", "real tiles, clear wakes"];
+
+/// A line for each training with its average precision on simulated and on real images.
+pub(crate) fn transfer(path: &Path, trainings: &[(String, [f64; 2])]) -> Outcome<()> {
+    let area = SVGBackend::new(path, (760, 120 + 28 * trainings.len() as u32)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let lines = (0..trainings.len() as i32).into_segmented();
+    let mut chart = ChartBuilder::on(&area)
+        .margin(16)
+        .x_label_area_size(44)
+        .y_label_area_size(96)
+        .build_cartesian_2d(0.0..1.0, lines)?;
+    let name = |line: &SegmentValue<i32>| match line {
+        SegmentValue::CenterOf(n) => trainings
+            .get(usize::try_from(*n).unwrap_or(usize::MAX))
+            .map_or_else(String::new, |(name, _)| name.clone()),
+        _ => String::new(),
+    };
+    chart
+        .configure_mesh()
+        .y_labels(trainings.len())
+        .y_label_formatter(&name)
+        .x_desc("average precision")
+        .draw()?;
+    for (kind, colour) in COLOURS.into_iter().enumerate() {
+        let dots = trainings.iter().zip(0..).map(|((_, precision), n)| {
+            let place = (precision[kind], SegmentValue::CenterOf(n));
+            Circle::new(place, 5, colour.filled())
+        });
+        chart
+            .draw_series(dots)?
+            .label(NAMES[kind])
+            .legend(move |(x, y)| Circle::new((x + 9, y), 5, colour.filled()));
+    }
+    chart
+        .configure_series_labels()
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK)
+        .position(SeriesLabelPosition::LowerRight)
+        .draw()?;
+    area.present()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_training_has_its_line_and_two_dots() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("transfer.svg");
+        let trainings = [("first", [0.2, 0.9]), ("second", [0.5, 0.4]), ("third", [1.0, 0.0])];
+        let trainings = trainings.map(|(name, dots)| (name.to_owned(), dots));
+        transfer(&path, &trainings).unwrap();
+        let drawn = std::fs::read_to_string(&path).unwrap();
+        for (name, _) in &trainings {
+            assert!(drawn.contains(name.as_str()), "{name}");
+        }
+        // Two of each training, and two of the legend.
+        assert_eq!(drawn.matches("<circle").count(), 2 * 3 + 2);
+    }
+}

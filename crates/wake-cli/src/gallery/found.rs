@@ -1,0 +1,50 @@
+//! What the detector finds among several ships and look-alikes.
+
+use wake_detector::{Detector, GreyImage};
+use wake_nn::device_named;
+use wake_physics::{Scene, simulate};
+
+use super::panel::{FOUND, SIDE, marked, set_in};
+use crate::exit::Outcome;
+use crate::sheet::Picture;
+
+/// Scene of three ships under way, one at rest, and slicks.
+const SCENE: &str = "assets/scenes/four_ships.toml";
+/// Pixels of the scene's image for one of the panel.
+const REDUCED: usize = 2;
+
+/// The image with sure detections and their probabilities, and a small copy of it without them.
+pub(crate) fn panel() -> Outcome<Picture> {
+    let scene = Scene::read(SCENE.as_ref())?;
+    let simulation = simulate(&scene)?;
+    let side = SIDE * REDUCED;
+    let levels = simulation.levels(&simulation.quick_look());
+    let image = GreyImage::eight_bits(side, side, levels.clone())?;
+    let spacing = scene.grid.spacing;
+    let detector = Detector::pretrained(&device_named("flex")?)?.with_spacing(spacing as f32)?;
+    let mut picture = marked(&means(&levels, side), spacing * REDUCED as f64);
+    for one in detector.find(&image).iter().filter(|one| one.sure) {
+        let corners = one.wake.oriented_box();
+        let corners = corners.map(|corner| corner.map(|v| f64::from(v) / REDUCED as f64));
+        picture.draw_outline(&corners, FOUND);
+        let top = corners.iter().map(|c| c[1]).fold(f64::MAX, f64::min);
+        let left = corners.iter().map(|c| c[0]).fold(f64::MAX, f64::min);
+        if let Some(probability) = one.probability {
+            let [top, left] = [top - 8.0, left - 30.0].map(|v| v.max(0.0) as usize);
+            picture.write_text(&format!("{probability:.2}"), top, left);
+        }
+    }
+    set_in(&mut picture, &Picture::reduced(&levels, side, SIDE / 3));
+    Ok(picture)
+}
+
+/// Means of the levels over squares.
+fn means(levels: &[u8], side: usize) -> Vec<u8> {
+    let square = |n: usize| {
+        let first = n / SIDE * REDUCED * side + n % SIDE * REDUCED;
+        let lines = (0..REDUCED).flat_map(|line| &levels[first + line * side..][..REDUCED]);
+        let sum: usize = lines.map(|&level| usize::from(level)).sum();
+        (sum / (REDUCED * REDUCED)) as u8
+    };
+    (0..SIDE * SIDE).map(square).collect()
+}
