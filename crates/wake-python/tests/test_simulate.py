@@ -180,4 +180,4 @@ def test_calls_leave_the_interpreter_to_others(scene: Scene) -> None:
 
 
 def test_the_version_is_that_of_the_crates() -> None:
-    assert shipwake.__version__ == "0.1.0"
+    assert shipwake.__version__ == "0.2.0"
