@@ -259,7 +259,7 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
 #[test]
 fn a_reader_learns_to_tell_prompts_apart() {
     let prompts = Prompts::new(Simulated::new(Recipe::default(), 3).unwrap());
-    let ids = (0..8).flat_map(|i| wake_ldm::conditioning::tokens(&prompts.prompt(i).unwrap().0));
+    let ids = (0..8).flat_map(|i| tokens(&prompts.prompt(i).unwrap().0));
     let vocabulary = Vocabulary::new(ids);
     let config = WakeModelConfig {
         vocabulary: vocabulary.known().to_vec(),

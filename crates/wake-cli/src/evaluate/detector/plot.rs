@@ -60,7 +60,11 @@ mod tests {
     fn every_training_has_its_line_and_two_dots() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("transfer.svg");
-        let trainings = [("first", [0.2, 0.9]), ("second", [0.5, 0.4]), ("third", [1.0, 0.0])];
+        let trainings = [
+            ("first", [0.2, 0.9]),
+            ("second", [0.5, 0.4]),
+            ("third", [1.0, 0.0]),
+        ];
         let trainings = trainings.map(|(name, dots)| (name.to_owned(), dots));
         transfer(&path, &trainings).unwrap();
         let drawn = std::fs::read_to_string(&path).unwrap();
