@@ -77,7 +77,7 @@ fn labels_of_real_images() {
     attack("labels", |input| {
         with_file(folder.path(), "labels.json", input, |_| {
             for tile in said(Tile::read_all(folder.path())).unwrap_or_default() {
-                tile.wakes();
+                let _ = tile.wakes();
             }
         });
     });
