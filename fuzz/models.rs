@@ -15,7 +15,10 @@ use crate::attack::{attack, said, with_file};
 /// A file with a part overwritten by the input, whose first two bytes say where.
 fn damaged(file: &[u8], input: &[u8]) -> Vec<u8> {
     let mut file = file.to_vec();
-    let place = input.iter().take(2).fold(0, |n, &b| 256 * n + usize::from(b));
+    let place = input
+        .iter()
+        .take(2)
+        .fold(0, |n, &b| 256 * n + usize::from(b));
     let start = place * file.len() / (1 << 16);
     let bytes = file[start..].iter_mut().zip(input.iter().skip(2));
     bytes.for_each(|(old, new)| *old = *new);

@@ -82,7 +82,7 @@ impl Picture {
     /// # Panics
     ///
     /// If they are not whole rows.
-    #[cfg(any(feature = "bench", test))]
+    #[cfg(test)]
     pub(crate) fn from_rgb(bytes: &[u8], columns: usize) -> Self {
         let (pixels, rest) = bytes.as_chunks::<3>();
         let rows = pixels.len() / columns.max(1);

@@ -79,8 +79,10 @@ const SCENES: [(&str, &[&str], &str); 4] = [
 ];
 /// The generated image: a prompt, and the caption.
 const PROMPT: &str = "a ship at 10 m/s toward 120 degrees, wind 3 m/s toward 60 degrees";
-const GENERATED: &str = "Generated from a sentence by the diffusion model, X band VV, 4 m pixels, wind 3 m/s";
-const FOUND: &str = "Found by the detector, with probabilities: Sentinel-1 IW, wind 4.5 m/s, four ships, slicks";
+const GENERATED: &str =
+    "Generated from a sentence by the diffusion model, X band VV, 4 m pixels, wind 3 m/s";
+const FOUND: &str =
+    "Found by the detector, with probabilities: Sentinel-1 IW, wind 4.5 m/s, four ships, slicks";
 
 /// Writes `gallery.png`, `stages.png`, `sigma0.svg` and `wake.gif`.
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {

@@ -67,10 +67,7 @@ fn table(
                 _ => write!(row, " {share:.2} of {all} |"),
             };
             if all > 0 {
-                let _ = writeln!(
-                    recall.csv,
-                    "{images},{by},{column},{name},{share:.2},{all}"
-                );
+                let _ = writeln!(recall.csv, "{images},{by},{column},{name},{share:.2},{all}");
             }
         }
         if number < SHOWN {

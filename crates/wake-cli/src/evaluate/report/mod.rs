@@ -23,7 +23,10 @@ fn markdown(report: &Report) -> String {
         images::ablation(report),
         images::pixels(report),
         images::wake(report),
-        values::measurements("Values measured in the images", &report.figures.measurements),
+        values::measurements(
+            "Values measured in the images",
+            &report.figures.measurements,
+        ),
         values::conditions(report),
         values::controllability(report),
         images::schedulers(report),

@@ -37,8 +37,7 @@ pub(super) fn conditions(report: &Report) -> String {
         return String::new();
     }
     let mut text =
-        "## Conditions\n\nMedian absolute error (share measurable).\n\n| value |"
-            .to_owned();
+        "## Conditions\n\nMedian absolute error (share measurable).\n\n| value |".to_owned();
     for condition in &report.figures.conditions {
         text += &format!(" {} |", condition.told);
     }
