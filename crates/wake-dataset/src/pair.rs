@@ -134,9 +134,8 @@ mod tests {
         );
         for index in 0..6 {
             let pair = source.pair(index).unwrap();
-            // Two pixels along the geometric mean of 20.3 and 18.4 m.
-            let spacing = (20.3_f64 * 18.4).sqrt() / 2.0;
-            assert!((pair.scene.grid.spacing - spacing).abs() < 1e-9);
+            // Two pixels along the geometric mean of 20.3 and 18.4 m, to the centimetre.
+            assert!((pair.scene.grid.spacing - 9.66).abs() < 1e-9);
             assert_eq!(pair.scene, plain.scene(index).unwrap());
             let (image, other) = (&pair.image, plain.pair(index).unwrap().image);
             assert_eq!((image.rows, image.columns), (72, 61));
@@ -146,7 +145,7 @@ mod tests {
             let brightest = brightest.unwrap();
             let [column, row] = pair.labels.ships[0].ship.echo_px.unwrap();
             let off = (column - (brightest % 61) as f64).hypot(row - (brightest / 61) as f64);
-            assert!(off < 60.0 / spacing + 3.0, "{index}: {off}");
+            assert!(off < 60.0 / 9.66 + 3.0, "{index}: {off}");
         }
     }
 

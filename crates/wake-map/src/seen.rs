@@ -27,6 +27,10 @@ const ASTERN: f32 = 600.0;
 const OFF: f32 = 12.0;
 const SPREAD: f32 = 0.03;
 const TURNED: f32 = 8.0;
+/// A line without an echo that ends this close to the tip of a surer wake leads to that ship, not from another one \[pixels\], if its axis
+/// differs by less \[degrees\]: arms seen together with what lies ahead of the bow.
+const AT_TIP: f32 = 25.0;
+const AHEAD: f32 = 15.0;
 
 impl Seen {
     pub(crate) fn of(product: &Product, one: &Detection) -> Self {
@@ -58,9 +62,12 @@ impl Seen {
                 let [right, down] = self.wake.direction();
                 let [x, y] = [0, 1].map(|k| other.wake.tip[k] - self.wake.tip[k]);
                 let (along, across) = (x * right + y * down, y * right - x * down);
-                (0.0..ASTERN).contains(&along)
+                let astern = (0.0..ASTERN).contains(&along)
                     && across.abs() < OFF + SPREAD * along
-                    && turn.abs() < TURNED
+                    && turn.abs() < TURNED;
+                let end = other.wake.at(other.wake.length);
+                let from_tip = (end[0] - self.wake.tip[0]).hypot(end[1] - self.wake.tip[1]);
+                astern || (from_tip < AT_TIP && turn.abs() < AHEAD)
             }
         }
     }
@@ -139,14 +146,15 @@ mod tests {
         }
     }
 
-    /// A wake to the right from (500, 500): a detection of its later part makes it longer, one that leads to its echo goes; a wake
-    /// beside it, one across it, and one with an echo of its own are of other ships.
+    /// A wake to the right from (500, 500): a detection of its later part makes it longer, one that leads to its echo and one
+    /// that ends at its tip go; a wake beside it, one across it, and one with an echo of its own are of other ships.
     #[test]
     fn a_ship_has_one_wake() {
         let echo = Some([505.0, 560.0]);
         let first = seen(0.9, [500.0, 500.0], 90.0, echo);
         let later = seen(0.5, [760.0, 512.0], 93.0, None);
         let again = seen(0.4, [510.0, 503.0], 78.0, Some([506.0, 558.0]));
+        let ahead = seen(0.35, [402.0, 505.0], 95.0, None);
         let others = [
             seen(0.8, [760.0, 560.0], 90.0, None),
             seen(0.7, [700.0, 500.0], 120.0, None),
@@ -154,7 +162,7 @@ mod tests {
             seen(0.3, [510.0, 503.0], 200.0, echo),
             seen(0.2, [440.0, 500.0], 90.0, None),
         ];
-        let mut all = vec![first, later, again];
+        let mut all = vec![first, later, again, ahead];
         all.extend(others);
         all.sort_by(|a, b| b.detection.score.total_cmp(&a.detection.score));
         let kept = one_a_ship(all);
