@@ -9,7 +9,8 @@ use wake_physics::scene::Sensor;
 use wake_train::detector::ImageRecipe;
 use wake_train::detector::judging::Searched;
 
-use super::report::FALSE_ALARMS;
+/// False alarms per image at which recall is reported.
+pub(crate) const FALSE_ALARMS: f64 = 0.5;
 
 /// Bounds of the visibility of wakes that are counted together \[dB\]: contrast of simulated ones, signal over noise of
 /// painted ones.

@@ -8,12 +8,9 @@ use serde_json::{Value, json};
 use wake_detector::score::{Curve, Judged, Rule};
 use whole_files::write_atomically;
 
-use super::recall::Recall;
+use super::recall::{FALSE_ALARMS, Recall};
 use super::{plot, real_sea};
 use crate::exit::Outcome;
-
-/// False alarms per image at which recall is reported.
-pub(crate) const FALSE_ALARMS: f64 = 0.5;
 
 /// One row a finder and set of images.
 #[derive(Default)]
