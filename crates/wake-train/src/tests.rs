@@ -294,8 +294,8 @@ fn a_reader_learns_to_tell_prompts_apart() {
             .map(|(a, b)| f64::from(a - b).powi(2));
         squares.sum::<f64>() / read.len() as f64
     };
-    // 64 prompts of 21 numbers: a ratio of two such means is known to a few per cent.
-    assert!(error(0) < 0.8 * error(1), "{} {}", error(0), error(1));
+    // 64 prompts of 21 numbers: the ratio is 1 to about 3 % for a blind parser, and three times that is no chance.
+    assert!(error(0) < 0.9 * error(1), "{} {}", error(0), error(1));
 }
 
 #[test]
