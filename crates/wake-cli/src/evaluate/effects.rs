@@ -1,4 +1,4 @@
-//! What single values of a scene do to its image: three values of heading, wind speed and incidence each, simulated and
+//! Effects of single values of a scene on its image: three values of heading, wind speed and incidence each, simulated and
 //! drawn by a model.
 
 use crate::exit::Outcome;

@@ -1,4 +1,4 @@
-//! What is evaluated, and its report.
+//! Evaluated images, and their report.
 
 use super::report::{PAPER, Report};
 use super::{ablation, plot, timing};

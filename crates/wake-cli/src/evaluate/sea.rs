@@ -1,4 +1,4 @@
-//! How like the sea of real images simulated, learnt and Gaussian seas are.
+//! Similarity of simulated, learnt and Gaussian seas to the sea of real images.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! What `wake evaluate calibration` writes.
+//! Report of `wake evaluate calibration`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

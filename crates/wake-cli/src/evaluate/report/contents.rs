@@ -1,4 +1,4 @@
-//! What `report.json` holds.
+//! Contents of `report.json`.
 
 use crate::evaluate::schedulers::SchedulerRow;
 use crate::evaluate::timing::TimingRow;
@@ -21,7 +21,7 @@ pub(crate) struct Report {
     pub(crate) paper: Paper,
 }
 
-/// What the paper reports of its model.
+/// Figures that the paper states for its model.
 #[derive(Debug, Serialize)]
 pub(crate) struct Paper {
     pub(crate) ssim: f64,
