@@ -14,6 +14,8 @@ mod sheet;
 mod simulate;
 
 #[cfg(feature = "prompt")]
+mod estimate;
+#[cfg(feature = "prompt")]
 mod prompt;
 
 #[cfg(feature = "dataset")]
@@ -76,6 +78,8 @@ enum Command {
     Locate(locate::Arguments),
     #[cfg(feature = "train")]
     Evaluate(evaluate::Arguments),
+    #[cfg(feature = "prompt")]
+    Estimate(estimate::Arguments),
     #[cfg(feature = "export")]
     Export(export::Arguments),
     #[cfg(feature = "bench")]
@@ -105,6 +109,8 @@ fn main() -> ExitCode {
         Command::Locate(arguments) => locate::run(&arguments),
         #[cfg(feature = "train")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        #[cfg(feature = "prompt")]
+        Command::Estimate(arguments) => estimate::run(&arguments),
         #[cfg(feature = "export")]
         Command::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "bench")]

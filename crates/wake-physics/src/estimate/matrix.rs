@@ -29,7 +29,6 @@ impl Matrix {
         self
     }
 
-    #[cfg(test)]
     pub(super) fn times(&self, other: &Self) -> Self {
         let mut out = Self::zero(self.size);
         for i in 0..self.size {
@@ -84,7 +83,6 @@ impl Matrix {
         Some(out)
     }
 
-    #[cfg(test)]
     pub(super) fn product(&self, vector: &[f64]) -> Vec<f64> {
         let row = |i: usize| (0..self.size).map(|j| self.at(i, j) * vector[j]).sum();
         (0..self.size).map(row).collect()
