@@ -20,7 +20,7 @@ const SIDE: usize = 512;
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let mut known = match &arguments.scene {
         Some(file) => Scene::read(file)?,
-        None => Scene::default(),
+        None => example(),
     }
     .with_assignments(&arguments.set)?;
     let mut options = Options::default();
@@ -41,6 +41,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         }
         None => simulate(&known)?.speckled,
     };
+    let truth = arguments.image.is_none().then(|| words::of_scene(&known));
     options.detection = detection(arguments, &known);
     // Images of the calibration have another sea than the image of the example.
     known.seed = known.seed.wrapping_add(1);
@@ -63,9 +64,17 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         exit::say(&format!("{json:#}"))?;
     } else {
         let text = words::as_text(&found, sentence.as_deref());
-        exit::say(&format!("{text}\nwritten to {}", out.display()))?;
+        let truth = truth.map_or_else(String::new, |truth| format!("{truth}\n"));
+        exit::say(&format!("{truth}{text}\nwritten to {}", out.display()))?;
     }
     Ok(())
+}
+
+/// The default scene on 256 × 256 pixels of 4 m.
+fn example() -> Scene {
+    let mut scene = Scene::default();
+    (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (256, 256, 4.0);
+    scene
 }
 
 fn print_bound(scene: &Scene, priors: &Priors, json: bool) -> Outcome<()> {

@@ -1,6 +1,7 @@
 //! An estimate in words and as JSON.
 
 use serde_json::{Value, json};
+use wake_physics::Scene;
 use wake_physics::estimate::{Bound, Estimate, Fitted, Wake};
 
 /// The estimate as JSON, with the prompt that describes its scene.
@@ -36,6 +37,23 @@ fn of_wake(wake: &Wake, sentence: Option<&str>) -> Value {
         "goodness_of_fit": wake.goodness_of_fit,
         "sentence": sentence,
     })
+}
+
+/// The values of a simulated scene that are estimated.
+pub(crate) fn of_scene(scene: &Scene) -> String {
+    let sea = &scene.sea;
+    let ships = scene.ships.iter().map(|ship| {
+        format!(
+            "heading {:.1} deg, speed {:.2} m/s, midship {:.1}, {:.1} m, length {:.0} m, ",
+            ship.heading, ship.speed, ship.position[0], ship.position[1], ship.length
+        )
+    });
+    format!(
+        "simulated     {}wind {:.2} m/s toward {:.1} deg",
+        ships.collect::<String>(),
+        sea.wind_speed,
+        sea.wind_toward
+    )
 }
 
 /// The estimate in a few lines.

@@ -119,3 +119,60 @@ fn drawn(
     field.values.iter_mut().for_each(|v| *v *= gain);
     Ok(field)
 }
+
+#[cfg(test)]
+#[allow(clippy::print_stdout, reason = "what was measured is printed")]
+mod tests {
+    use super::*;
+    use crate::estimate::observed::Observed;
+    use crate::estimate::parameter::Parameter;
+    use crate::estimate::scorer::{SeaNoise, mean};
+    use crate::scene::Scene;
+
+    /// Scores of other images of the scene have the mean and the variance of the calibration: 9 correlated scores of 10 images, whose
+    /// mean square is that of Student's t of 15 degrees, 1.15, within some 0.4.
+    #[test]
+    fn scores_of_other_images_are_those_of_the_calibration() {
+        let keys = [
+            "grid.rows=96",
+            "grid.columns=96",
+            "grid.spacing=4",
+            "radar.incidence=20",
+            "sea.wind_speed=6.5",
+            "ship.heading=60",
+        ];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        let state = State::of(scene.clone());
+        let parameters = &Parameter::OF_WAKE;
+        let mut simulator = Simulator::default();
+        let expected = mean(&mut simulator, &state).unwrap();
+        let view = Observed::new(expected.clone(), &scene, |_, _| 1.0);
+        let noise = SeaNoise::new(&state, parameters).unwrap();
+        let scorer = Scorer::new(&view, (&state, expected), (parameters, &noise)).unwrap();
+        let count = 16;
+        let calibration = Calibration::new(&scorer, &state, (3, count)).unwrap();
+        let (mut square, mut plain, images) = (0.0, 0.0, 10);
+        for seed in 0..images {
+            let mut other = scene.clone();
+            other.seed = 900 + seed;
+            let image = simulator.image(&other).unwrap().speckled();
+            let told = scorer.of(&image);
+            for (n, score) in told.score.iter().enumerate() {
+                let variance = calibration.variance.at(n, n) * (1.0 + 1.0 / count as f64);
+                square += (score - calibration.mean[n]).powi(2) / variance;
+                plain += score.powi(2) / variance;
+            }
+        }
+        let number = (images as usize * parameters.len()) as f64;
+        println!(
+            "{:.2}, without the mean {:.2}",
+            square / number,
+            plain / number
+        );
+        assert!(
+            (0.5..2.2).contains(&(square / number)),
+            "{}",
+            square / number
+        );
+    }
+}

@@ -4,8 +4,10 @@
 //! and the likelihood ratio of a wake of the best strength are two Fourier sums,
 //!
 //! ```text
-//! a(p) = Σ_x r̃(x) T̃(x − p),     e(p) = Σ_x w²(x) T̃²(x − p),     ln Λ = max_s (s a − s² e/2),   s within STRENGTHS
+//! a(p) = Σ_x r̃(x) T̃(x − p),     e(p) = Σ_x w²(x) T̃²(x − p),     ln Λ = max_s (s a − s² e/2)
 //! ```
+//!
+//! with strengths s from 0.4 to 2.5 of the wake of the filter's ship.
 
 use super::noise::{Noise, Taper};
 use super::observed::Observed;
@@ -391,4 +393,51 @@ fn apart(mut found: Vec<Candidate>, count: usize, turn: f64) -> Vec<Candidate> {
         }
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::expected_intensity;
+
+    /// The answer to a mean image is largest where its ship is, and that of the opposite heading is less.
+    #[test]
+    fn a_filter_finds_the_place_of_a_ship() {
+        let keys = [
+            "grid.rows=64",
+            "grid.columns=64",
+            "grid.spacing=8",
+            "grid.oversampling=1",
+            "ship.heading=60",
+            "ship.speed=9",
+            "ship.position=[48, -32]",
+        ];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        let part = Part::whole(&expected_intensity(&scene).unwrap(), &scene);
+        let bank = Bank::new(&part).unwrap();
+        let near = ([0.0; 2], 100.0);
+        let found = bank.answers(&[[9.0, 60.0], [9.0, 240.0]], near).unwrap();
+        let [x, y] = found[0].position;
+        assert!((x - 48.0).hypot(y + 32.0) < 8.0, "{found:?}");
+        assert!(found[0].score > 3.0 * found[1].score.max(1.0), "{found:?}");
+    }
+
+    /// Of neighbours the better one stays.
+    #[test]
+    fn ships_apart_are_no_neighbours() {
+        let ship = |speed: f64, heading: f64, score: f64| Candidate {
+            speed,
+            heading,
+            position: [0.0; 2],
+            score,
+        };
+        let all = vec![
+            ship(8.0, 1.0, 1.0),
+            ship(8.1, 359.0, 3.0),
+            ship(8.0, 180.0, 2.0),
+        ];
+        let kept = apart(all, 3, 4.0);
+        let headings: Vec<f64> = kept.iter().map(|k| k.heading).collect();
+        assert_eq!(headings, [359.0, 180.0]);
+    }
 }

@@ -67,7 +67,10 @@ fn a_simulated_wake_is_found_again() {
         (wake.position[1], ship.position[1], 30.0),
     ] {
         assert!(found.deviation < least, "{found:?} {truth}");
-        assert!((found.value - truth).abs() < 5.0 * found.deviation, "{found:?} {truth}");
+        assert!(
+            (found.value - truth).abs() < 5.0 * found.deviation,
+            "{found:?} {truth}"
+        );
     }
     assert_eq!(wake.covariance.len(), wake.names.len().pow(2));
 }
