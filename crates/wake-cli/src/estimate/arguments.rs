@@ -9,6 +9,7 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
+                  Experimental: the coverage of the error bars is not yet measured (docs/reports/estimate.md)\n\
                   Values, error bars and limits: docs/estimate.md"
 )]
 pub(crate) struct Arguments {

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! [`expected_with_derivatives`] is the mean image of a scene with its derivatives, [`Likelihood`] reads an image with it, and
-//! [`bound`] says how well any estimator can know ship and wind.
+//! [`bound`] says how well any estimator can know ship and wind. [`estimate`] reads ship and wind from one image.
 
 mod answer;
 mod bound;

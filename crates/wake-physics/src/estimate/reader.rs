@@ -71,6 +71,11 @@ const OF_SEA: [Parameter; 4] = [
 /// - `known`: grid and radar of the image, fetch, depth and the ship's proportions; its values that are estimated do not
 ///   matter, only the length is a start
 ///
+/// # Validity
+///
+/// A sea that is the same everywhere, one ship that goes straight. The coverage of the standard deviations has not been measured on
+/// a set of scenes.
+///
 /// # Errors
 ///
 /// A scene out of range, without a ship, without wind or with a ship that turns, an image of another size than the grid, or one
