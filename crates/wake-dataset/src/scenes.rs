@@ -655,7 +655,7 @@ mod tests {
             assert_eq!(radar, other.radar);
             assert_eq!(scene.ships.len(), other.ships.len());
             let gain = source.quick_look(index).unwrap()[0];
-            assert!((0.17..=0.48).contains(&gain));
+            assert!((0.15..=0.4).contains(&gain));
             let cell = |scene: &Scene| {
                 let range = scene.radar.range_resolution.unwrap();
                 (range * scene.radar.azimuth_resolution).sqrt() / scene.grid.spacing
@@ -669,7 +669,7 @@ mod tests {
             assert!(
                 ships().all(|ship| ship.recovery == Recovery::Wind && ship.steepness.is_some())
             );
-            let points = |ship: &Ship| ship.scatterers.is_some_and(|n| (60..=200).contains(&n));
+            let points = |ship: &Ship| ship.scatterers.is_some_and(|n| (200..=600).contains(&n));
             assert!(ships().all(|ship| points(ship) && ship.halo.is_some()));
             assert!(scene.radar.paired_echoes.is_some());
             turning += usize::from(ships().any(|ship| ship.turn_rate != 0.0));
