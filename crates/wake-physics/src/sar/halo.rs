@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The hull's second moments are L²/12 along and B²/12 across the heading, ρ is the resolution of each axis. The integral over the
-//! plane is the cross section σ_h, and the share inside the contour rᵀ M⁻¹ r = q² is 1 − (1 + q²)^{−1/2}.
+//! plane is the cross section `σ_h`, and the share inside the contour rᵀ M⁻¹ r = q² is 1 − (1 + q²)^{−1/2}.
 //!
 //! Such power comes by way of the sea and off the ship twice, from spray and white water about the hull, and from what a processor
 //! leaves out of focus. Its form is chosen: the power law of the far sidelobes, r^{−3} over the area as 1/x² along a line, continued

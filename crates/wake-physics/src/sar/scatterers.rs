@@ -3,11 +3,11 @@
 //! ```text
 //! 10 log₁₀ σ = 10 log₁₀(0.08 L^{7/3}) − 3 dB ± 3 dB
 //! y_image    = y + (R/V) (v + a t)                    v, a toward the radar; t over one aperture, −T/2 to T/2
+//! var y      = (R/V)² (σ_v² + σ_a² T²/12)             in addition to the hull's;   σ_a = 2π σ_v/P
 //! ```
 //!
-//! Roll and pitch move the points: a standard deviation σ_v of v displaces them by (R/V) σ_v. A ship that rolls with the period P has
-//! accelerations of σ_a = 2π σ_v/P, and a point spreads over (R/V) a T while the aperture lasts: the echo is defocused. Its variance
-//! in azimuth is (R/V)² (σ_v² + σ_a² T²/12) more than that of the hull.
+//! Roll and pitch of the period P displace the points by their velocities, of standard deviation `σ_v`, and spread each over (R/V) a T
+//! while the aperture lasts: the echo is defocused.
 //!
 //! The points are the same whether an impulse response images them or not.
 
