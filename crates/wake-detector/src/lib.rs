@@ -15,7 +15,6 @@ pub mod self_check;
 
 pub mod calibration;
 
-mod extent;
 mod maps;
 mod missing;
 mod search;
