@@ -293,7 +293,7 @@ mod tests {
     }
 
     /// Velocity and acceleration of a defocused ship of 200 points: variance of the azimuth, weighted with power, is
-    /// (R/V)² (σ_v² + σ_a² T²/12) more than the variance of the hull, 14²/3 across the heading. The cross section stays the same.
+    /// `(R/V)² (σ_v² + σ_a² T²/12)` more than the variance of the hull, 14²/3 across the heading. The cross section stays the same.
     #[test]
     fn a_rolling_ship_is_defocused() {
         let rolling = ShipEcho {

@@ -672,6 +672,7 @@ mod tests {
     /// What one fixed rule for means over slopes, and one fixed spacing of the table, would cost: figures of decision 32.
     #[test]
     #[ignore = "a report of times and errors: --ignored --nocapture"]
+    #[allow(clippy::print_stdout, reason = "figures are what it is for")]
     fn report_of_fixed_rules() {
         const TOLERANCE: f64 = 1e-2;
         let [mut x, mut y] = slopes(200);
