@@ -98,3 +98,48 @@ mod native {
         }
     }
 }
+
+#[cfg(all(test, feature = "flex", feature = "autodiff"))]
+mod tests {
+    use super::*;
+    use burn::nn::LinearConfig;
+    use burn::tensor::{Device, Distribution};
+
+    /// Results and all gradients of a layer large enough for the kernels, with and without bias, beside burn's.
+    #[test]
+    fn large_layers_are_those_of_burn() {
+        let device = Device::flex().autodiff();
+        for bias in [true, false] {
+            let layer = LinearConfig::new(512, 300).with_bias(bias).init(&device);
+            let normal = Distribution::Normal(0.0, 1.0);
+            let x = Tensor::<3>::random([2, 40, 512], normal, &device);
+            let seen = |apply: &dyn Fn(Tensor<3>) -> Tensor<3>| -> Vec<Vec<f32>> {
+                let x = x.clone().require_grad();
+                let y = apply(x.clone());
+                // The gradient of the result is the result: unlike everywhere.
+                let gradients = y.clone().square().sum().mul_scalar(0.5).backward();
+                let mut all = vec![
+                    y.into_data(),
+                    x.grad(&gradients).unwrap().into_data(),
+                    layer.weight.val().grad(&gradients).unwrap().into_data(),
+                ];
+                let bias = layer.bias.as_ref();
+                all.extend(bias.map(|bias| bias.val().grad(&gradients).unwrap().into_data()));
+                let numbers = all.into_iter().map(|data| data.iter::<f32>().collect());
+                numbers.collect()
+            };
+            let (ours, burns) = (
+                seen(&|x| native::linear(&layer, &x).unwrap()),
+                seen(&|x| layer.forward(x)),
+            );
+            assert_eq!(ours.len(), 3 + usize::from(bias));
+            for (ours, burns) in ours.iter().zip(&burns) {
+                assert_eq!(ours.len(), burns.len());
+                let largest = burns.iter().fold(0f32, |m, v| m.max(v.abs()));
+                // Sums of at most 512 terms in another order, one after the other.
+                let near = |(a, b): (&f32, &f32)| (a - b).abs() < 512.0 * 6e-8 * largest;
+                assert!(ours.iter().zip(burns).all(near), "{bias}");
+            }
+        }
+    }
+}

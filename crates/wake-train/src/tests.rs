@@ -253,8 +253,8 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     let all: Vec<usize> = (0..count).collect();
     let squares = residuals.latents(&all, &Device::flex()).square().mean();
     let variance = squares.into_scalar::<f32>();
-    // A fitted deviation σ has a loss of ½ + ln σ: residuals that nobody divides by it would have the variance σ², and latents without
-    // their mean one of 1/σ². Averaged weights lag behind those of the last steps, by less than a factor of three.
+    // A fitted deviation σ has a loss of ½ + ln σ: undivided residuals would have the variance σ², and divided latents, less no mean,
+    // one of 1/σ². Averaged weights lag behind the last ones.
     let undivided = (2.0 * (late - 0.5)).exp();
     assert!(undivided < 0.01, "{undivided}");
     assert!((0.3..3.0).contains(&variance), "{variance}");

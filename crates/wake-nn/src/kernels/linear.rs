@@ -7,6 +7,7 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::arch::arch;
+use super::product::Rows;
 use super::tile::{self, ROWS};
 
 /// Rows of a block, a multiple of a tile's.
@@ -62,38 +63,42 @@ pub(crate) fn to_bias(gradient: &[f32], to: usize) -> Vec<f32> {
     sums
 }
 
-/// Packs a matrix `[depth, columns]`: `[tile of columns, depth, column]`.
+/// Packs a matrix `[depth, columns]` on all cores: `[tile of columns, depth, column]`.
 fn packed(matrix: &[f32], depth: usize, columns: usize) -> Vec<f32> {
-    let width = arch().dispatch(tile::Width);
-    let mut packed = vec![0.0; columns.div_ceil(width) * depth * width];
-    packed
-        .par_chunks_exact_mut(depth * width)
-        .enumerate()
-        .for_each(|(tile, packed)| {
-            let of_tile = tile * width..columns.min((tile + 1) * width);
-            let rows = matrix.chunks_exact(columns);
-            for (row, packed) in rows.zip(packed.chunks_exact_mut(width)) {
-                packed[..of_tile.len()].copy_from_slice(&row[of_tile.clone()]);
-            }
-        });
-    packed
+    let rows = Rows {
+        values: matrix,
+        step: columns,
+        count: depth,
+    };
+    in_tiles(depth, columns, |tile, width, packed| {
+        rows.pack_tile(tile, columns, width, packed);
+    })
 }
 
-/// Packs the transpose of a matrix `[columns, depth]`.
+/// Packs the transpose of a matrix `[columns, depth]` in the same way.
 fn packed_transposed(matrix: &[f32], columns: usize, depth: usize) -> Vec<f32> {
+    let rows = Rows {
+        values: matrix,
+        step: depth,
+        count: columns,
+    };
+    in_tiles(depth, columns, |tile, width, packed| {
+        rows.pack_tile_transposed(tile, depth, width, packed);
+    })
+}
+
+/// Tiles of columns, each packed by a function of its number and width.
+fn in_tiles(
+    depth: usize,
+    columns: usize,
+    pack: impl Fn(usize, usize, &mut [f32]) + Sync,
+) -> Vec<f32> {
     let width = arch().dispatch(tile::Width);
     let mut packed = vec![0.0; columns.div_ceil(width) * depth * width];
     packed
         .par_chunks_exact_mut(depth * width)
         .enumerate()
-        .for_each(|(tile, packed)| {
-            let rows = matrix.chunks_exact(depth).skip(tile * width).take(width);
-            for (i, row) in rows.enumerate() {
-                for (value, packed) in row.iter().zip(packed.chunks_exact_mut(width)) {
-                    packed[i] = *value;
-                }
-            }
-        });
+        .for_each(|(tile, packed)| pack(tile, width, packed));
     packed
 }
 

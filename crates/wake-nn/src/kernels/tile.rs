@@ -48,7 +48,7 @@ pub(super) fn multiply<S: Simd>(
     for row in [&mut a, &mut b, &mut c, &mut d, &mut e, &mut f] {
         *row = &row[start..start + panel.len()];
     }
-    // A copy that nothing else can see stays in registers.
+    // A local copy stays in registers; through the reference every step would store all sums.
     let mut held = *sums;
     for (k, [left, right]) in panel.iter().enumerate() {
         for (sum, value) in held.iter_mut().zip([a[k], b[k], c[k], d[k], e[k], f[k]]) {

@@ -669,7 +669,7 @@ mod tests {
         }
     }
 
-    /// What one fixed rule for means over slopes, and one fixed spacing of the table, would cost: figures of decision 32.
+    /// Time and error of one fixed rule for all means over slopes, and the spacings of tables: figures of decision 32.
     #[test]
     #[ignore = "a report of times and errors: --ignored --nocapture"]
     #[allow(clippy::print_stdout, reason = "figures are what it is for")]

@@ -17,7 +17,7 @@ fn ship(more: &[&str]) -> Scene {
     small(120, 120, &[&keys[..], more].concat())
 }
 
-/// The keys of the recipe `detector`, in the middle of their ranges.
+/// The keys that make an echo one body, as the recipe `detector` draws them, with fewer points.
 const BODY: [&str; 4] = [
     "ship.scatterers=100",
     "ship.roll_period=12",
