@@ -98,6 +98,19 @@ pub(crate) struct Viewing {
 }
 
 impl ShipEcho {
+    /// Cross section of all points together \[m²\].
+    ///
+    /// - `number` of the ship in its scene, as for [`scatterers`](Self::scatterers)
+    pub(crate) fn cross_section(&self, seed: u64, number: usize) -> f64 {
+        self.drawn_cross_section(&mut generator(seed, Stream::Scatterers, number as u64))
+    }
+
+    /// The cross section by the first number of the ship's stream.
+    fn drawn_cross_section(&self, random: &mut impl Rng) -> f64 {
+        let normal: f64 = StandardNormal.sample(random);
+        median_cross_section(self.length) * 10f64.powf(0.1 * SPREAD_DB * normal)
+    }
+
     /// The points, where they are imaged.
     ///
     /// Places along the deck are even with jitter, shares exponential but for one point that has 0.15 to
@@ -109,8 +122,7 @@ impl ShipEcho {
     pub(crate) fn scatterers(&self, view: &Viewing, seed: u64, number: usize) -> Vec<PointTarget> {
         let mut random = generator(seed, Stream::Scatterers, number as u64);
         let normal = |random: &mut _| -> f64 { StandardNormal.sample(random) };
-        let spread = 10f64.powf(0.1 * SPREAD_DB * normal(&mut random));
-        let total = median_cross_section(self.length) * spread;
+        let total = self.drawn_cross_section(&mut random);
         let count = self.points.map_or(POINTS, |count| count as usize);
         let shares = shares(&mut random, count);
         let [ahead_x, ahead_y] = direction(self.heading);
@@ -313,6 +325,7 @@ mod tests {
             let total =
                 |points: &[PointTarget]| -> f64 { points.iter().map(|p| p.cross_section).sum() };
             let whole = total(&points);
+            assert!((whole / rolling.cross_section(seed, 0) - 1.0).abs() < 1e-9);
             assert!((whole / total(&still.scatterers(&VIEW, seed, 0)) - 1.0).abs() < 1e-9);
             for point in &points {
                 let off = point.position[1] + 40.0 + 460.0;

@@ -96,8 +96,7 @@ pub(super) fn halos(scene: &Scene, models: &Models) -> Vec<Halo> {
     let range = radar.range_resolution.unwrap_or(scene.grid.spacing);
     let of_ship = |(n, ship, echo): (usize, &Ship, ShipEcho)| {
         let ratio = power_ratio(ship.halo?);
-        let points = echo.scatterers(&viewing(scene, models), scene.seed, n);
-        let total: f64 = points.iter().map(|point| point.cross_section).sum();
+        let total = echo.cross_section(scene.seed, n);
         let [x, y] = echo.position;
         let velocity = echo.radial_velocity;
         let [xx, xy, yy] = hull_moments(direction(echo.heading), [echo.length, echo.beam]);
