@@ -39,6 +39,9 @@ def blocks():
         block = ResnetBlock2D(in_channels=channels, temb_channels=4 * channels, groups=32, eps=1e-5).eval()
         x, time_embedding = torch.randn(batch, channels, size, size), torch.randn(batch, 4 * channels)
         measure(f"residual_block {batch}x{channels}x{size}x{size}", lambda: block(x, time_embedding), 20)
+    for tokens, inner, outer in [(4096, 320, 320), (4096, 320, 2560), (1024, 2560, 640), (256, 1280, 10240)]:
+        layer, x = torch.nn.Linear(inner, outer), torch.randn(1, tokens, inner)
+        measure(f"linear layer, {tokens} tokens x {inner} to {outer}", lambda: layer(x), 20)
     query = torch.randn(1, 8, 4096, 40)
     for tokens in (4096, 77):
         context = torch.randn(1, 8, tokens, 40)

@@ -6,6 +6,7 @@ use burn::tensor::module::attention as scaled_dot_product;
 use burn::tensor::ops::AttentionModuleOptions;
 use burn::tensor::{DType, Device, Tensor};
 
+use super::linear::linear;
 use super::{cast_to, is_half};
 
 /// Attention of several heads, each seeing an equal share of the channels.
@@ -112,14 +113,14 @@ impl CrossAttention {
     pub fn forward(&self, x: Tensor<3>, context: Option<Tensor<3>>) -> Tensor<3> {
         let context = context.unwrap_or_else(|| x.clone());
         if context.dims()[1] == 1 {
-            let seen = self.to_out.forward(self.to_v.forward(context));
+            let seen = linear(&self.to_out, linear(&self.to_v, context));
             return seen.repeat_dim(1, x.dims()[1]);
         }
-        let key = self.to_k.forward(context.clone());
-        let value = self.to_v.forward(context);
-        let query = self.to_q.forward(x);
-        self.to_out
-            .forward(attention(query, key, value, self.heads, false))
+        let key = linear(&self.to_k, context.clone());
+        let value = linear(&self.to_v, context);
+        let query = linear(&self.to_q, x);
+        let seen = attention(query, key, value, self.heads, false);
+        linear(&self.to_out, seen)
     }
 }
 

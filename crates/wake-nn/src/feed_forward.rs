@@ -5,6 +5,7 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
 use super::activation::geglu;
+use super::linear::linear;
 
 /// Widens every token to four times its channels, gates, and narrows again.
 ///
@@ -40,6 +41,6 @@ impl FeedForward {
     ///
     /// `[batch, tokens, channels]`, in and out.
     pub fn forward(&self, x: Tensor<3>) -> Tensor<3> {
-        self.out.forward(geglu(self.proj.forward(x)))
+        linear(&self.out, geglu(linear(&self.proj, x)))
     }
 }

@@ -21,6 +21,8 @@ mod numbers;
 #[cfg(feature = "burn")]
 pub mod activation;
 #[cfg(feature = "burn")]
+pub mod linear;
+#[cfg(feature = "burn")]
 pub mod attention;
 #[cfg(feature = "burn")]
 pub mod conv;

@@ -6,14 +6,15 @@
 
 use std::time::Instant;
 
-use burn::nn::GroupNormConfig;
 use burn::nn::conv::Conv2d;
+use burn::nn::{GroupNormConfig, Linear, LinearConfig};
 use burn::tensor::module::attention as burns_attention;
 use burn::tensor::ops::AttentionModuleOptions;
 use burn::tensor::{Device, Distribution, Tensor, activation};
 use wake_nn::attention::attention;
 use wake_nn::burn;
 use wake_nn::conv::{conv3x3, convolve};
+use wake_nn::linear::linear;
 use wake_nn::norm::GroupNorm;
 
 /// Least milliseconds of seven calls after one that warms up.
@@ -91,5 +92,17 @@ fn times_beside_burn() {
         };
         let ours = |x: Tensor<3>| attention(x.clone(), x.clone(), x, heads, false);
         row(&name, [1, tokens, channels], ours, burns);
+    }
+    for (tokens, from, to) in [
+        (256, 128, 1024),
+        (4096, 320, 320),
+        (4096, 320, 2560),
+        (1024, 2560, 640),
+        (256, 1280, 10240),
+    ] {
+        let layer: Linear = LinearConfig::new(from, to).init(&device);
+        let name = format!("linear layer, {tokens} tokens × {from} to {to}");
+        let shape = [1, tokens, from];
+        row(&name, shape, |x| linear(&layer, x), |x| layer.forward(x));
     }
 }

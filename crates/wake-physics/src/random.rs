@@ -16,6 +16,8 @@ pub(crate) enum Stream {
     Points,
     /// Places and strengths of the scatterers of ships, by ships.
     Scatterers,
+    /// Paired echoes of the scatterers, by ships.
+    PairedEchoes,
     /// Gusts, by lines of their lattice.
     Gusts,
     /// Mottle, by lines of its lattice.
@@ -41,6 +43,7 @@ impl Stream {
             Self::Swell => 1 << 44,
             Self::Reflectivity => 1 << 45,
             Self::Mottle => 1 << 46,
+            Self::PairedEchoes => 1 << 47,
         }
     }
 }
@@ -65,7 +68,7 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    const ALL: [Stream; 9] = [
+    const ALL: [Stream; 10] = [
         Stream::Sea,
         Stream::Points,
         Stream::Scatterers,
@@ -74,6 +77,7 @@ mod tests {
         Stream::Slicks,
         Stream::Swell,
         Stream::Reflectivity,
+        Stream::PairedEchoes,
         Stream::Speckle,
     ];
 
@@ -96,7 +100,7 @@ mod tests {
     #[test]
     fn streams_of_lines_do_not_meet() {
         let longest = 1000u64 << 20;
-        let mut firsts: Vec<u64> = ALL[..7].iter().map(|s| s.first_line()).collect();
+        let mut firsts: Vec<u64> = ALL[..9].iter().map(|s| s.first_line()).collect();
         firsts.sort_unstable();
         assert!(firsts.windows(2).all(|pair| pair[1] - pair[0] > longest));
     }

@@ -253,6 +253,10 @@ fn a_prior_learns_a_mean_that_leaves_residuals_of_variance_one() {
     let all: Vec<usize> = (0..count).collect();
     let squares = residuals.latents(&all, &Device::flex()).square().mean();
     let variance = squares.into_scalar::<f32>();
+    // A fitted deviation σ has a loss of ½ + ln σ: undivided residuals would have the variance σ², and divided latents, less no mean,
+    // one of 1/σ². Averaged weights lag behind the last ones.
+    let undivided = (2.0 * (late - 0.5)).exp();
+    assert!(undivided < 0.01, "{undivided}");
     assert!((0.3..3.0).contains(&variance), "{variance}");
 }
 
@@ -267,12 +271,16 @@ fn a_reader_learns_to_tell_prompts_apart() {
     };
     let init = |device: &Device| config.init_parser(device);
     let devices = vec![Device::flex().autodiff()];
-    let mut run = Run::of("parser", &json!(config), init, options(1), devices).unwrap();
+    // As long as the run: a schedule that is over after 40 steps leaves a reader that has hardly learnt, and a verdict that
+    // depends on how a machine rounds.
+    let mut options = options(1);
+    options.trainer.rate.steps = 300;
+    let mut run = Run::of("parser", &json!(config), init, options, devices).unwrap();
     let task = ParserTask {
         prompts: &prompts,
         vocabulary: &vocabulary,
     };
-    let losses: Vec<f64> = (0..200).map(|_| run.step(&task).unwrap().0.loss).collect();
+    let losses: Vec<f64> = (0..300).map(|_| run.step(&task).unwrap().0.loss).collect();
     let [early, late] = early_and_late(&losses);
     assert!(late < 0.6 * early, "{early} {late}");
     // Prompts that were never learnt, read as what they state, and as what the next one states: a parser blind to the

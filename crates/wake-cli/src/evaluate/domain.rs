@@ -28,8 +28,8 @@ pub(crate) struct Options {
     /// Sampling steps; without it, the sampler's default
     #[arg(long)]
     steps: Option<usize>,
-    /// Scenes
-    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(4..=65536))]
+    /// Scenes; fewer than four have no two-sample test
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=65536))]
     count: u32,
     /// flex, ndarray, wgpu or cuda, where compiled in
     #[arg(long, default_value = "flex")]

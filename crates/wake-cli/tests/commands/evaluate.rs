@@ -45,3 +45,16 @@ fn one_scene_is_judged() {
         );
     }
 }
+
+/// One scene of a recipe: the table has all kinds of image and no two-sample test.
+#[test]
+fn one_scene_of_a_recipe_is_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let arguments = ["domain", "--count", "1", "--recipe", "ranges"];
+    let printed = done("evaluate", &arguments, &out);
+    for kind in ["expected", "Gaussian", "model", "other sea"] {
+        assert!(printed.contains(kind), "{kind}: {printed}");
+    }
+    assert_eq!(names(&out), ["domain.json", "domain.md", "domain.png"]);
+}

@@ -140,3 +140,35 @@ fn what_is_no_sea_is_named() {
     refused_by("generate", &layout, &["--sea", "wake model"]);
     assert_eq!(files(folder.path()).len(), 4);
 }
+
+/// Two images whose two halves have two windows of open sea each.
+fn open_seas(folder: &Path) -> PathBuf {
+    let folder = folder.join("seas");
+    std::fs::create_dir(&folder).expect("a folder");
+    for (name, step) in [("a.png", 7919), ("b.png", 7907)] {
+        let grey = |x: u32, y: u32| {
+            let bits = (x * step) ^ (y * 104_729) ^ (x * y * 31);
+            100 + (bits.wrapping_mul(2_654_435_761) >> 27) as u8
+        };
+        let image = image::GrayImage::from_fn(264, 264, |x, y| image::Luma([grey(x, y)]));
+        image.save(folder.join(name)).expect("an image");
+    }
+    folder
+}
+
+/// Simulated seas beside open water of images, by groups of features and by a network.
+#[test]
+fn simulated_seas_are_told_from_others() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let seas = open_seas(folder.path());
+    let out = folder.path().join("out");
+    let arguments = ["sea", "--real", text(&seas), "--recipe", "satellites"];
+    done("evaluate", &arguments, &out);
+    let report = std::fs::read(out.join("report.json")).expect("a report");
+    let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
+    assert_eq!(report["open_images"], 2);
+    // A simulated sea is correlated, these images are not.
+    let told = &report["recipes"][0]["network"]["accuracy"];
+    assert!(told.as_f64().is_some_and(|told| told > 0.9), "{report}");
+    assert_eq!(super::names(&out), ["report.json", "report.md"]);
+}

@@ -59,7 +59,7 @@ const POSITION: &str = "ship.position";
 const ANYWHERE: &str = "anywhere";
 /// Keys of a ship that only an echo or the edges of its wake have: a ship that is drawn without has none of them.
 const NEEDS: [(&str, &[&str]); 2] = [
-    ("echo", &["roll"]),
+    ("echo", &["roll", "roll_period", "scatterers", "halo"]),
     ("edge", &["edge_time", "edge_outflow"]),
 ];
 /// Keys that cannot be drawn, and why.
@@ -347,7 +347,7 @@ fn ship(
         let Some(key) = path.strip_prefix("ship.") else {
             continue;
         };
-        let value = distribution.at(at(key), false);
+        let value = distribution.at(at(key), is_whole(path));
         match (*path, &value) {
             (POSITION, Value::Word(word)) if word == ANYWHERE => {
                 let grid = &sea.grid;
@@ -356,7 +356,7 @@ fn ship(
                 ship.insert("position".to_owned(), vec![x, y].into());
             }
             ("ship.length", Value::Number(length)) => with_length(&mut ship, tenths(*length)),
-            _ => set(&mut ship, key, toml(&value, false))?,
+            _ => set(&mut ship, key, toml(&value, is_whole(path)))?,
         }
     }
     for (of, keys) in NEEDS {
@@ -393,7 +393,14 @@ fn number(
 
 /// Whether a value of a scene is a whole number.
 fn is_whole(path: &str) -> bool {
-    ["radar.looks", "grid.oversampling", COUNT, QUALITY].contains(&path)
+    [
+        "radar.looks",
+        "grid.oversampling",
+        "ship.scatterers",
+        COUNT,
+        QUALITY,
+    ]
+    .contains(&path)
 }
 
 impl Serialize for Draws {

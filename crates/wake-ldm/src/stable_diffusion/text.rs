@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use crate::options::Options;
 use wake_nn::activation::Activation;
 use wake_nn::attention::attention;
+use wake_nn::linear::linear;
 use wake_nn::weights::{Layout, load};
 use wake_nn::{Error, Result, check_range};
 
@@ -367,11 +368,11 @@ impl ClipAttention {
     }
 
     fn forward(&self, x: Tensor<3>) -> Tensor<3> {
-        let key = self.k_proj.forward(x.clone());
-        let value = self.v_proj.forward(x.clone());
-        let query = self.q_proj.forward(x);
-        self.out_proj
-            .forward(attention(query, key, value, self.heads, true))
+        let key = linear(&self.k_proj, x.clone());
+        let value = linear(&self.v_proj, x.clone());
+        let query = linear(&self.q_proj, x);
+        let seen = attention(query, key, value, self.heads, true);
+        linear(&self.out_proj, seen)
     }
 }
 
@@ -394,7 +395,6 @@ impl ClipMlp {
     }
 
     fn forward(&self, x: Tensor<3>) -> Tensor<3> {
-        self.fc2
-            .forward(self.activation.forward(self.fc1.forward(x)))
+        linear(&self.fc2, self.activation.forward(linear(&self.fc1, x)))
     }
 }

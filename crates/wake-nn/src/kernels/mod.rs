@@ -7,6 +7,7 @@ mod arch;
 pub(super) mod attention;
 pub(super) mod conv;
 pub(super) mod group_norm;
+pub(super) mod linear;
 pub(super) mod pointwise;
 mod product;
 mod silu;

@@ -31,27 +31,43 @@ impl<'a> Rows<'a> {
     pub(super) fn pack(&self, columns: usize, width: usize) -> Vec<f32> {
         let mut packed = vec![0.0; columns.div_ceil(width) * self.count * width];
         for (tile, packed) in packed.chunks_exact_mut(self.count * width).enumerate() {
-            let from = tile * width;
-            let to = columns.min(from + width);
-            for (i, packed) in packed.chunks_exact_mut(width).enumerate() {
-                packed[..to - from].copy_from_slice(&self.get(i, columns)[from..to]);
-            }
+            self.pack_tile(tile, columns, width, packed);
         }
         packed
+    }
+
+    /// Packs one tile of columns: `[row, column]`.
+    pub(super) fn pack_tile(&self, tile: usize, columns: usize, width: usize, packed: &mut [f32]) {
+        let from = tile * width;
+        let to = columns.min(from + width);
+        for (i, packed) in packed.chunks_exact_mut(width).enumerate() {
+            packed[..to - from].copy_from_slice(&self.get(i, columns)[from..to]);
+        }
     }
 
     /// Packs the transposed matrix: `[tile of rows, column, row]`.
     pub(super) fn pack_transposed(&self, columns: usize, width: usize) -> Vec<f32> {
         let mut packed = vec![0.0; self.count.div_ceil(width) * columns * width];
         for (tile, packed) in packed.chunks_exact_mut(columns * width).enumerate() {
-            for i in 0..width.min(self.count - tile * width) {
-                let row = self.get(tile * width + i, columns);
-                for (value, packed) in row.iter().zip(packed.chunks_exact_mut(width)) {
-                    packed[i] = *value;
-                }
-            }
+            self.pack_tile_transposed(tile, columns, width, packed);
         }
         packed
+    }
+
+    /// Packs one tile of rows, transposed: `[column, row]`.
+    pub(super) fn pack_tile_transposed(
+        &self,
+        tile: usize,
+        columns: usize,
+        width: usize,
+        packed: &mut [f32],
+    ) {
+        for i in 0..width.min(self.count - tile * width) {
+            let row = self.get(tile * width + i, columns);
+            for (value, packed) in row.iter().zip(packed.chunks_exact_mut(width)) {
+                packed[i] = *value;
+            }
+        }
     }
 }
 

@@ -48,13 +48,16 @@ pub(super) fn multiply<S: Simd>(
     for row in [&mut a, &mut b, &mut c, &mut d, &mut e, &mut f] {
         *row = &row[start..start + panel.len()];
     }
+    // A local copy stays in registers; through the reference every step would store all sums.
+    let mut held = *sums;
     for (k, [left, right]) in panel.iter().enumerate() {
-        for (sum, value) in sums.iter_mut().zip([a[k], b[k], c[k], d[k], e[k], f[k]]) {
+        for (sum, value) in held.iter_mut().zip([a[k], b[k], c[k], d[k], e[k], f[k]]) {
             let value = simd.splat_f32s(value);
             sum[0] = simd.mul_add_f32s(value, *left, sum[0]);
             sum[1] = simd.mul_add_f32s(value, *right, sum[1]);
         }
     }
+    *sums = held;
 }
 
 /// Adds the product of the transpose of six columns with a panel that is one tile wide.
@@ -77,6 +80,7 @@ pub(super) fn multiply_columns<S: Simd>(
     sums: &mut Sums<S>,
 ) {
     let (panel, _) = S::as_simd_f32s(panel).0.as_chunks::<2>();
+    let mut held = *sums;
     for ([near, far], row) in panel.iter().zip(left.chunks(step)) {
         let row = &row[columns.clone()];
         let mut few = [0.0; ROWS];
@@ -84,12 +88,13 @@ pub(super) fn multiply_columns<S: Simd>(
             few[..row.len()].copy_from_slice(row);
             &few
         });
-        for (sum, &value) in sums.iter_mut().zip(values) {
+        for (sum, &value) in held.iter_mut().zip(values) {
             let value = simd.splat_f32s(value);
             sum[0] = simd.mul_add_f32s(value, *near, sum[0]);
             sum[1] = simd.mul_add_f32s(value, *far, sum[1]);
         }
     }
+    *sums = held;
 }
 
 /// Sums that start at one value per row.

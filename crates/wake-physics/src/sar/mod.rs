@@ -12,7 +12,9 @@ pub mod coherence;
 pub(crate) mod dense;
 pub(crate) mod echo;
 pub mod geometry;
+pub mod halo;
 pub mod impulse;
+pub mod paired_echoes;
 pub mod scatterers;
 pub mod speckle;
 

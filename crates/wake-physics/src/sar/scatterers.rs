@@ -1,8 +1,13 @@
-//! A ship as a radar at satellite incidence sees it: a few bright points with random shares of its radar cross section.
+//! A ship as a radar at satellite incidence sees it: bright points with random shares of its radar cross section.
 //!
 //! ```text
 //! 10 log₁₀ σ = 10 log₁₀(0.08 L^{7/3}) − 3 dB ± 3 dB
+//! y_image    = y + (R/V) (v + a t)                    v, a toward the radar; t over one aperture, −T/2 to T/2
+//! var y      = (R/V)² (σ_v² + σ_a² T²/12)             in addition to the hull's;   σ_a = 2π σ_v/P
 //! ```
+//!
+//! Roll and pitch of the period P displace the points by their velocities, of standard deviation `σ_v`, and spread each over (R/V) a T
+//! while the aperture lasts: the echo is defocused.
 //!
 //! The points are the same whether an impulse response images them or not.
 
@@ -12,8 +17,14 @@ use crate::random::{Stream, generator};
 use rand::Rng;
 use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 
-/// Points along the deck: chosen; 2 to 11 maxima within 10 dB of the peak were counted in real echoes.
+/// Points along the deck where a ship does not say: chosen; 2 to 11 maxima within 10 dB of the peak were counted in real echoes.
 const POINTS: usize = 12;
+
+/// Points that have more than this share of a defocused echo are spread over the aperture in parts: chosen.
+const LARGE_SHARE: f64 = 0.05;
+
+/// These parts: chosen; four resolution cells, the smear of the longest apertures, have two each.
+const PARTS: usize = 8;
 
 /// Smallest and largest share of the brightest point: chosen.
 const DOMINANT_SHARE: [f64; 2] = [0.15, 0.85];
@@ -69,6 +80,10 @@ pub(crate) struct ShipEcho {
     pub(crate) radial_velocity: f64,
     /// Standard deviation of the points' velocity toward the radar by roll and pitch [m/s].
     pub(crate) roll_velocity: f64,
+    /// Standard deviation of their acceleration [m/s²].
+    pub(crate) roll_acceleration: f64,
+    /// Number of points; 12 where absent.
+    pub(crate) points: Option<u32>,
 }
 
 /// How the echo is imaged.
@@ -78,12 +93,27 @@ pub(crate) struct Viewing {
     pub(crate) incidence: f64,
     /// R/V \[s\].
     pub(crate) range_to_velocity: f64,
+    /// Time of one aperture T \[s\].
+    pub(crate) aperture: f64,
 }
 
 impl ShipEcho {
+    /// Cross section of all points together \[m²\].
+    ///
+    /// - `number` of the ship in its scene, as for [`scatterers`](Self::scatterers)
+    pub(crate) fn cross_section(&self, seed: u64, number: usize) -> f64 {
+        self.drawn_cross_section(&mut generator(seed, Stream::Scatterers, number as u64))
+    }
+
+    /// The cross section by the first number of the ship's stream.
+    fn drawn_cross_section(&self, random: &mut impl Rng) -> f64 {
+        let normal: f64 = StandardNormal.sample(random);
+        median_cross_section(self.length) * 10f64.powf(0.1 * SPREAD_DB * normal)
+    }
+
     /// The points, where they are imaged.
     ///
-    /// Their number is fixed, places along the deck are even with jitter, shares exponential but for one that has 0.15 to
+    /// Places along the deck are even with jitter, shares exponential but for one point that has 0.15 to
     /// 0.85 of all. Each is displaced in azimuth by its velocity and toward the radar by its height (0.4 of the beam,
     /// chosen). Together they have the median cross section times a log-normal factor of 3 dB.
     ///
@@ -92,38 +122,54 @@ impl ShipEcho {
     pub(crate) fn scatterers(&self, view: &Viewing, seed: u64, number: usize) -> Vec<PointTarget> {
         let mut random = generator(seed, Stream::Scatterers, number as u64);
         let normal = |random: &mut _| -> f64 { StandardNormal.sample(random) };
-        let spread = 10f64.powf(0.1 * SPREAD_DB * normal(&mut random));
-        let total = median_cross_section(self.length) * spread;
-        let shares = shares(&mut random);
+        let total = self.drawn_cross_section(&mut random);
+        let count = self.points.map_or(POINTS, |count| count as usize);
+        let shares = shares(&mut random, count);
         let [ahead_x, ahead_y] = direction(self.heading);
-        let mut points = Vec::with_capacity(POINTS);
+        let mut points = Vec::with_capacity(count);
         for (n, share) in shares.into_iter().enumerate() {
             let along: f64 = uniform(&mut random, [0.0, 1.0]);
-            let along = self.length * ((n as f64 + along) / POINTS as f64 - 0.5);
+            let along = self.length * ((n as f64 + along) / count as f64 - 0.5);
             let side = self.beam * uniform(&mut random, [-0.5, 0.5]);
             let height = HEIGHT_OF_BEAM * self.beam * uniform(&mut random, [0.0, 1.0]);
             let velocity = self.radial_velocity + self.roll_velocity * normal(&mut random);
-            points.push(PointTarget {
-                position: [
-                    self.position[0]
-                        + along * ahead_x
-                        + side * ahead_y
-                        + layover(height, view.incidence),
-                    self.position[1] + along * ahead_y - side * ahead_x
-                        + azimuth_displacement(view.range_to_velocity, velocity),
-                ],
-                cross_section: total * share,
-            });
+            let mut add = |velocity, cross_section| {
+                points.push(PointTarget {
+                    position: [
+                        self.position[0]
+                            + along * ahead_x
+                            + side * ahead_y
+                            + layover(height, view.incidence),
+                        self.position[1] + along * ahead_y - side * ahead_x
+                            + azimuth_displacement(view.range_to_velocity, velocity),
+                    ],
+                    cross_section,
+                });
+            };
+            if self.roll_acceleration == 0.0 {
+                add(velocity, total * share);
+                continue;
+            }
+            let acceleration = self.roll_acceleration * normal(&mut random);
+            let parts = if share > LARGE_SHARE { PARTS } else { 1 };
+            for part in 0..parts {
+                let place = (part as f64 + uniform(&mut random, [0.0, 1.0])) / parts as f64;
+                let change = acceleration * view.aperture * (place - 0.5);
+                add(velocity + change, total * share / parts as f64);
+            }
         }
         points
     }
 }
 
 /// Shares with sum 1: exponential, one of them drawn.
-fn shares(random: &mut impl Rng) -> Vec<f64> {
+fn shares(random: &mut impl Rng, count: usize) -> Vec<f64> {
+    if count == 1 {
+        return vec![1.0];
+    }
     let dominant = uniform(random, DOMINANT_SHARE);
-    let place = (uniform(random, [0.0, POINTS as f64]) as usize).min(POINTS - 1);
-    let mut shares: Vec<f64> = (0..POINTS).map(|_| Exp1.sample(random)).collect();
+    let place = (uniform(random, [0.0, count as f64]) as usize).min(count - 1);
+    let mut shares: Vec<f64> = (0..count).map(|_| Exp1.sample(random)).collect();
     shares[place] = 0.0;
     let rest: f64 = shares.iter().sum();
     for share in &mut shares {
@@ -163,6 +209,7 @@ mod tests {
     const VIEW: Viewing = Viewing {
         incidence: 0.61,
         range_to_velocity: 115.0,
+        aperture: 0.8,
     };
 
     fn ship() -> ShipEcho {
@@ -173,6 +220,8 @@ mod tests {
             beam: 28.0,
             radial_velocity: -4.0,
             roll_velocity: 0.0,
+            roll_acceleration: 0.0,
+            points: None,
         }
     }
 
@@ -222,7 +271,7 @@ mod tests {
     fn shares_are_shares() {
         for seed in 0..200 {
             let mut random = generator(seed, Stream::Sea, 0);
-            let shares = shares(&mut random);
+            let shares = shares(&mut random, POINTS);
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             let largest = shares.iter().copied().fold(0.0, f64::max);
             assert!(largest >= DOMINANT_SHARE[0] && shares.iter().all(|&s| s > 0.0));
@@ -252,6 +301,47 @@ mod tests {
         assert!(
             (deviation / 34.5 - 1.0).abs() < 4.0 / f64::sqrt(2.0 * n),
             "{deviation}"
+        );
+    }
+
+    /// Velocity and acceleration of a defocused ship of 200 points: variance of the azimuth, weighted with power, is
+    /// `(R/V)² (σ_v² + σ_a² T²/12)` more than the variance of the hull, 14²/3 across the heading. The cross section stays the same.
+    #[test]
+    fn a_rolling_ship_is_defocused() {
+        let rolling = ShipEcho {
+            roll_velocity: 0.2,
+            roll_acceleration: 0.5,
+            points: Some(200),
+            ..ship()
+        };
+        let still = ShipEcho {
+            points: Some(200),
+            ..ship()
+        };
+        let (mut sum, mut power) = (0.0, 0.0);
+        let ships = 600;
+        for seed in 0..ships {
+            let points = rolling.scatterers(&VIEW, seed, 0);
+            let total =
+                |points: &[PointTarget]| -> f64 { points.iter().map(|p| p.cross_section).sum() };
+            let whole = total(&points);
+            assert!((whole / rolling.cross_section(seed, 0) - 1.0).abs() < 1e-9);
+            assert!((whole / total(&still.scatterers(&VIEW, seed, 0)) - 1.0).abs() < 1e-9);
+            for point in &points {
+                let off = point.position[1] + 40.0 + 460.0;
+                sum += point.cross_section / whole * off * off;
+                power += point.cross_section / whole;
+            }
+        }
+        let variance = sum / power;
+        let motion = 115.0f64.powi(2) * (0.2f64.powi(2) + (0.5f64 * 0.8).powi(2) / 12.0);
+        let expected = motion + 28.0f64.powi(2) / 12.0;
+        // One point has half the power in the mean, so that a ship is little more than one draw: the variance of a squared normal
+        // is twice its square, weighted by the mean square of the shares, 0.3. Four standard errors.
+        let error = 4.0 * (2.0 * 0.3 / ships as f64).sqrt();
+        assert!(
+            (variance / expected - 1.0).abs() < error,
+            "{variance} {expected}"
         );
     }
 

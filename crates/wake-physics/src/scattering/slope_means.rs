@@ -47,6 +47,10 @@ pub(crate) struct SlopeMeans {
 }
 
 impl SlopeMeans {
+    /// Number of rules that are taken.
+    #[cfg(test)]
+    pub(crate) const RULES_TAKEN: usize = USED;
+
     /// The farthest node from the middle, at most, for slopes of a variance in all.
     pub(crate) fn reach(variance: f64) -> f64 {
         if variance <= 0.0 {
@@ -54,6 +58,18 @@ impl SlopeMeans {
         }
         let farthest = RULES.iter().filter_map(|rule| rule.last());
         farthest.map(|node| node[0]).fold(0.0, f64::max) * variance.sqrt()
+    }
+
+    /// One rule for all means.
+    #[cfg(test)]
+    pub(crate) fn fixed(rule: usize) -> Self {
+        let mut largest = [0.0; USED];
+        largest[rule..].fill(f64::INFINITY);
+        Self {
+            facets: [[-1.0, 1.0]; 2],
+            largest: vec![largest; CELLS * CELLS],
+            error: 0.0,
+        }
     }
 
     /// Rules for the means of a function to an absolute `error`, by what more nodes make of it along four directions.

@@ -669,6 +669,76 @@ mod tests {
         }
     }
 
+    /// Time and error of one fixed rule for all means over slopes, and the spacings of tables: figures of decision 32.
+    #[test]
+    #[ignore = "a report of times and errors: --ignored --nocapture"]
+    #[allow(clippy::print_stdout, reason = "figures are what it is for")]
+    fn report_of_fixed_rules() {
+        const TOLERANCE: f64 = 1e-2;
+        let [mut x, mut y] = slopes(200);
+        for slope in x.values.iter_mut().chain(&mut y.values) {
+            *slope *= 0.5;
+        }
+        // A wake's waves, from far away to those that break.
+        let variance = |n: usize| 0.02 * (1.0 - n as f32 / x.values.len() as f32).powi(8);
+        let of = |share: f32| Field {
+            values: (0..x.values.len()).map(|n| share * variance(n)).collect(),
+            ..x.clone()
+        };
+        let unresolved = [of(0.8), of(0.1), of(0.2)];
+        let facets = FacetFields {
+            subpixel_variances: Some(&unresolved),
+            ..FacetFields::of_slopes(&x, &y)
+        };
+        let rules = SlopeMeans::RULES_TAKEN;
+        let mut rows = vec![[0.0f64; 2]; rules + 1];
+        let mut spacings = [f64::INFINITY, 0.0f64];
+        for degrees in [16.0, 24.0, 32.0, 45.0] {
+            for wind_speed in [3.0, 7.0, 12.0] {
+                for (frequency, spacing) in [(1.27e9, 5.0), (5.4e9, 10.0), (9.6e9, 2.5)] {
+                    let case = Case {
+                        degrees,
+                        wind_speed,
+                        frequency,
+                        spacing,
+                        ..DEFAULT
+                    };
+                    let backscatter = case.backscatter();
+                    let allowed = TOLERANCE * mean(&backscatter);
+                    let mut table = BackscatterTable::covering(backscatter, &facets, allowed);
+                    if let Some(interpolation) = &table.interpolation {
+                        let [[first, last], _] = table.range;
+                        let step = (last - first) / interpolation.nodes()[0] as f64;
+                        spacings = [spacings[0].min(step), spacings[1].max(step)];
+                    }
+                    let chosen = table.means.clone().expect("unresolved slopes");
+                    table.means = Some(SlopeMeans::fixed(rules - 1));
+                    let exact = table.sigma0_field(&facets);
+                    for (n, row) in rows.iter_mut().enumerate() {
+                        table.means = Some(match n {
+                            0 => chosen.clone(),
+                            n => SlopeMeans::fixed(n - 1),
+                        });
+                        let times = (0..3).map(|_| {
+                            let begun = std::time::Instant::now();
+                            let (error, _) = table.sigma0_field(&facets).difference(&exact);
+                            row[1] = row[1].max(error / exact.mean());
+                            begun.elapsed().as_secs_f64()
+                        });
+                        row[0] += times.fold(f64::INFINITY, f64::min);
+                    }
+                }
+            }
+        }
+        println!("spacing of tables {:.4} to {:.4}", spacings[0], spacings[1]);
+        for (n, [time, error]) in rows.iter().enumerate() {
+            let ratio = time / rows[0][0];
+            println!(
+                "rule {n} (0: chosen): time {ratio:.2}, largest error {error:.1e} of the mean"
+            );
+        }
+    }
+
     /// Slopes outside the table are evaluated exactly.
     #[test]
     fn steep_facets_are_exact() {

@@ -105,13 +105,24 @@ impl Ship {
     /// What only an echo or the edges of the wake have is refused without them.
     fn validate_needless(&self, name: &str) -> Result<()> {
         let edge_time = self.edge_time.unwrap_or(0.0);
+        let period = self.roll_period.unwrap_or(0.0);
+        let points = self.scatterers.map_or(0.0, f64::from);
         let needless = [
             ("roll", self.roll, "m/s", "echo", self.echo),
+            ("roll_period", period, "s", "echo", self.echo),
+            ("scatterers", points, "points", "echo", self.echo),
             ("edge_time", edge_time, "s", "edge", self.edge),
             ("edge_outflow", self.edge_outflow, "m/s", "edge", self.edge),
         ];
         let ignored = |&(_, value, _, _, set): &(_, f64, _, _, bool)| value > 0.0 && !set;
         match needless.into_iter().find(ignored) {
+            None if self.halo.is_some() && !self.echo => Err(Error::Conflict {
+                name: format!("{name}.halo"),
+                value: "set".to_owned(),
+                requirement: format!(
+                    "but needs {name}.echo: set {name}.echo = true, or leave it out"
+                ),
+            }),
             None => Ok(()),
             Some((key, value, unit, of, _)) => Err(Error::Conflict {
                 name: format!("{name}.{key}"),
@@ -168,6 +179,19 @@ impl Ship {
         )?;
         range("edge_outflow", self.edge_outflow, [0.0, 0.3], "m/s")?;
         range("roll", self.roll, [0.0, 2.0], "m/s")?;
+        optional(
+            &format!("{name}.roll_period"),
+            self.roll_period,
+            [4.0, 60.0],
+            "s",
+        )?;
+        optional(
+            &format!("{name}.scatterers"),
+            self.scatterers.map(f64::from),
+            [1.0, 1000.0],
+            "",
+        )?;
+        optional(&format!("{name}.halo"), self.halo, [-40.0, 0.0], "dB")?;
         self.validate_needless(name)?;
         match (self.hull, self.block_coefficient) {
             (HullForm::Wigley, Some(value)) => Err(Error::Conflict {
@@ -218,6 +242,12 @@ impl Radar {
         )?;
         optional("radar.prf", self.prf, [100.0, 2e4], "Hz")?;
         optional(
+            "radar.paired_echoes",
+            self.paired_echoes,
+            [-40.0, 0.0],
+            "dB",
+        )?;
+        optional(
             "radar.relaxation_rate",
             self.relaxation_rate,
             [0.01, 100.0],
@@ -235,6 +265,7 @@ impl Radar {
             ("radar.azimuth_window", self.azimuth_window.is_some()),
             ("radar.look_overlap", self.look_overlap.is_some()),
             ("radar.azimuth_ambiguity", self.azimuth_ambiguity.is_some()),
+            ("radar.paired_echoes", self.paired_echoes.is_some()),
         ];
         let refuse = |name: &str, requirement: &str| {
             Err(Error::Conflict {
@@ -289,7 +320,7 @@ mod tests {
     use super::*;
 
     /// Key, closed range, and values just outside it.
-    const RANGES: [(&str, f64, f64); 39] = [
+    const RANGES: [(&str, f64, f64); 43] = [
         ("grid.rows", 1.0, 16384.0),
         ("grid.columns", 1.0, 16384.0),
         ("grid.spacing", 0.1, 100.0),
@@ -325,6 +356,10 @@ mod tests {
         ("ship.edge_time", 0.0, 1000.0),
         ("ship.edge_outflow", 0.0, 0.3),
         ("ship.roll", 0.0, 2.0),
+        ("ship.roll_period", 4.0, 60.0),
+        ("ship.scatterers", 1.0, 1000.0),
+        ("ship.halo", -40.0, 0.0),
+        ("radar.paired_echoes", -40.0, 0.0),
         ("radar.range_resolution", 0.5, 500.0),
         ("radar.nesz", -60.0, 20.0),
         ("radar.prf", 100.0, 2e4),
@@ -369,7 +404,13 @@ mod tests {
     }
 
     fn whole(key: &str) -> bool {
-        ["grid.rows", "grid.columns", "grid.oversampling"].contains(&key)
+        [
+            "grid.rows",
+            "grid.columns",
+            "grid.oversampling",
+            "ship.scatterers",
+        ]
+        .contains(&key)
     }
 
     fn below(min: f64, key: &str) -> f64 {
@@ -434,6 +475,9 @@ mod tests {
     fn keys_without_effect_are_refused() {
         for (key, of) in [
             ("ship.roll=0.2", "ship.echo"),
+            ("ship.roll_period=8", "ship.echo"),
+            ("ship.scatterers=40", "ship.echo"),
+            ("ship.halo=-10", "ship.echo"),
             ("ship.edge_time=400", "ship.edge"),
             ("ship.edge_outflow=0.02", "ship.edge"),
         ] {

@@ -84,6 +84,7 @@ radar_keys! {
     azimuth_ambiguity: f64, or;
     #[serde(alias = "pulse_rate")]
     prf: f64, or;
+    paired_echoes: f64, or;
 }
 
 /// Keys of the radar in a scene file, and the names under which serialized scenes have them.
@@ -152,6 +153,7 @@ fn of_sensor(sensor: Sensor, incidence: Option<f64>) -> Radar {
         nesz: Some(mode.nesz),
         azimuth_ambiguity: Some(AMBIGUITY),
         prf: Some(mode.prf),
+        paired_echoes: None,
         relaxation_rate: None,
     }
 }

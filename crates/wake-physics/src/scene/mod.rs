@@ -237,6 +237,17 @@ pub struct Ship {
     /// Standard deviation of the line-of-sight velocity of points on the ship by roll and pitch [m/s], 0 to 2; only with
     /// [`Self::echo`].
     pub roll: f64,
+    /// Period of roll and pitch \[s\], 4 to 60: the points accelerate while the radar integrates, which defocuses the echo. They keep
+    /// their velocity where absent; only with [`Self::echo`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roll_period: Option<f64>,
+    /// Number of points that the echo consists of, 1 to 1000; 12 where absent; only with [`Self::echo`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scatterers: Option<u32>,
+    /// Power around the echo over the power of its points \[dB\], −40 to 0; none where absent; only with [`Self::echo`]. See
+    /// [`crate::sar::halo`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub halo: Option<f64>,
 }
 
 impl Default for Ship {
@@ -260,6 +271,9 @@ impl Default for Ship {
             edge_time: None,
             edge_outflow: 0.0,
             roll: 0.0,
+            roll_period: None,
+            scatterers: None,
+            halo: None,
         }
     }
 }
@@ -356,6 +370,10 @@ pub struct Radar {
         skip_serializing_if = "Option::is_none"
     )]
     pub prf: Option<f64>,
+    /// Power of the paired echoes of a ship's brightest points over the power of these points \[dB\], −40 to 0: a cross along range and
+    /// azimuth; none where absent. See [`crate::sar::paired_echoes`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paired_echoes: Option<f64>,
     /// Relaxation rate of the Bragg waves [1/s], 0.01 to 100, in the hydrodynamic modulation and at the edges of wakes; from
     /// the Bragg wave and the wind where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -379,6 +397,7 @@ impl Default for Radar {
             nesz: None,
             azimuth_ambiguity: None,
             prf: None,
+            paired_echoes: None,
             relaxation_rate: None,
         }
     }

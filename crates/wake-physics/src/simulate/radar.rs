@@ -2,7 +2,7 @@
 
 use super::record::{Accuracy, Reached};
 use super::simulation::Method;
-use super::speckling::points;
+use super::speckling::{halos, points};
 use super::stages::{Memory, Roughening, Stages};
 use crate::fields::Fields;
 use crate::plan::SHARES;
@@ -133,13 +133,16 @@ impl Stages<'_> {
         fields.intensity = intensity;
     }
 
-    /// Adds the ships' own echoes, unless an impulse response is to image it, and the radar's noise.
+    /// Adds the ships' own echoes, their points only where no impulse response is to image these, and the radar's noise.
     pub(super) fn add_echo_and_noise(&self, intensity: &mut Field) {
         let models = self.site.models;
         if models.response.is_none() {
             let resolution = models.resolution_at_rest().nominal;
             let points = points(self.site.scene, models);
             add_points(intensity, &self.computed, &points, resolution);
+        }
+        for halo in halos(self.site.scene, models) {
+            halo.add(intensity, &self.computed);
         }
         for effect in self.effects() {
             effect.add_to_image(intensity);

@@ -1,17 +1,22 @@
 //! From the mean intensity to the image with speckle.
 
+use crate::constants::SPEED_OF_LIGHT;
 use crate::error::Result;
-use crate::kelvin::KelvinWake;
 use crate::models::Models;
+use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
 use crate::sar::ImpulseResponse;
-use crate::sar::geometry::ship_radial_velocity;
+use crate::sar::coherence::integration_time;
+use crate::sar::geometry::{azimuth_displacement, direction, ship_radial_velocity};
+use crate::sar::halo::{Halo, hull_moments};
 use crate::sar::impulse::{Looks, PointTarget, Reflectivity};
+use crate::sar::paired_echoes::PairedEchoes;
 use crate::sar::scatterers::{ShipEcho, Viewing, ambiguities};
 use crate::sar::speckle::speckle;
 use crate::scene::sensor::ambiguity_distance;
 use crate::scene::{Scene, Ship};
 use num_complex::Complex32;
+use std::f64::consts::TAU;
 
 /// What the radar looks at before its impulse response.
 #[derive(Debug, Clone)]
@@ -60,14 +65,68 @@ impl Exposure {
 
 /// The ships whose echo is drawn as points, with their ghosts: the same whether or not an impulse response images them.
 pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
-    let view = Viewing {
-        incidence: models.incidence,
-        range_to_velocity: models.range_to_velocity,
+    let radar = &scene.radar;
+    let mut points = Vec::new();
+    for (n, ship, echo) in echoes(scene, models) {
+        let mut own = echo.scatterers(&viewing(scene, models), scene.seed, n);
+        let halo = ship.halo.map_or(0.0, power_ratio);
+        for point in &mut own {
+            point.cross_section /= 1.0 + halo;
+        }
+        if let (Some(ratio), Some(range)) = (radar.paired_echoes, radar.range_resolution) {
+            let echoes = PairedEchoes {
+                ratio: power_ratio(ratio),
+                cell: [range, radar.azimuth_resolution],
+            };
+            let mut random = generator(scene.seed, Stream::PairedEchoes, n as u64);
+            echoes.spread(&mut own, &mut random);
+        }
+        points.extend(own);
+    }
+    if let (Some(level), Some(rate)) = (radar.azimuth_ambiguity, radar.prf) {
+        let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
+        points.extend(ambiguities(&points, distance, power_ratio(level)));
+    }
+    points
+}
+
+/// The halos of the ships whose echo is drawn.
+pub(super) fn halos(scene: &Scene, models: &Models) -> Vec<Halo> {
+    let radar = &scene.radar;
+    let range = radar.range_resolution.unwrap_or(scene.grid.spacing);
+    let of_ship = |(n, ship, echo): (usize, &Ship, ShipEcho)| {
+        let ratio = power_ratio(ship.halo?);
+        let total = echo.cross_section(scene.seed, n);
+        let [x, y] = echo.position;
+        let velocity = echo.radial_velocity;
+        let [xx, xy, yy] = hull_moments(direction(echo.heading), [echo.length, echo.beam]);
+        let smear = models.range_to_velocity * echo.roll_velocity;
+        Some(Halo {
+            centre: [
+                x,
+                y + azimuth_displacement(models.range_to_velocity, velocity),
+            ],
+            moments: [
+                xx + 0.25 * range * range,
+                xy,
+                yy + 0.25 * radar.azimuth_resolution.powi(2) + smear * smear,
+            ],
+            cross_section: total * ratio / (1.0 + ratio),
+        })
     };
+    echoes(scene, models).filter_map(of_ship).collect()
+}
+
+/// The ships whose echo is drawn, with their numbers.
+fn echoes<'s>(
+    scene: &'s Scene,
+    models: &'s Models,
+) -> impl Iterator<Item = (usize, &'s Ship, ShipEcho)> {
     let ships = scene.ships.iter().zip(&models.wakes).enumerate();
     let drawn = ships.filter(|(_, (ship, _))| ship.echo);
-    let of_ship = |(n, (ship, wake)): (usize, (&Ship, &KelvinWake))| {
+    drawn.map(|(n, (ship, wake))| {
         let heading = ship.heading_at(scene.sea.time);
+        let acceleration = |period: f64| TAU * ship.roll / period;
         let echo = ShipEcho {
             position: wake.track.position,
             heading,
@@ -75,16 +134,29 @@ pub(super) fn points(scene: &Scene, models: &Models) -> Vec<PointTarget> {
             beam: ship.beam,
             radial_velocity: ship_radial_velocity(ship.speed, heading, models.incidence),
             roll_velocity: ship.roll,
+            roll_acceleration: ship.roll_period.map_or(0.0, acceleration),
+            points: ship.scatterers,
         };
-        echo.scatterers(&view, scene.seed, n)
-    };
-    let mut points: Vec<PointTarget> = drawn.flat_map(of_ship).collect();
+        (n, ship, echo)
+    })
+}
+
+fn viewing(scene: &Scene, models: &Models) -> Viewing {
     let radar = &scene.radar;
-    if let (Some(level), Some(rate)) = (radar.azimuth_ambiguity, radar.prf) {
-        let distance = ambiguity_distance(rate, radar.frequency, models.range_to_velocity);
-        points.extend(ambiguities(&points, distance, 10f64.powf(0.1 * level)));
+    Viewing {
+        incidence: models.incidence,
+        range_to_velocity: models.range_to_velocity,
+        aperture: integration_time(
+            SPEED_OF_LIGHT / radar.frequency,
+            models.range_to_velocity,
+            radar.azimuth_resolution,
+        ),
     }
-    points
+}
+
+/// The ratio of a level \[dB\].
+fn power_ratio(level: f64) -> f64 {
+    10f64.powf(0.1 * level)
 }
 
 /// Those points that lie among the sources: an impulse response would bring others around.

@@ -90,6 +90,7 @@ prop_compose! {
         (damping, windy) in (prop_oneof![Just(0.6), ends(0.0, 1.0)], any::<bool>()),
         edge_time in maybe(ends(0.0, 1000.0)),
         (edge_outflow, roll) in (ends(0.0, 0.3), ends(0.0, 2.0)),
+        (roll_period, scatterers, halo) in (maybe(ends(4.0, 60.0)), maybe(1..=1000u32), maybe(ends(-40.0, 0.0))),
     ) -> Ship {
         // Radii from the narrowest turn to the widest, whose decades count alike.
         let narrowest = 2.0 * length.max(TAU * speed * speed / GRAVITY) * (1.0 + 1e-9);
@@ -117,6 +118,9 @@ prop_compose! {
             edge_time: edge_time.filter(|_| edge),
             edge_outflow: if edge { edge_outflow } else { 0.0 },
             roll: if echo { roll } else { 0.0 },
+            roll_period: roll_period.filter(|_| echo),
+            scatterers: scatterers.filter(|_| echo),
+            halo: halo.filter(|_| echo),
         }
     }
 }
@@ -143,6 +147,7 @@ prop_compose! {
         (looks, look_overlap) in (looks(), maybe(ends(0.0, 0.9))),
         nesz in maybe(ends(-60.0, 20.0)),
         (ambiguity, prf) in (maybe(ends(-60.0, 0.0)), decades(100.0, 2e4)),
+        paired_echoes in maybe(ends(-40.0, 0.0)),
         relaxation_rate in maybe(decades(0.01, 100.0)),
     ) -> Radar {
         let responds = range_resolution.is_some();
@@ -162,6 +167,7 @@ prop_compose! {
             nesz,
             azimuth_ambiguity: ambiguity,
             prf: ambiguity.map(|_| prf),
+            paired_echoes: paired_echoes.filter(|_| responds),
             relaxation_rate,
         }
     }

@@ -10,6 +10,7 @@
 mod any_scene;
 mod attack;
 mod detectability;
+mod echo;
 mod expected;
 mod hard_cases;
 mod methods;

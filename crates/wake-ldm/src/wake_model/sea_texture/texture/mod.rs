@@ -268,7 +268,8 @@ impl SeaTexture {
         let all = expected_intensity(scene)?;
         let mut silent = scene.clone();
         for ship in &mut silent.ships {
-            (ship.echo, ship.roll) = (false, 0.0);
+            (ship.echo, ship.roll, ship.halo) = (false, 0.0, None);
+            (ship.roll_period, ship.scatterers) = (None, None);
         }
         let sea = match silent == *scene {
             true => all.clone(),
