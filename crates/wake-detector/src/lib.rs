@@ -15,6 +15,7 @@ pub mod self_check;
 
 pub mod calibration;
 
+mod extent;
 mod maps;
 mod missing;
 mod search;

@@ -62,6 +62,8 @@ pub struct Detection {
     pub score: f32,
     /// Tip, axis, half-angle and visible length; its signal-to-noise is unknown, so infinite.
     pub wake: Wake,
+    /// Standard deviation of the wake's length \[pixels\]; `None` where the method gives none.
+    pub length_sd: Option<f32>,
     /// Agreement of the line's direction with the axis: 1 from tip to end, −1 from end to tip; `None` where the method gives none.
     pub forward: Option<f32>,
     /// Probability of a wake in either direction; `None` without a calibration.
@@ -79,6 +81,7 @@ impl Detection {
         Self {
             score,
             wake,
+            length_sd: None,
             forward: None,
             probability: None,
             direction_probability: None,

@@ -21,6 +21,8 @@ struct Line {
     axis_deg: f32,
     half_angle_deg: f32,
     length: f32,
+    #[serde(default)]
+    length_sd: Option<f32>,
 }
 
 /// The wakes of a tile.
@@ -123,6 +125,7 @@ impl Line {
             axis_deg: one.wake.axis_deg,
             half_angle_deg: one.wake.half_angle_deg,
             length: one.wake.length,
+            length_sd: one.length_sd,
         }
     }
 
@@ -136,6 +139,7 @@ impl Line {
             contrast_db: None,
         };
         Detection {
+            length_sd: self.length_sd,
             forward: self.forward,
             ..Detection::new(self.score, wake)
         }
@@ -160,6 +164,7 @@ mod tests {
             axis_deg: 12.5,
             half_angle_deg: 0.1,
             length: 88.0,
+            length_sd: Some(7.5),
         };
         let state = State::open(&path, &identity).unwrap();
         state.note(7, &[wake.detection()]).unwrap();
@@ -174,6 +179,7 @@ mod tests {
         let again = state.done[&7][0];
         assert_eq!(again.score.to_bits(), wake.score.to_bits());
         assert_eq!(again.wake, wake.detection().wake);
+        assert_eq!(again.length_sd, Some(7.5));
         let other = json!({"product": "a", "least_score": 0.2});
         let refused = State::open(&path, &other).unwrap_err().to_string();
         assert!(refused.contains("least_score is 0.1, not 0.2"), "{refused}");

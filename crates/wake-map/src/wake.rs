@@ -34,6 +34,8 @@ pub struct MappedWake {
     pub heading: Option<f64>,
     /// Visible length \[m\].
     pub length: Option<f64>,
+    /// Standard deviation of the visible length \[m\].
+    pub length_deviation: Option<f64>,
     /// (Pixel, line) of the end of what is seen.
     pub end_px: [f64; 2],
     /// Visible length \[pixels\].
@@ -90,6 +92,7 @@ fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
         end: None,
         heading: None,
         length: None,
+        length_deviation: None,
         end_px: wake.at(wake.length).map(f64::from),
         length_px: f64::from(wake.length),
         half_angle: f64::from(wake.half_angle_deg),
@@ -106,6 +109,8 @@ fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
         mapped.end = Some([to.longitude, to.latitude]);
         mapped.heading = Some(track.azimuth);
         mapped.length = Some(track.distance);
+        let relative = |deviation: f32| f64::from(deviation / wake.length.max(1.0));
+        mapped.length_deviation = detection.length_sd.map(|d| relative(d) * track.distance);
         mapped.incidence = from.incidence;
     }
     let sentinel = product.sentinel1();

@@ -165,6 +165,7 @@ fn detection(found: &Detection) -> Value {
         "axis_deg": wake.axis_deg,
         "half_angle_deg": wake.half_angle_deg,
         "length": wake.length,
+        "length_sd": found.length_sd,
         "corners": wake.oriented_box(),
     })
 }
