@@ -50,11 +50,11 @@ const BOUND: f32 = 4.0;
 
 /// How far a line goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Extent {
+pub struct Extent {
     /// From the tip \[pixels\].
-    pub(crate) length: f32,
+    pub length: f32,
     /// Its standard deviation \[pixels\].
-    pub(crate) deviation: f32,
+    pub deviation: f32,
 }
 
 /// An image in standard deviations of its speckle, `[rows, columns]`.

@@ -259,7 +259,7 @@ impl View<'_> {
         by_scale
     }
 
-    /// Wakes of a tile with their lengths measured in the image.
+    /// Wakes of a tile with the ends of their lines measured in the image.
     fn followed(&self, mut found: Vec<Detection>, tile: &Tile, search: Search) -> Vec<Detection> {
         if found.is_empty() {
             return found;
@@ -278,10 +278,7 @@ impl View<'_> {
         for one in &mut found {
             let mut seen = one.wake;
             seen.tip = [0, 1].map(|a| seen.tip[a] - tile.seen[0][1 - a] as f32);
-            if let Some(extent) = surroundings.extent(&seen) {
-                one.wake.length = extent.length;
-                one.length_sd = Some(extent.deviation);
-            }
+            one.extent = surroundings.extent(&seen);
         }
         found
     }

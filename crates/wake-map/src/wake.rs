@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use wake_detector::Detection;
+use wake_detector::{Detection, Extent};
 use wake_geo::Product;
 
 use crate::echo::Echo;
@@ -71,10 +71,11 @@ pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>>
 fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
     let Seen {
         detection,
-        wake,
         measured,
         echo,
+        ..
     } = *one;
+    let wake = one.visible();
     let (lines, pixels) = product.size();
     let inside = |[x, y]: [f32; 2]| {
         let clamped = |value: f32, size: usize| f64::from(value).clamp(-0.5, size as f64 - 0.5);
@@ -109,8 +110,10 @@ fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
         mapped.end = Some([to.longitude, to.latitude]);
         mapped.heading = Some(track.azimuth);
         mapped.length = Some(track.distance);
-        let relative = |deviation: f32| f64::from(deviation / wake.length.max(1.0));
-        mapped.length_deviation = detection.length_sd.map(|d| relative(d) * track.distance);
+        let relative = |extent: Extent| f64::from(extent.deviation / wake.length.max(1.0));
+        mapped.length_deviation = detection
+            .extent
+            .map(|extent| relative(extent) * track.distance);
         mapped.incidence = from.incidence;
     }
     let sentinel = product.sentinel1();
