@@ -179,7 +179,8 @@ impl Detector {
     #[must_use]
     pub fn find(&self, image: &GreyImage) -> Vec<Detection> {
         let Ok(found) = find(image, self, self.search);
-        self.rated(found)
+        let rated = self.rated(found).into_iter();
+        rated.map(Detection::measured).collect()
     }
 
     /// The wakes of one of the [`Tile`]s of an image that is read window by window, without probabilities;
@@ -192,7 +193,8 @@ impl Detector {
         in_tile(image, tile, self, self.search)
     }
 
-    /// The wakes of all tiles with their probabilities, each told once, the surest first.
+    /// The wakes of all tiles with their probabilities, each told once, the surest first, as long as the network says;
+    /// [`Detection::measured`] makes them as long as they were measured to be.
     #[must_use]
     pub fn merged(&self, found: Vec<Detection>) -> Vec<Detection> {
         self.rated(merged(found))

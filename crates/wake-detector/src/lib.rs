@@ -15,6 +15,7 @@ pub mod self_check;
 
 pub mod calibration;
 
+mod extent;
 mod maps;
 mod missing;
 mod search;
@@ -31,6 +32,7 @@ pub use burn;
 pub use calibration::Calibration;
 pub use detector::Detector;
 pub use error::{Error, Result};
+pub use extent::Extent;
 pub use files::{image_files, image_name, picture_name};
 pub use finder::{Finder, Radon};
 pub use image::GreyImage;

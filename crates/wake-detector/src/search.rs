@@ -1,5 +1,6 @@
 //! The search of an image: tiles, scales, network, wakes.
 
+use crate::extent::Surroundings;
 use crate::maps::{Maps, same, without_repeats};
 use crate::missing::filled;
 use crate::network::{MULTIPLE, STRIDE};
@@ -203,11 +204,7 @@ pub(crate) fn in_tile<R: Raster>(
         columns,
     };
     let by_scale = match search.spacing {
-        Some(metres) => {
-            // The images that the network learned from have pixels of about ten metres.
-            let native = (metres / 10.0).clamp(0.25, 1.0);
-            view.around_candidates(native, mapper)
-        }
+        Some(metres) => view.around_candidates(native_of_spacing(metres), mapper),
         None => view.at_all_scales(mapper),
     };
     let told = |one: Detection| -> Option<Detection> {
@@ -219,7 +216,7 @@ pub(crate) fn in_tile<R: Raster>(
         .into_iter()
         .map(|found| found.into_iter().filter_map(told).collect())
         .collect();
-    Ok(agreed(&by_scale))
+    Ok(view.followed(agreed(&by_scale), tile, search))
 }
 
 /// Pixels that are searched.
@@ -260,6 +257,30 @@ impl View<'_> {
             by_scale.push(found);
         }
         by_scale
+    }
+
+    /// Wakes of a tile with the ends of their lines measured in the image.
+    fn followed(&self, mut found: Vec<Detection>, tile: &Tile, search: Search) -> Vec<Detection> {
+        if found.is_empty() {
+            return found;
+        }
+        let contrast = normalize::contrast(self.pixels, self.rows, self.columns);
+        let native = search.spacing.map_or_else(
+            || native_scale(self.pixels, self.rows, self.columns),
+            native_of_spacing,
+        );
+        let surroundings = Surroundings {
+            contrast: &contrast,
+            rows: self.rows,
+            columns: self.columns,
+            unit: 1.0 / native,
+        };
+        for one in &mut found {
+            let mut seen = one.wake;
+            seen.tip = [0, 1].map(|a| seen.tip[a] - tile.seen[0][1 - a] as f32);
+            one.extent = surroundings.extent(&seen);
+        }
+        found
     }
 
     /// The wakes of a part, in pixels of the whole.
@@ -372,6 +393,11 @@ fn native_scale(pixels: &[f32], rows: usize, columns: usize) -> f32 {
     let correlation = (product / power).clamp(0.01, 0.99);
     let width = 0.5 / (-correlation.ln()).sqrt();
     (0.7 / width).clamp(0.5, 1.0) as f32
+}
+
+/// The scale of pixels of a known spacing \[m\]: the images that the network learned from have pixels of about ten metres.
+fn native_of_spacing(metres: f32) -> f32 {
+    (metres / 10.0).clamp(0.25, 1.0)
 }
 
 fn at_scale(pixels: &[f32], rows: usize, columns: usize, factor: f32, mapper: &dyn Mapper) -> Maps {

@@ -1,5 +1,7 @@
 //! Wakes in an image.
 
+use crate::extent::Extent;
+
 /// Half the width of a box at least \[pixels\]: that of the line itself.
 const LEAST_HALF_WIDTH: f32 = 8.0;
 
@@ -62,6 +64,8 @@ pub struct Detection {
     pub score: f32,
     /// Tip, axis, half-angle and visible length; its signal-to-noise is unknown, so infinite.
     pub wake: Wake,
+    /// The end of the line as measured in the image; `None` where it was not.
+    pub extent: Option<Extent>,
     /// Agreement of the line's direction with the axis: 1 from tip to end, −1 from end to tip; `None` where the method gives none.
     pub forward: Option<f32>,
     /// Probability of a wake in either direction; `None` without a calibration.
@@ -79,11 +83,19 @@ impl Detection {
         Self {
             score,
             wake,
+            extent: None,
             forward: None,
             probability: None,
             direction_probability: None,
             sure: true,
         }
+    }
+
+    /// The detection with the length that was measured, where one was.
+    #[must_use]
+    pub fn measured(mut self) -> Self {
+        self.wake.length = self.extent.map_or(self.wake.length, |extent| extent.length);
+        self
     }
 }
 

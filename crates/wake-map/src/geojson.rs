@@ -43,7 +43,7 @@ pub(crate) fn properties(wake: &MappedWake) -> Map<String, Value> {
     let echo = wake.echo.as_ref();
     let properties = json!({
         "type": "wake", "probability": wake.probability, "sure": wake.sure, "score": wake.score,
-        "direction_probability": wake.direction_probability, "heading_deg": wake.heading, "length_m": wake.length,
+        "direction_probability": wake.direction_probability, "heading_deg": wake.heading, "length_m": wake.length, "length_sd_m": wake.length_deviation,
         "contrast_db": wake.contrast_db, "kind": wake.kind, "half_angle_deg": wake.half_angle,
         "incidence_deg": wake.incidence, "time": wake.time, "line": wake.line, "pixel": wake.pixel,
         "displacement_m": echo.and_then(|echo| echo.displacement),

@@ -49,6 +49,20 @@ impl Seen {
         }
     }
 
+    /// The wake to the measured end of its line, where it was measured.
+    pub(crate) fn visible(&self) -> Wake {
+        let Some(extent) = self.detection.extent else {
+            return self.wake;
+        };
+        let [right, down] = self.wake.direction();
+        let moved = [0, 1].map(|k| self.wake.tip[k] - self.detection.wake.tip[k]);
+        let begun = moved[0] * right + moved[1] * down;
+        Wake {
+            length: (extent.length - begun).max(1.0),
+            ..self.wake
+        }
+    }
+
     /// Whether another detection, which is less sure, is of the same wake.
     fn is_again(&self, other: &Self) -> bool {
         let turn = (other.wake.axis_deg - self.wake.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
@@ -178,6 +192,22 @@ mod tests {
             kept[0].wake.length
         );
         assert!((kept[1].wake.length - 100.0).abs() < 1e-6);
+    }
+
+    /// The end of a line stays where it was measured, wherever the wake begins.
+    #[test]
+    fn a_wake_ends_where_it_was_measured() {
+        let mut one = seen(0.9, [480.0, 500.0], 90.0, None);
+        assert!((one.visible().length - 100.0).abs() < 1e-6);
+        let extent = wake_detector::Extent {
+            length: 250.0,
+            deviation: 20.0,
+        };
+        one.detection.extent = Some(extent);
+        one.wake.tip[0] += 30.0;
+        let visible = one.visible();
+        assert!((visible.at(visible.length)[0] - 730.0).abs() < 1e-3);
+        assert!((one.detection.measured().wake.length - 250.0).abs() < 1e-6);
     }
 
     /// A line to the right that was found 5 pixels too high and 20 ahead of a ship of 30 pixels: its wake begins at the stern, and

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use wake_detector::{Detection, Wake};
+use wake_detector::{Detection, Extent, Wake};
 
 use crate::error::{Error, Result};
 
@@ -21,6 +21,9 @@ struct Line {
     axis_deg: f32,
     half_angle_deg: f32,
     length: f32,
+    /// Measured length and its standard deviation.
+    #[serde(default)]
+    extent: Option<[f32; 2]>,
 }
 
 /// The wakes of a tile.
@@ -123,6 +126,7 @@ impl Line {
             axis_deg: one.wake.axis_deg,
             half_angle_deg: one.wake.half_angle_deg,
             length: one.wake.length,
+            extent: one.extent.map(|extent| [extent.length, extent.deviation]),
         }
     }
 
@@ -136,6 +140,9 @@ impl Line {
             contrast_db: None,
         };
         Detection {
+            extent: self
+                .extent
+                .map(|[length, deviation]| Extent { length, deviation }),
             forward: self.forward,
             ..Detection::new(self.score, wake)
         }
@@ -160,6 +167,7 @@ mod tests {
             axis_deg: 12.5,
             half_angle_deg: 0.1,
             length: 88.0,
+            extent: Some([91.0, 7.5]),
         };
         let state = State::open(&path, &identity).unwrap();
         state.note(7, &[wake.detection()]).unwrap();
@@ -174,6 +182,7 @@ mod tests {
         let again = state.done[&7][0];
         assert_eq!(again.score.to_bits(), wake.score.to_bits());
         assert_eq!(again.wake, wake.detection().wake);
+        assert_eq!(again.extent, wake.detection().extent);
         let other = json!({"product": "a", "least_score": 0.2});
         let refused = State::open(&path, &other).unwrap_err().to_string();
         assert!(refused.contains("least_score is 0.1, not 0.2"), "{refused}");

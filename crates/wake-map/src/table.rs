@@ -6,13 +6,14 @@ use crate::geojson::properties;
 use crate::wake::MappedWake;
 
 /// The columns of the table.
-const COLUMNS: [&str; 16] = [
+const COLUMNS: [&str; 17] = [
     "probability",
     "sure",
     "score",
     "heading_deg",
     "direction_probability",
     "length_m",
+    "length_sd_m",
     "contrast_db",
     "kind",
     "half_angle_deg",

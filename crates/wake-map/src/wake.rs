@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use wake_detector::Detection;
+use wake_detector::{Detection, Extent};
 use wake_geo::Product;
 
 use crate::echo::Echo;
@@ -34,6 +34,8 @@ pub struct MappedWake {
     pub heading: Option<f64>,
     /// Visible length \[m\].
     pub length: Option<f64>,
+    /// Standard deviation of the visible length \[m\].
+    pub length_deviation: Option<f64>,
     /// (Pixel, line) of the end of what is seen.
     pub end_px: [f64; 2],
     /// Visible length \[pixels\].
@@ -69,10 +71,11 @@ pub fn mapped(product: &Product, found: &[Detection]) -> Result<Vec<MappedWake>>
 fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
     let Seen {
         detection,
-        wake,
         measured,
         echo,
+        ..
     } = *one;
+    let wake = one.visible();
     let (lines, pixels) = product.size();
     let inside = |[x, y]: [f32; 2]| {
         let clamped = |value: f32, size: usize| f64::from(value).clamp(-0.5, size as f64 - 0.5);
@@ -90,6 +93,7 @@ fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
         end: None,
         heading: None,
         length: None,
+        length_deviation: None,
         end_px: wake.at(wake.length).map(f64::from),
         length_px: f64::from(wake.length),
         half_angle: f64::from(wake.half_angle_deg),
@@ -106,6 +110,10 @@ fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
         mapped.end = Some([to.longitude, to.latitude]);
         mapped.heading = Some(track.azimuth);
         mapped.length = Some(track.distance);
+        let relative = |extent: Extent| f64::from(extent.deviation / wake.length.max(1.0));
+        mapped.length_deviation = detection
+            .extent
+            .map(|extent| relative(extent) * track.distance);
         mapped.incidence = from.incidence;
     }
     let sentinel = product.sentinel1();

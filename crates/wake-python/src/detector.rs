@@ -68,7 +68,8 @@ impl PyDetector {
                 let Ok(wakes) = detector.find_in(&amplitudes, &tile);
                 found.extend(wakes);
             }
-            Ok(detector.merged(found))
+            let merged = detector.merged(found).into_iter();
+            Ok(merged.map(Detection::measured).collect::<Vec<_>>())
         })?;
         json(py, &found.iter().map(detection).collect::<Vec<_>>())
     }
@@ -165,6 +166,7 @@ fn detection(found: &Detection) -> Value {
         "axis_deg": wake.axis_deg,
         "half_angle_deg": wake.half_angle_deg,
         "length": wake.length,
+        "length_sd": found.extent.map(|extent| extent.deviation),
         "corners": wake.oriented_box(),
     })
 }

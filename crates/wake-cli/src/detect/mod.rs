@@ -139,6 +139,7 @@ fn as_json(one: &Detection) -> Value {
         "axis_deg": one.wake.axis_deg,
         "half_angle_deg": one.wake.half_angle_deg,
         "length_px": one.wake.length,
+        "length_sd_px": one.extent.map(|extent| extent.deviation),
         "oriented_box": one.wake.oriented_box(),
     })
 }

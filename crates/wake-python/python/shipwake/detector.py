@@ -39,6 +39,8 @@ class Detection:
     """Half the angle between the outer edges [degrees]."""
     length: float
     """Visible length [pixels]."""
+    length_sd: float | None
+    """Standard deviation of the length [pixels]; ``None`` where the surroundings of the line do not lie in the image."""
     corners: npt.NDArray[np.float64]
     """``[4, 2]``: corners of the box along the wake, left and right of the tip first."""
 
@@ -186,6 +188,7 @@ def _detection(one: Mapping[str, Any]) -> Detection:
         axis_deg=one["axis_deg"],
         half_angle_deg=one["half_angle_deg"],
         length=one["length"],
+        length_sd=one["length_sd"],
         corners=np.asarray(one["corners"], dtype=np.float64),
     )
 

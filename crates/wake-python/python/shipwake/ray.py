@@ -133,7 +133,7 @@ class Detect:
         pair = pa.list_(pa.float64())
         numbers = dict.fromkeys(("score", "probability", "direction_probability"), pa.float64())
         numbers |= {"sure": pa.bool_(), "line": pa.float64(), "pixel": pa.float64(), "tip": pair, "end": pair}
-        numbers |= dict.fromkeys(("heading", "length"), pa.float64())
+        numbers |= dict.fromkeys(("heading", "length", "length_deviation"), pa.float64())
         numbers |= {"end_px": pair, "length_px": pa.float64(), "half_angle": pa.float64(), "contrast_db": pa.float64()}
         numbers |= {"kind": pa.string(), "incidence": pa.float64(), "time": pa.string()}
         echo = ["line", "pixel", "latitude", "longitude", "displacement", "radial_velocity", "radial_velocity_deviation"]
