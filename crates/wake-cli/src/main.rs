@@ -11,10 +11,10 @@ mod locate;
 #[cfg(feature = "simulate")]
 mod sheet;
 #[cfg(feature = "simulate")]
+mod estimate;
+#[cfg(feature = "simulate")]
 mod simulate;
 
-#[cfg(feature = "prompt")]
-mod estimate;
 #[cfg(feature = "prompt")]
 mod prompt;
 
@@ -78,7 +78,7 @@ enum Command {
     Locate(locate::Arguments),
     #[cfg(feature = "train")]
     Evaluate(evaluate::Arguments),
-    #[cfg(feature = "prompt")]
+    #[cfg(feature = "simulate")]
     Estimate(estimate::Arguments),
     #[cfg(feature = "export")]
     Export(export::Arguments),
@@ -109,7 +109,7 @@ fn main() -> ExitCode {
         Command::Locate(arguments) => locate::run(&arguments),
         #[cfg(feature = "train")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
-        #[cfg(feature = "prompt")]
+        #[cfg(feature = "simulate")]
         Command::Estimate(arguments) => estimate::run(&arguments),
         #[cfg(feature = "export")]
         Command::Export(arguments) => export::run(&arguments),

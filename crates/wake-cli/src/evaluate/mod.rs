@@ -8,7 +8,6 @@ mod detector;
 mod domain;
 mod domain_report;
 mod effects;
-mod estimate;
 mod judged;
 mod model;
 mod options;
@@ -37,7 +36,6 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         Some(Task::Sea(options)) => sea::run(options),
         Some(Task::Detector(options)) => detector::run(options),
         Some(Task::Calibration(options)) => calibration::run(options),
-        Some(Task::Estimate(options)) => estimate::run(options),
     }
 }
 

@@ -174,8 +174,10 @@ mod tests {
             }
         }
         let values: Vec<f64> = direction.values.iter().map(|v| f64::from(*v)).collect();
-        let solved = full.inverse().unwrap().product(&values);
-        let expected: f64 = values.iter().zip(&solved).map(|(a, b)| a * b).sum();
+        let inverse = full.inverse().unwrap();
+        let pairs = (0..36).flat_map(|a| (0..36).map(move |b| [a, b]));
+        let products = pairs.map(|[a, b]| values[a] * inverse.at(a, b) * values[b]);
+        let expected: f64 = products.sum();
         assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
     }
 }

@@ -1,4 +1,4 @@
-//! What is estimated: scene values, the size of the ship, and nuisance values of the image.
+//! What an image tells of: scene values, the size of the ship, and nuisance values of the image.
 
 use super::value::Value;
 use serde::Serialize;
@@ -51,6 +51,33 @@ impl Parameter {
         }
     }
 
+    /// Its unit; of the factors' logarithms 1.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Value(Value::Speed | Value::WindSpeed) => "m/s",
+            Self::Value(Value::Heading | Value::WindToward | Value::Incidence) => "deg",
+            Self::Value(_) | Self::Size => "m",
+            Self::Gain | Self::Texture => "",
+        }
+    }
+
+    /// Whether it is one of the ship.
+    #[must_use]
+    pub fn is_of_ship(self) -> bool {
+        match self {
+            Self::Value(value) => value.is_of_ship(),
+            Self::Size => true,
+            Self::Gain | Self::Texture => false,
+        }
+    }
+
+    /// Whether it is a factor on the image, not a value of the scene.
+    #[must_use]
+    pub fn is_nuisance(self) -> bool {
+        matches!(self, Self::Gain | Self::Texture)
+    }
+
     /// Scene values that it changes.
     pub(super) fn values(self) -> &'static [Value] {
         match self {
@@ -64,7 +91,7 @@ impl Parameter {
     }
 }
 
-/// Factors on what a scene makes, known from elsewhere or estimated as nuisance values.
+/// Factors on what a scene makes: nuisance values of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factors {
     /// Factor on the mean image \[1\], above 0: its logarithm is [`Parameter::Gain`].

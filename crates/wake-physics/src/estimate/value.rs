@@ -131,8 +131,8 @@ impl Value {
         match self {
             Self::Speed => 2e-3 * self.of(scene).max(0.1),
             // At half a kilometre as far as a position moves.
-            Self::Heading => (0.02 * beam / 500.0).to_degrees(),
-            Self::X | Self::Y => 0.02 * beam,
+            Self::Heading => (0.002 * beam / 500.0).to_degrees(),
+            Self::X | Self::Y => 0.002 * beam,
             Self::Size | Self::Length | Self::Beam | Self::Draft | Self::WindSpeed => {
                 2e-3 * self.of(scene).max(0.01)
             }

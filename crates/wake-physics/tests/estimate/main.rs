@@ -8,4 +8,3 @@
 
 mod bounds;
 mod derivatives;
-mod reader;
