@@ -11,6 +11,8 @@ mod locate;
 #[cfg(feature = "simulate")]
 mod sheet;
 #[cfg(feature = "simulate")]
+mod estimate;
+#[cfg(feature = "simulate")]
 mod simulate;
 
 #[cfg(feature = "prompt")]
@@ -76,6 +78,8 @@ enum Command {
     Locate(locate::Arguments),
     #[cfg(feature = "train")]
     Evaluate(evaluate::Arguments),
+    #[cfg(feature = "simulate")]
+    Estimate(estimate::Arguments),
     #[cfg(feature = "export")]
     Export(export::Arguments),
     #[cfg(feature = "bench")]
@@ -105,6 +109,8 @@ fn main() -> ExitCode {
         Command::Locate(arguments) => locate::run(&arguments),
         #[cfg(feature = "train")]
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        #[cfg(feature = "simulate")]
+        Command::Estimate(arguments) => estimate::run(&arguments),
         #[cfg(feature = "export")]
         Command::Export(arguments) => export::run(&arguments),
         #[cfg(feature = "bench")]

@@ -94,6 +94,7 @@ mod plan;
 pub mod labels;
 mod simulate;
 pub mod measure;
+pub mod estimate;
 pub mod reference;
 
 pub use error::{Error, Result};

@@ -231,7 +231,7 @@ impl Models {
 }
 
 /// The Kelvin wake of a ship.
-fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
+pub(crate) fn kelvin_wake(ship: &Ship, depth: f64, time: f64) -> KelvinWake {
     let (length, beam, draft) = (ship.length, ship.beam, ship.draft);
     KelvinWake {
         hull: match ship.hull {

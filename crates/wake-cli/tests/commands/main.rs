@@ -7,6 +7,8 @@ mod bench;
 mod dataset;
 #[cfg(feature = "train")]
 mod detector;
+#[cfg(feature = "simulate")]
+mod estimate;
 #[cfg(feature = "train")]
 mod evaluate;
 #[cfg(feature = "export")]

@@ -21,6 +21,18 @@ pub fn fade(forward: f64, length: f64) -> f64 {
     s * s * s * (10.0 + s * (6.0 * s - 15.0))
 }
 
+/// [`fade`], and its derivatives by ξ and by L [1/m].
+#[inline(always)]
+pub(crate) fn fade_with_slope(forward: f64, length: f64) -> [f64; 3] {
+    let s = (0.5 - forward / length).clamp(0.0, 1.0);
+    let slope = 30.0 * (s * (1.0 - s)).powi(2);
+    [
+        fade(forward, length),
+        -slope / length,
+        slope * forward / (length * length),
+    ]
+}
+
 /// [`fade`] at every pixel of a raster.
 #[must_use]
 pub fn fade_field(track: &Track, length: f64, raster: &Raster) -> Field {
@@ -75,6 +87,21 @@ mod tests {
             assert!(bend.abs() <= 5.8e-4 * d * d + 1e-15);
             assert!(fade(x, 100.0) <= last);
             last = fade(x, 100.0);
+        }
+    }
+
+    #[test]
+    fn slopes_are_derivatives() {
+        for forward in [-60.0, -49.0, -20.0, 0.0, 31.0, 49.9, 80.0] {
+            let [value, by_forward, by_length] = fade_with_slope(forward, 100.0);
+            assert_eq!(value, fade(forward, 100.0));
+            let d = 1e-4;
+            let central = |at: &dyn Fn(f64) -> f64| (at(d) - at(-d)) / (2.0 * d);
+            let expected = central(&|d| fade(forward + d, 100.0));
+            // d² times third derivatives of 60/L³, and rounding.
+            assert!((by_forward - expected).abs() < 1e-10, "{forward}");
+            let expected = central(&|d| fade(forward, 100.0 + d));
+            assert!((by_length - expected).abs() < 1e-10, "{forward}");
         }
     }
 

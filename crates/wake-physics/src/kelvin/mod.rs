@@ -22,7 +22,7 @@ mod subpixel;
 mod zones;
 
 pub use fade::{fade, fade_field};
-pub(crate) use fade::{fade_at, fill_fade};
+pub(crate) use fade::{fade_at, fade_with_slope, fill_fade};
 pub use panels::{WakePlan, Zone};
 pub(crate) use rays::Ray;
 pub use rays::{KELVIN_ANGLE, half_angle};

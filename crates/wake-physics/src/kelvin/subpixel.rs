@@ -243,6 +243,98 @@ impl SubpixelWake {
     }
 }
 
+/// Standard deviation over which [`SubpixelWake::smoothed`] averages, in rays.
+const SMOOTHING: f64 = 10.0;
+
+/// Rays that an average looks at on each side.
+const SMOOTHED: usize = 40;
+
+impl SubpixelWake {
+    /// The same waves averaged over the rays around each, a Gaussian of [`SMOOTHING`] rays: variances then are a smooth function of
+    /// the place, which pass to 0 beyond the outermost ray.
+    pub(crate) fn smoothed(&self) -> Self {
+        let average = |branch: &Vec<WavesOfRay>| -> Vec<WavesOfRay> {
+            let count = branch.len();
+            let one = |n: usize| {
+                let mut sum = Sum::default();
+                let (mut total, mut square_speed) = (0.0, 0.0);
+                for m in 0..=2 * SMOOTHED {
+                    let off = m as f64 - SMOOTHED as f64;
+                    let weight = (-0.5 * (off / SMOOTHING).powi(2)).exp();
+                    total += weight;
+                    // The rays on the other side of the track are the same.
+                    let ray = n as isize + m as isize - SMOOTHED as isize;
+                    let ray = if ray < 0 { -1 - ray } else { ray } as usize;
+                    let Some(waves) = branch.get(ray) else {
+                        continue;
+                    };
+                    let slopes = weight * waves.slopes;
+                    sum.slopes += slopes;
+                    sum.cosine += slopes * waves.direction[0];
+                    sum.decay += slopes * waves.decay;
+                    square_speed += slopes * waves.square_speed;
+                }
+                if sum.slopes <= 0.0 {
+                    return WavesOfRay::default();
+                }
+                let cosine = (sum.cosine / sum.slopes).min(1.0);
+                WavesOfRay {
+                    slopes: sum.slopes / total,
+                    direction: [cosine, (1.0 - cosine * cosine).sqrt()],
+                    square_speed: square_speed / sum.slopes,
+                    decay: sum.decay / sum.slopes,
+                }
+            };
+            (0..count + SMOOTHED).map(one).collect()
+        };
+        let branches = self.branches.each_ref().map(average);
+        Self {
+            widest: (self.step * branches[0].len() as f64).min(1.5).tan(),
+            branches,
+            ..self.clone()
+        }
+    }
+
+    /// [`Self::at`], interpolated between the rays of [`Self::smoothed`] waves.
+    pub(crate) fn between(&self, place: [f64; 2]) -> Option<Roughness> {
+        let [ahead, port] = self.track.seen_from_ship(place);
+        let shown = fade(ahead, self.length).powi(2);
+        if port.abs() >= self.widest * -ahead || shown <= 0.0 {
+            return None;
+        }
+        let ray = port.abs().atan2(-ahead) / self.step - 0.5;
+        let (ray, side) = (ray.max(0.0), if ray < 0.0 { 2.0 * ray + 1.0 } else { 1.0 });
+        let first = ray as usize;
+        let part = ray - first as f64;
+        let mut out = Roughness::default();
+        for branch in &self.branches {
+            for (ray, weight) in [(first, 1.0 - part), (first + 1, part)] {
+                let Some(waves) = branch.get(ray).filter(|_| weight > 0.0) else {
+                    continue;
+                };
+                let variance = weight * shown * waves.variance(-ahead);
+                let [along, across] = waves.direction;
+                let [x, y] = self.track.turned([along, across.copysign(port)]);
+                // Both sides of the track meet on it: the product of along and across is odd.
+                let [u, v] = self.track.turned([along, -across.copysign(port)]);
+                let product = |a: f64, b: f64| 0.5 * (1.0 + side) * a + 0.5 * (1.0 - side) * b;
+                let slopes = [
+                    product(x * x, u * u),
+                    product(x * y, u * v),
+                    product(y * y, v * v),
+                ]
+                .map(|p| variance * p);
+                for (sum, slope) in out.slopes.iter_mut().zip(slopes) {
+                    *sum += slope;
+                }
+                out.velocity[0] += slopes[0] * waves.square_speed;
+                out.velocity[1] += variance * waves.square_speed;
+            }
+        }
+        Some(out)
+    }
+}
+
 impl WavesOfRay {
     /// Variance of the slopes at a distance astern of midship \[m\].
     fn variance(&self, distance: f64) -> f64 {

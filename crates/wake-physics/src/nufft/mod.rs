@@ -89,39 +89,69 @@ pub(crate) fn synthesize_each(
     workspace: &mut Workspace,
     summands: Summands<'_>,
     tolerance: f64,
-    mut take: impl FnMut(usize, &mut Field),
+    take: impl FnMut(usize, &mut Field),
 ) -> f64 {
-    let Summands { waves, raster, .. } = summands;
     let sums = CentredSums::new(summands, WAVES_AT_ONCE);
-    let mut rms: Vec<f64> = sums.sizes.iter().map(|s| s.expected_rms()).collect();
-    let mut todo: Vec<usize> = (0..rms.len()).filter(|&q| rms[q] > 0.0).collect();
-    let mut reached = 0.0f64;
-    for attempt in 1..=ATTEMPTS {
-        if todo.is_empty() || raster.is_empty() {
-            break;
-        }
-        let demand = Demand::strictest(todo.iter().map(|&q| (sums.sizes[q], rms[q])), tolerance);
-        let gridding = Gridding::fastest(&demand, raster, [waves.len(), todo.len()]);
-        let mut again = Vec::new();
-        let check = |q: usize, field: &mut Field| {
-            // A field below its own error says nothing yet; the estimate falls, but never to nothing.
-            rms[q] = field.rms().max(1e-6 * rms[q]);
-            let error = gridding.error_bound(&sums.sizes[q]) / rms[q];
-            if attempt < ATTEMPTS && error > tolerance {
-                again.push(q);
-            } else {
-                reached = reached.max(error);
-                take(q, field);
+    sums.compute(workspace, summands.waves.len(), tolerance, take)
+}
+
+/// Fields Σₙ Re[sₙ exp(i kₙ·x)] of waves whose strengths s are given, one field a set of strengths: as exact as
+/// [`synthesize`]; `take` as in [`synthesize_each`].
+///
+/// - `wavenumbers`: kx and ky [rad/m], as many as each set has strengths
+pub(crate) fn sum_strengths(
+    workspace: &mut Workspace,
+    (wavenumbers, strengths): ([&[f64]; 2], Vec<Vec<Complex64>>),
+    raster: &Raster,
+    tolerance: f64,
+    take: impl FnMut(usize, &mut Field),
+) -> f64 {
+    let part = Part::of(wavenumbers, strengths, raster);
+    let count = wavenumbers[0].len();
+    CentredSums::of(raster, part).compute(workspace, count, tolerance, take)
+}
+
+impl CentredSums<'_> {
+    /// Computes all fields, of `waves` waves.
+    fn compute(
+        &self,
+        workspace: &mut Workspace,
+        waves: usize,
+        tolerance: f64,
+        mut take: impl FnMut(usize, &mut Field),
+    ) -> f64 {
+        let (sums, raster) = (self, self.raster);
+        let mut rms: Vec<f64> = sums.sizes.iter().map(|s| s.expected_rms()).collect();
+        let mut todo: Vec<usize> = (0..rms.len()).filter(|&q| rms[q] > 0.0).collect();
+        let mut reached = 0.0f64;
+        for attempt in 1..=ATTEMPTS {
+            if todo.is_empty() || raster.is_empty() {
+                break;
             }
-        };
-        if gridding.double_precision {
-            sums.run::<f64>(workspace, &gridding, &todo, check);
-        } else {
-            sums.run::<f32>(workspace, &gridding, &todo, check);
+            let demand =
+                Demand::strictest(todo.iter().map(|&q| (sums.sizes[q], rms[q])), tolerance);
+            let gridding = Gridding::fastest(&demand, raster, [waves, todo.len()]);
+            let mut again = Vec::new();
+            let check = |q: usize, field: &mut Field| {
+                // A field below its own error says nothing yet; the estimate falls, but never to nothing.
+                rms[q] = field.rms().max(1e-6 * rms[q]);
+                let error = gridding.error_bound(&sums.sizes[q]) / rms[q];
+                if attempt < ATTEMPTS && error > tolerance {
+                    again.push(q);
+                } else {
+                    reached = reached.max(error);
+                    take(q, field);
+                }
+            };
+            if gridding.double_precision {
+                sums.run::<f64>(workspace, &gridding, &todo, check);
+            } else {
+                sums.run::<f32>(workspace, &gridding, &todo, check);
+            }
+            todo = again;
         }
-        todo = again;
+        reached
     }
-    reached
 }
 
 /// Waves that one thread looks at by itself.
@@ -132,7 +162,9 @@ pub(crate) const WAVES_AT_ONCE: usize = 1 << 22;
 
 /// Waves with their phases counted from the raster's middle pixel.
 struct CentredSums<'a> {
-    summands: Summands<'a>,
+    raster: &'a Raster,
+    /// What parts are made of, where not all waves are spread at once.
+    summands: Option<Summands<'a>>,
     /// One a quantity.
     sizes: Vec<Size>,
     /// All waves, where they are spread at once.
@@ -157,20 +189,24 @@ impl Part {
             quantities,
             raster,
         } = summands;
+        let strengths = strengths(waves, transfer, quantities);
+        Self::of([&waves.kx, &waves.ky], strengths, raster)
+    }
+
+    fn of([kx, ky]: [&[f64]; 2], mut strengths: Vec<Vec<Complex64>>, raster: &Raster) -> Self {
         let (x, y) = (raster.x(raster.columns / 2), raster.y(raster.rows / 2));
-        let phases: Vec<Complex64> = (0..waves.len())
+        let phases: Vec<Complex64> = (0..kx.len())
             .into_par_iter()
             .with_min_len(MANY)
-            .map(|n| Complex64::cis(waves.kx[n] * x + waves.ky[n] * y))
+            .map(|n| Complex64::cis(kx[n] * x + ky[n] * y))
             .collect();
-        let mut strengths = strengths(waves, transfer, quantities);
         for s in &mut strengths {
             s.iter_mut().zip(&phases).for_each(|(s, p)| *s *= p);
         }
         let step = raster.spacing / TAU;
         Self {
-            cycles: (0..waves.len())
-                .map(|n| [waves.ky[n] * step, waves.kx[n] * step])
+            cycles: (0..kx.len())
+                .map(|n| [ky[n] * step, kx[n] * step])
                 .collect(),
             strengths,
         }
@@ -207,16 +243,38 @@ impl<'a> CentredSums<'a> {
     /// - `at_once`: waves that are spread at once
     fn new(summands: Summands<'a>, at_once: usize) -> Self {
         let Summands {
-            waves, quantities, ..
+            waves,
+            quantities,
+            raster,
+            ..
         } = summands;
-        let mut sums = Self {
-            summands,
+        Self {
+            raster,
+            summands: Some(summands),
             sizes: Vec::new(),
             whole: (waves.len() <= at_once).then(|| Part::new(summands)),
             at_once,
-        };
-        let mut totals = vec![[0.0; 2]; quantities.len()];
-        sums.each_part(|part| {
+        }
+        .sized(quantities.len())
+    }
+
+    /// Sums of the waves of one part.
+    fn of(raster: &'a Raster, part: Part) -> Self {
+        let count = part.strengths.len();
+        Self {
+            raster,
+            summands: None,
+            sizes: Vec::new(),
+            whole: Some(part),
+            at_once: usize::MAX,
+        }
+        .sized(count)
+    }
+
+    /// With the sizes of the strengths of `count` fields.
+    fn sized(mut self, count: usize) -> Self {
+        let mut totals = vec![[0.0; 2]; count];
+        self.each_part(|part| {
             for (total, strengths) in totals.iter_mut().zip(&part.strengths) {
                 for strength in strengths {
                     total[0] += strength.norm();
@@ -228,8 +286,8 @@ impl<'a> CentredSums<'a> {
             sum,
             root: squares.sqrt(),
         };
-        sums.sizes = totals.into_iter().map(size).collect();
-        sums
+        self.sizes = totals.into_iter().map(size).collect();
+        self
     }
 
     /// Looks at the waves, part by part.
@@ -237,12 +295,15 @@ impl<'a> CentredSums<'a> {
         if let Some(part) = &self.whole {
             return look(part);
         }
-        let waves = self.summands.waves;
+        let Some(summands) = self.summands else {
+            return;
+        };
+        let waves = summands.waves;
         for start in (0..waves.len()).step_by(self.at_once) {
             let some = waves.part(start..(start + self.at_once).min(waves.len()));
             look(&Part::new(Summands {
                 waves: &some,
-                ..self.summands
+                ..summands
             }));
         }
     }
@@ -255,7 +316,7 @@ impl<'a> CentredSums<'a> {
         todo: &[usize],
         mut done: impl FnMut(usize, &mut Field),
     ) {
-        let raster = self.summands.raster;
+        let raster = self.raster;
         let [rows, columns] = gridding.lattice;
         let mut fields = [(); 2].map(|()| workspace.field(raster));
         let (blocks, planner) = T::of(workspace);

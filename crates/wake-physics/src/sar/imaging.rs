@@ -35,7 +35,7 @@ pub struct Sources<'a> {
 
 /// Smallest variance of the azimuth response [pixel²]: half a pixel of standard deviation, a width at half
 /// power of 1.2 pixels. A narrower response would fall between the pixels.
-pub(super) const SMALLEST_VARIANCE: f64 = 0.25;
+pub(crate) const SMALLEST_VARIANCE: f64 = 0.25;
 
 /// Velocity, acceleration and elevation to rows, columns and widths.
 #[derive(Debug, Clone, Copy)]

@@ -132,6 +132,13 @@ impl ImpulseResponse {
     /// As [`Self::multilook`], and if the sources are too coarse for twice the bandwidth.
     #[must_use]
     pub fn mean(&self, sources: &Reflectivity<'_>, image: &Raster) -> Field {
+        let mut mean = self.filtered(sources, image);
+        mean.values.iter_mut().for_each(|v| *v = v.max(0.0));
+        mean
+    }
+
+    /// [`Self::mean`] of an intensity that may be negative, such as a derivative.
+    pub(crate) fn filtered(&self, sources: &Reflectivity<'_>, image: &Raster) -> Field {
         let view = View::new(sources, image);
         let raster = sources.raster;
         let bands = self.bands(&view, raster.spacing).map(|b| power_band(&b));
@@ -155,7 +162,7 @@ impl ImpulseResponse {
         let mut out = Field::constant(image, 0.0);
         let take = |from: &[Complex32], to: &mut [f32]| {
             for (to, from) in to.iter_mut().zip(from) {
-                *to = from.re.max(0.0);
+                *to = from.re;
             }
         };
         filter.run(

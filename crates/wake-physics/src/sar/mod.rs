@@ -19,6 +19,7 @@ pub mod scatterers;
 pub mod speckle;
 
 mod imaging;
+pub(crate) mod smooth;
 mod taps;
 
 pub use coherence::AzimuthResolution;

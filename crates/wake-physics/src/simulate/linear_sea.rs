@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Pixels between opposite edges of an image, around the period of the field.
-const GUARD: usize = 64;
+pub(crate) const GUARD: usize = 64;
 
 /// Waves that the smear leaves less of their variance are not there.
 const LEAST_SHARE: f64 = 1e-6;
@@ -186,7 +186,7 @@ fn pairs(variances: &[f32], period: usize) -> impl Iterator<Item = f32> {
 /// Adds the waves of a swell to variances along +k, all of its variance however few of them are near its peak.
 ///
 /// - `period` waves along each axis, `step` between them [rad/m]
-fn add_swell(swell: Option<&Swell>, variances: &mut [f32], period: usize, step: f64) {
+pub(crate) fn add_swell(swell: Option<&Swell>, variances: &mut [f32], period: usize, step: f64) {
     let Some(swell) = swell else {
         return;
     };

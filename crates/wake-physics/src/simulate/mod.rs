@@ -5,7 +5,7 @@
 //! ```
 
 mod direct;
-mod linear_sea;
+pub(crate) mod linear_sea;
 mod radar;
 mod record;
 mod simulation;

@@ -166,11 +166,16 @@ impl Transfer {
             Quantity::VelocityZ => -i * omega,
             Quantity::RadialAcceleration => -i * omega * self.radial([kx, ky], omega),
             Quantity::Hydrodynamic if k > LARGEST_MODULATING_WAVENUMBER => Complex64::ZERO,
-            Quantity::Hydrodynamic => {
-                let gradient = i * kx * (horizontal * kx / k);
-                -self.action_slope * gradient / (self.relaxation_rate - i * omega)
-            }
+            Quantity::Hydrodynamic => self.modulation([kx, ky], omega),
         }
+    }
+
+    /// Modulation by a wave of any length, which [`Self::factor`] ends at 5 m [1/m].
+    pub(crate) fn modulation(&self, [kx, ky]: [f64; 2], omega: f64) -> Complex64 {
+        let k = kx.hypot(ky);
+        let horizontal = omega / crate::dispersion::depth_factor(k, self.depth);
+        let gradient = Complex64::i() * kx * (horizontal * kx / k);
+        -self.action_slope * gradient / (self.relaxation_rate - Complex64::i() * omega)
     }
 
     /// Factor of the velocity toward the radar, vz cos θ − vx sin θ [1/s]; 0 at k = 0.

@@ -1,0 +1,128 @@
+//! The likelihood of an image given a scene, to second order.
+//!
+//! Relative intensity r = I/μ − 1 has a covariance that is the same everywhere ([`super::noise`]). Seen through a window w its
+//! spectrum R = F[w r] has the power S = E|R|², and wavenumbers are taken as independent (Whittle):
+//!
+//! ```text
+//! ln L = −½ c Σ (|R|²/S + ln S) − Σ w² ln μ,       c = Σw²/P²   on a torus of P² pixels
+//! score of the mean      g = c Σ Re D̄ R/S,          D = F[w ∂ln μ]
+//! score of the spectrum  g = ½ c Σ (∂ln S)(|R|²/S − 1)
+//! ```
+//!
+//! The scores have the mean 0 whenever mean and covariance are right: Gamma speckle and a sea that is not Gaussian change no
+//! more than their variances. The variance V of the score of the mean is computed with the covariance between all pixels, not
+//! from the approximation; that of the spectrum is the Gaussian one. Standard deviations are those of J⁻¹VJ⁻¹
+//! (Godambe), J the expected slope of the score.
+//!
+//! # References
+//!
+//! Whittle (1953), Ark. Mat. 2, 423; Godambe (1960), Ann. Math. Stat. 31, 1208.
+
+use super::expected::{Expected, ExpectedImage};
+use super::observed::{Observed, Texture};
+use super::parameter::{Factors, Parameter};
+use super::priors::values_of;
+use crate::error::{Error, Result};
+use crate::raster::Field;
+use crate::scene::Scene;
+
+/// The likelihood of images given a scene.
+///
+/// ```
+/// use wake_physics::estimate::{Factors, Likelihood, Parameter};
+/// use wake_physics::{Scene, simulate};
+///
+/// let mut scene = Scene::default();
+/// (scene.grid.rows, scene.grid.columns) = (64, 64);
+/// let image = simulate(&scene)?.speckled;
+/// let likelihood = Likelihood::new(&scene, &Parameter::OF_WAKE)?;
+/// let here = likelihood.of(&image, &Factors::default())?;
+/// // A sea of twice the variance is less likely, and the score says so.
+/// let rougher = likelihood.of(&image, &Factors { texture: 2.0, ..Factors::default() })?;
+/// assert!(rougher.log_likelihood < here.log_likelihood);
+/// # Ok::<(), wake_physics::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Likelihood {
+    parameters: Vec<Parameter>,
+    scene: Scene,
+    expected: Expected,
+    texture: Texture,
+}
+
+/// What an image says of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Score {
+    /// ln likelihood, but for a constant of the image.
+    pub log_likelihood: f64,
+    /// Its slope by each parameter: mean 0 over images of the scene.
+    pub score: Vec<f64>,
+    /// Expected slope J of the score, row after row.
+    pub information: Vec<f64>,
+    /// Variance V of the score, row after row: that of an estimate is J⁻¹VJ⁻¹.
+    pub variance: Vec<f64>,
+    /// Power of the residual over its expectation by rings of wavenumbers, the longest waves first: 1 where the scene explains the
+    /// image.
+    pub power: Vec<f64>,
+}
+
+impl Likelihood {
+    /// The likelihood near a scene, with the score of some parameters.
+    ///
+    /// # Errors
+    ///
+    /// As [`ExpectedImage::new`].
+    pub fn new(scene: &Scene, parameters: &[Parameter]) -> Result<Self> {
+        let image = ExpectedImage::new(scene, &values_of(parameters))?;
+        Ok(Self {
+            expected: image.at(scene)?,
+            texture: Texture::new(scene, parameters)?,
+            parameters: parameters.to_vec(),
+            scene: scene.clone(),
+        })
+    }
+
+    /// Reads an image of intensity with speckle, in the unit of σ⁰ times the gain.
+    ///
+    /// # Errors
+    ///
+    /// An image of another size than the grid, one that holds a value that is negative or no number, or factors that are.
+    pub fn of(&self, image: &Field, factors: &Factors) -> Result<Score> {
+        let conflict = |name: &str, value: String, requirement: &str| {
+            Err(Error::Conflict {
+                name: name.to_owned(),
+                value,
+                requirement: requirement.to_owned(),
+            })
+        };
+        let grid = &self.scene.grid;
+        if [image.rows, image.columns] != [grid.rows, grid.columns] {
+            let value = format!("{} x {} pixels", image.rows, image.columns);
+            let requirement = format!("but the grid has {} x {}", grid.rows, grid.columns);
+            return conflict("image", value, &requirement);
+        }
+        if !image.values.iter().all(|v| v.is_finite() && *v >= 0.0) {
+            let requirement = "but intensities are finite and not negative";
+            return conflict("image", "not an intensity".to_owned(), requirement);
+        }
+        let Factors { gain, texture } = *factors;
+        if !(gain.is_finite() && gain > 0.0 && texture.is_finite() && texture >= 0.0) {
+            let value = format!("gain {gain}, texture {texture}");
+            return conflict("factors", value, "but they are finite and not negative");
+        }
+        let observed = Observed::new(image.clone(), &self.scene, |_, _| 1.0);
+        let near = observed.near(
+            &self.parameters,
+            (factors, &self.expected),
+            &self.texture,
+            true,
+        );
+        Ok(Score {
+            log_likelihood: near.log_likelihood,
+            score: near.score,
+            information: near.information.slope.values,
+            variance: near.information.variance.values,
+            power: near.rings.iter().map(|ring| ring[0]).collect(),
+        })
+    }
+}

@@ -1,0 +1,174 @@
+use super::*;
+use crate::estimate::expected::ExpectedImage;
+use crate::estimate::priors::values_of;
+use crate::estimate::value::Value;
+use crate::sar::speckle::speckle;
+use crate::simulate::Simulator;
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Images that are drawn.
+const SEEDS: u64 = 200;
+
+fn scene() -> Scene {
+    let keys = [
+        "grid.rows=96",
+        "grid.columns=96",
+        "grid.spacing=4",
+        "ship.heading=60",
+        "sea.wind_speed=4",
+        "model.tolerance=1e-2",
+    ];
+    Scene::default().with_assignments(&keys).unwrap()
+}
+
+/// Mean of each score over its stated standard deviation, and its mean square over the stated variance, for images of seeds.
+fn scores(
+    scene: &Scene,
+    mut image: impl FnMut(&Expected, &Texture, u64) -> Field,
+) -> Vec<[f64; 2]> {
+    let parameters = Parameter::OF_WAKE;
+    let expected = ExpectedImage::new(scene, &values_of(&parameters)).unwrap();
+    let expected = expected.at(scene).unwrap();
+    let texture = Texture::new(scene, &parameters).unwrap();
+    let mut observed = Observed::new(expected.intensity.clone(), scene, |_, _| 1.0);
+    let mut sums = vec![[0.0; 2]; parameters.len()];
+    let mut stated = Vec::new();
+    for seed in 0..SEEDS {
+        observed.image = image(&expected, &texture, seed);
+        let near = observed.near(
+            &parameters,
+            (&Factors::default(), &expected),
+            &texture,
+            seed == 0,
+        );
+        if seed == 0 {
+            let variance = |n| near.information.variance.at(n, n);
+            stated = (0..parameters.len()).map(variance).collect();
+        }
+        for (sums, score) in sums.iter_mut().zip(&near.score) {
+            sums[0] += score;
+            sums[1] += score * score;
+        }
+    }
+    let of = |(sums, stated): (&[f64; 2], &f64)| {
+        let seeds = SEEDS as f64;
+        [sums[0] / seeds / stated.sqrt(), sums[1] / seeds / stated]
+    };
+    sums.iter().zip(&stated).map(of).collect()
+}
+
+/// A Gaussian sea of the covariance of the model.
+fn gaussian_sea(texture: &Texture, seed: u64) -> Field {
+    let size = texture.noise.size;
+    let torus = Torus::new(size);
+    let mut random = StdRng::seed_from_u64(seed);
+    let white = Field {
+        rows: size,
+        columns: size,
+        values: (0..size * size)
+            .map(|_| StandardNormal.sample(&mut random))
+            .collect(),
+    };
+    let mut spectrum = torus.spectrum(&white);
+    let power = torus.spectrum(&texture.noise.sea());
+    for (value, power) in spectrum.iter_mut().zip(&power) {
+        *value *= power.re.max(0.0).sqrt();
+    }
+    let [field, _] = torus.fields([&spectrum, &spectrum], [96; 2]);
+    field
+}
+
+/// Over images of the model (mean image, Gaussian sea, Gamma speckle) every score has the mean 0, and the variance that is stated.
+#[test]
+fn scores_have_mean_zero_and_the_stated_variance() {
+    let scene = scene();
+    let found = scores(&scene, |expected, texture, seed| {
+        let mut image = expected.intensity.clone();
+        let sea = gaussian_sea(texture, seed);
+        for (value, wave) in image.values.iter_mut().zip(&sea.values) {
+            *value *= (1.0 + wave).max(0.0);
+        }
+        speckle(&mut image, scene.radar.looks, seed);
+        image
+    });
+    for (parameter, [mean, square]) in Parameter::OF_WAKE.iter().zip(found) {
+        // A mean of 200 standard normal numbers has the deviation 0.07, their mean square 0.1. The spectrum's score knows no kurtosis
+        // of speckle.
+        let allowed = match parameter {
+            Parameter::Value(Value::WindSpeed | Value::WindToward) | Parameter::Texture => 0.6,
+            _ => 0.35,
+        };
+        println!("{parameter:?}: {mean:.3} {square:.3}");
+        assert!(mean.abs() < 0.25, "{parameter:?}: {mean}");
+        assert!((square - 1.0).abs() < allowed, "{parameter:?}: {square}");
+    }
+}
+
+/// Over images of the simulator, whose sea is not Gaussian and whose mean is the expected image to first order in the sea alone, a
+/// score of the ship is off by a part of its deviation, one of the wind by up to one and a half: the bias of an estimate from such an
+/// image, in deviations (docs/physics/estimate.md).
+#[test]
+fn scores_of_simulated_images_are_off_by_less_than_their_deviation() {
+    let scene = scene();
+    let mut simulator = Simulator::default();
+    let found = scores(&scene, |_, _, seed| {
+        let mut scene = scene.clone();
+        scene.seed = seed << 8;
+        simulator.simulate(&scene).unwrap().speckled
+    });
+    for (parameter, [mean, square]) in Parameter::OF_WAKE.iter().zip(found) {
+        println!("{parameter:?}: {mean:.3} {square:.3}");
+        // Nuisance values take up what mean and power are off by.
+        if parameter.is_nuisance() {
+            continue;
+        }
+        let allowed = if parameter.is_of_ship() { 1.0 } else { 1.5 };
+        assert!(mean.abs() < allowed, "{parameter:?}: {mean}");
+        assert!(
+            (0.5..1.5 + allowed * allowed).contains(&square),
+            "{parameter:?}: {square}"
+        );
+    }
+}
+
+/// The covariance of simulated seas without ships: power by rings of wavenumbers over its expectation.
+#[test]
+fn power_of_simulated_seas_is_that_of_the_nonlinear_transform() {
+    for keys in [
+        &["sea.wind_speed=7", "sea.wind_toward=0"][..],
+        &["sea.wind_speed=5", "sea.wind_toward=120"],
+    ] {
+        let grid = ["grid.rows=128", "grid.columns=128", "grid.spacing=4"];
+        let mut scene = Scene::default()
+            .with_assignments(&[&grid[..], keys].concat())
+            .unwrap();
+        scene.ships.clear();
+        let mean = crate::simulate::expected_intensity(&scene).unwrap();
+        let noise = Noise::new(&scene).unwrap();
+        let mut simulator = Simulator::default();
+        let seeds = 24;
+        let mut rings = vec![[0.0; 2]; RINGS];
+        for seed in 0..seeds {
+            scene.seed = 1000 + (seed << 8);
+            let image = simulator.simulate(&scene).unwrap().speckled;
+            let observed = Observed::new(image, &scene, |_, _| 1.0);
+            let left = observed.torus.spectrum(&observed.residual(&mean));
+            let power = observed.power(&noise);
+            let scale = observed.taper.energy / (observed.torus.size.pow(2)) as f64;
+            for (sum, ring) in rings.iter_mut().zip(observed.rings(scale, &left, &power)) {
+                sum[0] += ring[0] / seeds as f64;
+                sum[1] += ring[1];
+            }
+        }
+        println!("{keys:?} {rings:.3?}");
+        for [ratio, count] in rings {
+            // Scatter of squares of normal numbers, and what waves modulate beyond the first order.
+            assert!(
+                (ratio - 1.0).abs() < 3.0 * (2.0 / count).sqrt() + 0.08,
+                "{keys:?}: {ratio}"
+            );
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What an image tells of: scene values, the size of the ship, and nuisance values of the image.
+
+use super::value::Value;
+use serde::Serialize;
+
+/// An unknown of the likelihood.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Parameter {
+    /// Length of the ship \[m\], its beam and draft in proportion.
+    Size,
+    /// Logarithm of a factor on the image: calibration, and what the mean image is wrong by.
+    Gain,
+    /// Logarithm of a factor on the variance of the sea's texture.
+    Texture,
+    /// A value of the scene.
+    #[serde(untagged)]
+    Value(Value),
+}
+
+impl Parameter {
+    /// What a wake in an image is asked for.
+    pub const OF_WAKE: [Self; 9] = [
+        Self::Value(Value::Speed),
+        Self::Value(Value::Heading),
+        Self::Value(Value::X),
+        Self::Value(Value::Y),
+        Self::Size,
+        Self::Value(Value::WindSpeed),
+        Self::Value(Value::WindToward),
+        Self::Gain,
+        Self::Texture,
+    ];
+
+    /// Its name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Value(Value::Speed) => "speed",
+            Self::Value(Value::Heading) => "heading",
+            Self::Value(Value::X) => "x",
+            Self::Value(Value::Y) => "y",
+            Self::Value(Value::Length | Value::Size) | Self::Size => "length",
+            Self::Value(Value::Beam) => "beam",
+            Self::Value(Value::Draft) => "draft",
+            Self::Value(Value::WindSpeed) => "wind_speed",
+            Self::Value(Value::WindToward) => "wind_toward",
+            Self::Value(Value::Incidence) => "incidence",
+            Self::Gain => "gain",
+            Self::Texture => "texture",
+        }
+    }
+
+    /// Its unit; of the factors' logarithms 1.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Value(Value::Speed | Value::WindSpeed) => "m/s",
+            Self::Value(Value::Heading | Value::WindToward | Value::Incidence) => "deg",
+            Self::Value(_) | Self::Size => "m",
+            Self::Gain | Self::Texture => "",
+        }
+    }
+
+    /// Whether it is one of the ship.
+    #[must_use]
+    pub fn is_of_ship(self) -> bool {
+        match self {
+            Self::Value(value) => value.is_of_ship(),
+            Self::Size => true,
+            Self::Gain | Self::Texture => false,
+        }
+    }
+
+    /// Whether it is a factor on the image, not a value of the scene.
+    #[must_use]
+    pub fn is_nuisance(self) -> bool {
+        matches!(self, Self::Gain | Self::Texture)
+    }
+
+    /// Scene values that it changes.
+    pub(super) fn values(self) -> &'static [Value] {
+        match self {
+            Self::Value(value) => match Value::ALL.iter().position(|v| *v == value) {
+                Some(n) => &Value::ALL[n..=n],
+                None => &[],
+            },
+            Self::Size => &[Value::Size],
+            Self::Gain | Self::Texture => &[],
+        }
+    }
+}
+
+/// Factors on what a scene makes: nuisance values of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Factors {
+    /// Factor on the mean image \[1\], above 0: its logarithm is [`Parameter::Gain`].
+    pub gain: f64,
+    /// Factor on the variance of the sea's texture \[1\], at least 0: its logarithm is [`Parameter::Texture`].
+    pub texture: f64,
+}
+
+impl Default for Factors {
+    /// The scene as it is.
+    fn default() -> Self {
+        Self {
+            gain: 1.0,
+            texture: 1.0,
+        }
+    }
+}
