@@ -18,7 +18,7 @@
 //!
 //! Hinkley (1970), Biometrika 57, 1: likelihood of a change point. James & Stein (1961): shrinkage. The constants are chosen.
 
-use crate::wake::Wake;
+use crate::wake::{Extent, Wake};
 
 /// Length of a block along the axis, half the width of a profile, and the longest line in blocks \[units\].
 const BLOCK: usize = 6;
@@ -47,15 +47,6 @@ const TOGETHER: f64 = 2.6;
 const FADE: f64 = 0.08;
 /// Contrast beyond these bounds is a ship.
 const BOUND: f32 = 4.0;
-
-/// How far a line goes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
-    /// From the tip \[pixels\].
-    pub length: f32,
-    /// Its standard deviation \[pixels\].
-    pub deviation: f32,
-}
 
 /// An image in standard deviations of its speckle, `[rows, columns]`.
 #[derive(Debug, Clone, Copy)]

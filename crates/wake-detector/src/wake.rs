@@ -1,7 +1,5 @@
 //! Wakes in an image.
 
-use crate::extent::Extent;
-
 /// Half the width of a box at least \[pixels\]: that of the line itself.
 const LEAST_HALF_WIDTH: f32 = 8.0;
 
@@ -55,6 +53,15 @@ impl Wake {
         ]
         .map(|(a, c)| corner(a, c))
     }
+}
+
+/// How far a line goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// From the tip \[pixels\].
+    pub length: f32,
+    /// Its standard deviation \[pixels\].
+    pub deviation: f32,
 }
 
 /// A wake that was found, in pixels of the image.
