@@ -98,7 +98,7 @@ enum Factor<'a> {
 /// Factors: `[rows, depth]` and `[depth, columns]`; result: `[rows, columns]`
 fn product(left: &[f32], right: Factor<'_>, bias: Option<&[f32]>, sizes: [usize; 3]) -> Vec<f32> {
     let [rows, _, wide] = sizes;
-    // Every task packs its columns: as many rows as leave every core its share.
+    // Every task packs its columns again: use as many rows a task as leave four tasks a core.
     let shares = (4 * rayon::current_num_threads()).div_ceil(wide.div_ceil(COLUMNS));
     let many = rows.div_ceil(shares).next_multiple_of(BLOCK);
     let mut out = vec![0.0; rows * wide];

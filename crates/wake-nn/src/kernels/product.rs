@@ -66,7 +66,7 @@ impl<'a> Rows<'a> {
         packed: &mut [f32],
     ) {
         let rows = width.min(self.count - tile * width);
-        // As many columns at a time as stay in a core's first cache, whatever the rows write.
+        // Few columns at a time: the places that they are written to stay in a core's first cache.
         for (n, packed) in packed.chunks_mut(SQUARE * width).enumerate() {
             for i in 0..rows {
                 let row = &self.get(tile * width + i, columns)[n * SQUARE..];

@@ -1,11 +1,11 @@
-//! Gradient of a convolution to its image: a convolution with the kernel turned around, or what every tap gives.
+//! Gradient of a convolution to its image: a convolution with turned kernels, or the transposed product.
 
 use rayon::prelude::*;
 
 use super::geometry::Geometry;
 use super::{convolve, scatter, tiles};
 
-/// Below so many channels out, what every tap gives is written and read more often than it is added to.
+/// Below so many channels out the terms of the transposed product take longer to write and read than to compute.
 const FEW: usize = 16;
 
 /// Gradient to the image.

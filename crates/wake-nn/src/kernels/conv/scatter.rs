@@ -1,7 +1,8 @@
-//! Gradient of a convolution to its image by the transposed product: what every tap gives is computed for all outputs, and added
-//! where the tap saw the image.
+//! Gradient of a convolution to its image by the transposed product: the contribution of every tap is computed for all outputs, and
+//! added to the pixel that the tap reads.
 //!
-//! The weights are read once, as they lie: images of few pixels have less numbers than weights that would have to be moved.
+//! The weights are read once, in the order of their tensor. Turned kernels need a copy of them, which takes longer than the product
+//! itself where an image is small.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;

@@ -153,7 +153,7 @@ impl WithSimd for Block<'_> {
         let windows = self.tiles.batch * rows * self.tiles.size_out()[1];
         let panels = windows.div_ceil(width);
         let panel = PLACES * channels * width;
-        // A row of tiles of a wide image is more than stays near: some panels of it at a time.
+        // A row of tiles of a wide image exceeds the cache: transform some panels of it at a time.
         let together = (NEAR / panel).clamp(1, panels);
         let mut image = vec![0.0; together * panel];
         let mut window = vec![0.0; PLACES * width];
