@@ -128,8 +128,16 @@ impl CrossAttention {
 #[cfg(feature = "flex")]
 mod native {
     use super::*;
-    use crate::kernels::attention::{self, Shape};
-    use crate::operation::{Operation, apply};
+    use crate::kernels::attention::{self, Attended, Shape, Softmax};
+    use crate::operation::{Operation, apply, values_of};
+    use burn::backend::flex::FlexTensor;
+
+    /// What the gradients need beside the inputs.
+    #[derive(Debug, Clone)]
+    pub(crate) struct Saved {
+        softmax: Vec<Softmax>,
+        result: Option<FlexTensor>,
+    }
 
     /// `None` where the tensors are elsewhere.
     pub(super) fn attention(
@@ -157,20 +165,30 @@ mod native {
     }
 
     impl Operation<3> for Shape {
-        type Saved = ();
+        type Saved = Saved;
 
-        fn forward(&self, [query, key, value]: [&[f32]; 3]) -> (Vec<f32>, ()) {
-            (attention::attend(query, key, value, self), ())
+        fn forward(&self, [query, key, value]: [&[f32]; 3]) -> (Vec<f32>, Saved) {
+            let (values, softmax) = attention::attend(query, key, value, self);
+            let result = None;
+            (values, Saved { softmax, result })
+        }
+
+        fn keep(saved: &mut Saved, result: &FlexTensor) {
+            saved.result = Some(result.clone());
         }
 
         fn gradients(
             &self,
             inputs: [&[f32]; 3],
-            (): &(),
+            saved: &Saved,
             gradient: &[f32],
             _: [bool; 3],
         ) -> [Vec<f32>; 3] {
-            attention::gradients(inputs, gradient, self)
+            let attended = Attended {
+                values: saved.result.as_ref().map_or(&[], values_of),
+                softmax: &saved.softmax,
+            };
+            attention::gradients(inputs, attended, gradient, self)
         }
     }
 }

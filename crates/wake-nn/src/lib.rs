@@ -21,6 +21,8 @@ mod numbers;
 #[cfg(feature = "burn")]
 pub mod activation;
 #[cfg(feature = "burn")]
+mod layer_norm;
+#[cfg(feature = "burn")]
 pub mod linear;
 #[cfg(feature = "burn")]
 pub mod attention;
@@ -32,6 +34,8 @@ pub mod feed_forward;
 pub mod norm;
 #[cfg(feature = "burn")]
 pub mod patch;
+#[cfg(feature = "burn")]
+mod projection;
 #[cfg(feature = "burn")]
 pub mod resample;
 #[cfg(feature = "burn")]

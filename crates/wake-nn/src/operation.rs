@@ -14,6 +14,13 @@ pub(super) trait Operation<const N: usize>:
     /// The result, its shape, and what is saved.
     fn forward(&self, inputs: [&[f32]; N]) -> (Vec<f32>, Self::Saved);
 
+    /// Keeps the result where the gradients need it; it is shared, not copied.
+    #[cfg_attr(
+        not(feature = "autodiff"),
+        allow(dead_code, reason = "nothing is trained")
+    )]
+    fn keep(_: &mut Self::Saved, _: &FlexTensor) {}
+
     /// The gradient to every input that is wanted, from the gradient of the result.
     #[cfg_attr(
         not(feature = "autodiff"),
@@ -88,7 +95,7 @@ fn plain(tensor: DispatchTensor) -> FlexTensor {
 }
 
 /// The elements of a contiguous tensor.
-fn values_of(tensor: &FlexTensor) -> &[f32] {
+pub(super) fn values_of(tensor: &FlexTensor) -> &[f32] {
     tensor.as_slice().unwrap_or_default()
 }
 
@@ -117,8 +124,9 @@ mod tracked {
         let inputs = inputs.map(tracked);
         let guards = inputs.each_ref().map(Tracked::node);
         let inputs = inputs.map(|input| input.into_primitive().to_contiguous());
-        let (values, saved) = operation.forward(inputs.each_ref().map(values_of));
+        let (values, mut saved) = operation.forward(inputs.each_ref().map(values_of));
         let result = tensor(values, shape);
+        O::keep(&mut saved, &result);
         let step = Step(std::marker::PhantomData::<O>);
         let result = match step
             .prepare::<NoCheckpointing>(guards)

@@ -1,15 +1,14 @@
 //! The transformer that mixes the pixels of an image with each other and with a prompt.
 
 use burn::module::Module;
-use burn::nn::conv::Conv2d;
-use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
-use burn::tensor::module::linear;
+use burn::nn::{LayerNorm, LayerNormConfig};
 use burn::tensor::{Device, Tensor};
 
 use super::attention::CrossAttention;
-use super::conv::conv1x1;
 use super::feed_forward::FeedForward;
+use super::layer_norm::{EPSILON, layer_norm};
 use super::norm::GroupNorm;
+use super::projection::Projection;
 
 /// Widths and constants of a [`Transformer2d`].
 #[derive(Debug, Clone, Copy)]
@@ -109,7 +108,11 @@ impl TransformerBlock {
             heads,
             ..
         } = shape;
-        let norm = || LayerNormConfig::new(channels).init(device);
+        let norm = || {
+            LayerNormConfig::new(channels)
+                .with_epsilon(EPSILON)
+                .init(device)
+        };
         Self {
             norm1: norm(),
             attn1: CrossAttention::new(channels, channels, heads, false, device),
@@ -133,65 +136,14 @@ impl TransformerBlock {
     ///
     /// Without a context that the block attends to.
     pub fn forward(&self, x: Tensor<3>, context: Option<&Tensor<3>>) -> Tensor<3> {
-        let x = self.attn1.forward(self.norm1.forward(x.clone()), None) + x;
+        let x = self.attn1.forward(layer_norm(&self.norm1, x.clone()), None) + x;
         let x = match (&self.norm2, &self.attn2, context) {
             (Some(norm), Some(attention), Some(context)) => {
-                attention.forward(norm.forward(x.clone()), Some(context.clone())) + x
+                attention.forward(layer_norm(norm, x.clone()), Some(context.clone())) + x
             }
             (Some(_), Some(_), None) => panic!("this transformer attends to a context; give one"),
             _ => x,
         };
-        self.ff.forward(self.norm3.forward(x.clone())) + x
-    }
-}
-
-/// A linear map of every pixel's channels, stored as a 1 × 1 convolution (Stable Diffusion v1) or
-/// as a matrix (v2). Both are computed as a matrix product that turns pixels into tokens or back on
-/// its way, so that nothing is transposed in memory.
-#[derive(Module, Debug)]
-enum Projection {
-    Conv(Conv2d),
-    Linear(Linear),
-}
-
-impl Projection {
-    fn new(channels: usize, linear: bool, device: &Device) -> Self {
-        if linear {
-            Self::Linear(LinearConfig::new(channels, channels).init(device))
-        } else {
-            Self::Conv(conv1x1(channels, channels, device))
-        }
-    }
-
-    /// The matrix `[in, out]` and the bias.
-    fn matrix(&self) -> (Tensor<2>, Option<Tensor<1>>) {
-        match self {
-            Self::Linear(layer) => (layer.weight.val(), layer.bias.as_ref().map(|b| b.val())),
-            Self::Conv(layer) => {
-                let weight = layer.weight.val();
-                let [channels_out, channels_in, _, _] = weight.dims();
-                let matrix = weight.reshape([channels_out, channels_in]).transpose();
-                (matrix, layer.bias.as_ref().map(|b| b.val()))
-            }
-        }
-    }
-
-    /// `[batch, channels, pixels]` to `[batch, pixels, channels]`.
-    fn to_tokens(&self, pixels: Tensor<3>) -> Tensor<3> {
-        let (matrix, bias) = self.matrix();
-        linear(pixels.swap_dims(1, 2), matrix, bias)
-    }
-
-    /// `[batch, pixels, channels]` to `[batch, channels, pixels]`.
-    fn to_pixels(&self, tokens: Tensor<3>) -> Tensor<3> {
-        let (matrix, bias) = self.matrix();
-        let pixels = matrix
-            .transpose()
-            .unsqueeze::<3>()
-            .matmul(tokens.swap_dims(1, 2));
-        match bias {
-            Some(bias) => pixels + bias.unsqueeze_dims(&[0, -1]),
-            None => pixels,
-        }
+        self.ff.forward(layer_norm(&self.norm3, x.clone())) + x
     }
 }

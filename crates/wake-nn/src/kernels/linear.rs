@@ -1,21 +1,22 @@
 //! Products of whole matrices, as a linear layer and its gradients need them.
 //!
-//! One factor is packed by tiles, once; blocks of rows of the other one pass by on all cores, a stretch of their depth at a time, which
-//! with its part of a tile stays in a core's first cache.
+//! Every task makes some rows and columns of a product, a stretch of the depth at a time: its columns of the right factor are packed
+//! by tiles, which stay in a core's second cache, and rows of the left one pass by as they lie.
 
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::arch::arch;
+use super::columns::columns;
 use super::product::Rows;
 use super::tile::{self, ROWS};
 
-/// Rows of a block, a multiple of a tile's.
+/// Rows that a tile of the right factor meets before the next one does, a multiple of a tile's.
 const BLOCK: usize = 8 * ROWS;
 /// Numbers of a row that are multiplied at a time: a tile takes 24 KiB with the widest vectors.
 const DEPTH: usize = 192;
-/// Columns whose sum is one core's work.
-const COLUMNS: usize = 64;
+/// Columns of a task, or whose sum is one core's work.
+const COLUMNS: usize = 128;
 
 /// The sizes of a layer: rows, what comes in, what goes out.
 #[derive(Debug, Clone, Copy)]
@@ -31,21 +32,25 @@ pub(crate) struct Sizes {
 ///
 /// `x`: `[rows, from]`, `weight`: `[from, to]`, `bias`: `[to]`; result: `[rows, to]`
 pub(crate) fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, sizes: Sizes) -> Vec<f32> {
-    let right = packed(weight, sizes.from, sizes.to);
-    product(x, &right, bias, [sizes.rows, sizes.from, sizes.to])
+    product(
+        x,
+        Factor::Plain(weight),
+        bias,
+        [sizes.rows, sizes.from, sizes.to],
+    )
 }
 
 /// The gradient to x: `g Wᵀ`, `[rows, from]`.
 pub(crate) fn to_input(gradient: &[f32], weight: &[f32], sizes: Sizes) -> Vec<f32> {
-    let right = packed_transposed(weight, sizes.from, sizes.to);
-    product(gradient, &right, None, [sizes.rows, sizes.to, sizes.from])
+    let sizes = [sizes.rows, sizes.to, sizes.from];
+    product(gradient, Factor::Transposed(weight), None, sizes)
 }
 
 /// The gradient to W: `xᵀ g`, `[from, to]`.
 pub(crate) fn to_weight(x: &[f32], gradient: &[f32], sizes: Sizes) -> Vec<f32> {
     let left = transposed(x, sizes.rows, sizes.from);
-    let right = packed(gradient, sizes.rows, sizes.to);
-    product(&left, &right, None, [sizes.from, sizes.rows, sizes.to])
+    let sizes = [sizes.from, sizes.rows, sizes.to];
+    product(&left, Factor::Plain(gradient), None, sizes)
 }
 
 /// The gradient to b: the sum over all rows, `[to]`.
@@ -61,45 +66,6 @@ pub(crate) fn to_bias(gradient: &[f32], to: usize) -> Vec<f32> {
             }
         });
     sums
-}
-
-/// Packs a matrix `[depth, columns]` on all cores: `[tile of columns, depth, column]`.
-fn packed(matrix: &[f32], depth: usize, columns: usize) -> Vec<f32> {
-    let rows = Rows {
-        values: matrix,
-        step: columns,
-        count: depth,
-    };
-    in_tiles(depth, columns, |tile, width, packed| {
-        rows.pack_tile(tile, columns, width, packed);
-    })
-}
-
-/// Packs the transpose of a matrix `[columns, depth]` in the same way.
-fn packed_transposed(matrix: &[f32], columns: usize, depth: usize) -> Vec<f32> {
-    let rows = Rows {
-        values: matrix,
-        step: depth,
-        count: columns,
-    };
-    in_tiles(depth, columns, |tile, width, packed| {
-        rows.pack_tile_transposed(tile, depth, width, packed);
-    })
-}
-
-/// Tiles of columns, each packed by a function of its number and width.
-fn in_tiles(
-    depth: usize,
-    columns: usize,
-    pack: impl Fn(usize, usize, &mut [f32]) + Sync,
-) -> Vec<f32> {
-    let width = arch().dispatch(tile::Width);
-    let mut packed = vec![0.0; columns.div_ceil(width) * depth * width];
-    packed
-        .par_chunks_exact_mut(depth * width)
-        .enumerate()
-        .for_each(|(tile, packed)| pack(tile, width, packed));
-    packed
 }
 
 /// `[columns, rows]` of a matrix `[rows, columns]`.
@@ -118,72 +84,123 @@ fn transposed(matrix: &[f32], rows: usize, columns: usize) -> Vec<f32> {
     out
 }
 
-/// The product of rows with a packed matrix, and a bias.
+/// A matrix as it lies in memory, or its transpose.
+#[derive(Debug, Clone, Copy)]
+enum Factor<'a> {
+    Plain(&'a [f32]),
+    Transposed(&'a [f32]),
+}
+
+/// The product of two matrices, and a bias for every column.
 ///
 /// # Shapes
 ///
-/// `left`: `[rows, depth]`, `right`: `[tile, depth, width]`; result: `[rows, columns]`
-fn product(
-    left: &[f32],
-    right: &[f32],
-    bias: Option<&[f32]>,
-    [rows, depth, columns]: [usize; 3],
-) -> Vec<f32> {
-    let mut out = vec![0.0; rows * columns];
-    out.par_chunks_mut(BLOCK * columns)
-        .zip(left.par_chunks(BLOCK * depth))
-        .for_each(|(out, left)| {
-            arch().dispatch(Block {
-                left,
-                right,
-                bias,
-                depth,
-                columns,
-                out,
+/// Factors: `[rows, depth]` and `[depth, columns]`; result: `[rows, columns]`
+fn product(left: &[f32], right: Factor<'_>, bias: Option<&[f32]>, sizes: [usize; 3]) -> Vec<f32> {
+    let [rows, _, wide] = sizes;
+    // Every task packs its columns again: use as many rows a task as leave four tasks a core.
+    let shares = (4 * rayon::current_num_threads()).div_ceil(wide.div_ceil(COLUMNS));
+    let many = rows.div_ceil(shares).next_multiple_of(BLOCK);
+    let mut out = vec![0.0; rows * wide];
+    columns(&mut out, wide, COLUMNS)
+        .par_iter_mut()
+        .enumerate()
+        .for_each(|(n, out)| {
+            out.par_chunks_mut(many).enumerate().for_each(|(m, out)| {
+                arch().dispatch(Task {
+                    left,
+                    right,
+                    bias,
+                    sizes,
+                    first: [m * many, n * COLUMNS],
+                    out,
+                });
             });
         });
     out
 }
 
-/// Some rows of a product.
-struct Block<'a> {
+/// Some rows and columns of a product.
+struct Task<'a, 'b> {
     left: &'a [f32],
-    right: &'a [f32],
+    right: Factor<'a>,
     bias: Option<&'a [f32]>,
-    depth: usize,
-    columns: usize,
-    out: &'a mut [f32],
+    /// Rows, depth and columns of the whole product.
+    sizes: [usize; 3],
+    /// The first row and column.
+    first: [usize; 2],
+    /// These columns of each row.
+    out: &'a mut [&'b mut [f32]],
 }
 
-impl WithSimd for Block<'_> {
+impl WithSimd for Task<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let (width, depth, columns) = (tile::width::<S>(), self.depth, self.columns);
-        let last = self.left.len() / depth - 1;
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let (width, depth) = (tile::width::<S>(), self.sizes[1]);
+        let tiles = self.out[0].len().div_ceil(width);
+        let mut packed = vec![0.0; tiles * DEPTH.min(depth) * width];
         for first in (0..depth).step_by(DEPTH) {
-            let stretch = first * width..depth.min(first + DEPTH) * width;
-            for (tile, right) in self.right.chunks_exact(depth * width).enumerate() {
-                let of_tile = tile * width..columns.min((tile + 1) * width);
-                let panel = &right[stretch.clone()];
-                for (n, out) in self.out.chunks_mut(ROWS * columns).enumerate() {
-                    let row = |i: usize| &self.left[(n * ROWS + i).min(last) * depth..][..depth];
-                    let rows = std::array::from_fn(row);
-                    let mut sums = tile::start(simd, [0.0; ROWS]);
-                    for (sum, out) in sums.iter_mut().zip(out.chunks_exact(columns)) {
-                        *sum = match self.bias {
-                            _ if first > 0 => tile::load(simd, &out[of_tile.clone()]),
-                            Some(bias) => tile::load(simd, &bias[of_tile.clone()]),
-                            None => *sum,
-                        };
-                    }
-                    tile::multiply(simd, rows, first, panel, &mut sums);
-                    for (sum, out) in sums.into_iter().zip(out.chunks_exact_mut(columns)) {
-                        tile::store::<S>(sum, &mut out[of_tile.clone()]);
+            let count = DEPTH.min(depth - first);
+            let packed = &mut packed[..tiles * count * width];
+            self.pack(first, count, width, packed);
+            for row in (0..self.out.len()).step_by(BLOCK) {
+                for (tile, panel) in packed.chunks_exact(count * width).enumerate() {
+                    for row in (row..self.out.len().min(row + BLOCK)).step_by(ROWS) {
+                        self.multiply(simd, [row, first, tile], panel);
                     }
                 }
             }
+        }
+    }
+}
+
+impl Task<'_, '_> {
+    /// Packs a stretch of the depth of these columns of the right factor: `[tile, depth, column]`.
+    fn pack(&self, first: usize, count: usize, width: usize, packed: &mut [f32]) {
+        let [_, depth, columns] = self.sizes;
+        let begin = self.first[1] / width;
+        for (tile, packed) in packed.chunks_exact_mut(count * width).enumerate() {
+            match self.right {
+                Factor::Plain(values) => Rows {
+                    values: &values[first * columns..],
+                    step: columns,
+                    count,
+                }
+                .pack_tile(begin + tile, columns, width, packed),
+                Factor::Transposed(values) => Rows {
+                    values: &values[first..],
+                    step: depth,
+                    count: columns,
+                }
+                .pack_tile_transposed(begin + tile, count, width, packed),
+            }
+        }
+    }
+
+    /// Adds the product of six rows and one tile over a stretch of the depth from the `first` on.
+    #[inline(always)]
+    fn multiply<S: Simd>(&mut self, simd: S, [row, first, tile]: [usize; 3], panel: &[f32]) {
+        let width = tile::width::<S>();
+        let depth = self.sizes[1];
+        let count = panel.len() / width;
+        let of_tile = tile * width..self.out[0].len().min((tile + 1) * width);
+        let end = self.out.len().min(row + ROWS);
+        let out = &mut self.out[row..end];
+        let mut sums = tile::start(simd, [0.0; ROWS]);
+        for (sum, out) in sums.iter_mut().zip(&*out) {
+            *sum = match self.bias {
+                _ if first > 0 => tile::load(simd, &out[of_tile.clone()]),
+                Some(bias) => tile::load(simd, &bias[self.first[1]..][of_tile.clone()]),
+                None => *sum,
+            };
+        }
+        let (row, last) = (self.first[0] + row, self.first[0] + end - 1);
+        let of = |i: usize| &self.left[(row + i).min(last) * depth + first..][..count];
+        tile::multiply(simd, std::array::from_fn(of), 0, panel, &mut sums);
+        for (sum, out) in sums.into_iter().zip(out) {
+            tile::store::<S>(sum, &mut out[of_tile.clone()]);
         }
     }
 }
@@ -196,7 +213,13 @@ mod tests {
     /// Every product against sums in f64, on sizes that fill tiles, blocks and stretches and on sizes that do not.
     #[test]
     fn products_are_sums() {
-        for (rows, from, to) in [(1, 1, 1), (5, 7, 33), (50, 200, 70), (97, 385, 64)] {
+        for (rows, from, to) in [
+            (1, 1, 1),
+            (5, 7, 33),
+            (50, 200, 70),
+            (97, 385, 64),
+            (500, 20, 150),
+        ] {
             let sizes = Sizes { rows, from, to };
             let (x, weight) = (noise(rows * from, 1), noise(from * to, 2));
             let (bias, gradient) = (noise(to, 3), noise(rows * to, 4));

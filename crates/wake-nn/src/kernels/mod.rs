@@ -5,8 +5,10 @@
 
 mod arch;
 pub(super) mod attention;
+mod columns;
 pub(super) mod conv;
 pub(super) mod group_norm;
+pub(super) mod layer_norm;
 pub(super) mod linear;
 pub(super) mod pointwise;
 mod product;

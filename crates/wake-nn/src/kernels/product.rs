@@ -4,6 +4,9 @@ use pulp::Simd;
 
 use super::tile::{self, ROWS};
 
+/// Columns that are transposed at a time.
+const SQUARE: usize = 16;
+
 /// Rows that are `step` apart in memory.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rows<'a> {
@@ -62,10 +65,14 @@ impl<'a> Rows<'a> {
         width: usize,
         packed: &mut [f32],
     ) {
-        for i in 0..width.min(self.count - tile * width) {
-            let row = self.get(tile * width + i, columns);
-            for (value, packed) in row.iter().zip(packed.chunks_exact_mut(width)) {
-                packed[i] = *value;
+        let rows = width.min(self.count - tile * width);
+        // Few columns at a time: the places that they are written to stay in a core's first cache.
+        for (n, packed) in packed.chunks_mut(SQUARE * width).enumerate() {
+            for i in 0..rows {
+                let row = &self.get(tile * width + i, columns)[n * SQUARE..];
+                for (value, packed) in row.iter().zip(packed.chunks_exact_mut(width)) {
+                    packed[i] = *value;
+                }
             }
         }
     }

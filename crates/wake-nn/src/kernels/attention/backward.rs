@@ -1,29 +1,41 @@
-//! The way back through attention.
+//! The way back through attention: tokens lie side by side in a tile, queries pass by.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::super::product::{Rows, Target, multiply};
+use super::super::silu::exp;
 use super::super::tile;
 use super::Shape;
-use super::forward::{TOKENS, add_values, exponentials, hide, products};
+use super::forward::{Softmax, TOKENS, add_values, products};
+
+/// Queries whose weights are there at a time: as many as tokens on the way forward.
+const QUERIES: usize = TOKENS;
+
+/// What came out of an attention.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Attended<'a> {
+    pub(crate) values: &'a [f32],
+    pub(crate) softmax: &'a [Softmax],
+}
 
 /// Gradients to query, key and value.
 ///
 /// ```text
 /// P = softmax(s Q Kᵀ),   dV = Pᵀ dO,   dP = dO Vᵀ
-/// dS = s P ⊙ (dP − Σ_j P dP),   dQ = dS K,   dK = dSᵀ Q
+/// dS = s P ⊙ (dP − dO · O),   dQ = dS K,   dK = dSᵀ Q
 /// ```
 ///
 /// # Shapes
 ///
-/// As [`attend`](super::attend); `gradient` as its result.
+/// As [`attend`](super::attend), whose result is `attended`; `gradient` as its values.
 ///
 /// # References
 ///
-/// Dao et al. (2022), "Fast and Memory-Efficient Exact Attention", appendix B.2.
+/// Dao et al. (2022), "Fast and Memory-Efficient Exact Attention", algorithm 4 and appendix B.2.
 pub(crate) fn gradients(
     [query, key, value]: [&[f32]; 3],
+    attended: Attended<'_>,
     gradient: &[f32],
     shape: &Shape,
 ) -> [Vec<f32>; 3] {
@@ -32,10 +44,16 @@ pub(crate) fn gradients(
     let heads: Vec<_> = shape
         .heads_of_batch()
         .map(|[n, head]| {
+            let softmax = attended.softmax[n * asking * shape.heads..]
+                .iter()
+                .skip(head)
+                .step_by(shape.heads);
             arch.dispatch(Backward {
                 query: shape.head(query, asking, n, head),
                 key: shape.head(key, seen, n, head),
                 value: shape.head(value, seen, n, head),
+                result: shape.head(attended.values, asking, n, head),
+                softmax: softmax.take(asking).copied().collect(),
                 gradient: shape.head(gradient, asking, n, head),
                 shape,
             })
@@ -44,12 +62,15 @@ pub(crate) fn gradients(
     let join = |of: usize, tokens: usize| {
         let depth = shape.depth();
         let mut out = vec![0.0; shape.batch * tokens * shape.channels];
-        for (i, out) in out.chunks_exact_mut(shape.channels).enumerate() {
-            for (head, out) in out.chunks_exact_mut(depth).enumerate() {
-                let from = &heads[i / tokens * shape.heads + head][of];
-                out.copy_from_slice(&from[i % tokens * depth..][..depth]);
-            }
-        }
+        out.par_chunks_exact_mut(shape.channels)
+            .enumerate()
+            .with_min_len(64)
+            .for_each(|(i, out)| {
+                for (head, out) in out.chunks_exact_mut(depth).enumerate() {
+                    let from = &heads[i / tokens * shape.heads + head][of];
+                    out.copy_from_slice(&from[i % tokens * depth..][..depth]);
+                }
+            });
         out
     };
     [join(0, asking), join(1, seen), join(2, seen)]
@@ -60,6 +81,8 @@ struct Backward<'a> {
     query: Rows<'a>,
     key: Rows<'a>,
     value: Rows<'a>,
+    result: Rows<'a>,
+    softmax: Vec<Softmax>,
     gradient: Rows<'a>,
     shape: &'a Shape,
 }
@@ -70,93 +93,77 @@ impl WithSimd for Backward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [Vec<f32>; 3] {
         let (width, depth) = (tile::width::<S>(), self.shape.depth());
+        let scale = self.shape.scale();
         let [asking, seen] = self.shape.tokens;
         let mut out = [asking, seen, seen].map(|tokens| vec![0.0; tokens * depth]);
-        // One column a query.
-        let [mut weights, mut slopes] = [0, 1].map(|_| vec![0.0; seen * width]);
-        for first in (0..asking).step_by(width) {
-            let [query, gradient] = [self.query, self.gradient].map(|rows| rows.from(first, width));
-            let columns = query.pack_transposed(depth, width);
-            products::<S>(simd, &self.key, &columns, &mut weights);
-            if self.shape.causal {
-                hide(&mut weights, width, 0, first);
-            }
-            normalise::<S>(&mut weights, self.shape.scale());
-            let columns = gradient.pack_transposed(depth, width);
-            products::<S>(simd, &self.value, &columns, &mut slopes);
-            through_softmax::<S>(&weights, &mut slopes, self.shape.scale());
-
-            let [dquery, dkey, dvalue] = &mut out;
-            let mut sums = vec![0.0; depth * width];
-            add_values::<S>(simd, &self.key, &slopes, depth, &mut sums);
-            let rows = dquery[first * depth..]
-                .chunks_exact_mut(depth)
-                .take(query.count);
-            for (j, row) in rows.enumerate() {
-                let column = sums[j..].iter().step_by(width);
-                row.iter_mut()
-                    .zip(column)
-                    .for_each(|(out, sum)| *out = *sum);
-            }
-            for (left, right, out) in [(&slopes, query, dkey), (&weights, gradient, dvalue)] {
+        let [dquery, dkey, dvalue] = &mut out;
+        // dO · O of each query.
+        let means: Vec<f32> = (0..asking)
+            .map(|i| {
+                let [a, b] = [self.gradient, self.result].map(|rows| rows.get(i, depth));
+                a.iter().zip(b).map(|(a, b)| a * b).sum()
+            })
+            .collect();
+        // One column a token.
+        let [mut weights, mut slopes] = [0; 2].map(|_| vec![0.0; QUERIES.min(asking) * width]);
+        for token in (0..seen).step_by(width) {
+            let [key, value] = [self.key, self.value].map(|rows| rows.from(token, width));
+            let keys = key.pack_transposed(depth, width);
+            let values = value.pack_transposed(depth, width);
+            let right = key.pack(depth, width);
+            let [mut of_key, mut of_value] = [0; 2].map(|_| vec![0.0; depth * width]);
+            // Queries before a token do not see it.
+            let begin = if self.shape.causal { token } else { 0 };
+            for first in (begin..asking).step_by(QUERIES) {
+                let count = QUERIES.min(asking - first);
+                let [query, gradient] =
+                    [self.query, self.gradient].map(|rows| rows.from(first, count));
+                let weights = &mut weights[..count * width];
+                let slopes = &mut slopes[..count * width];
+                products::<S>(simd, &query, &keys, weights);
+                if self.shape.causal {
+                    for (i, row) in weights.chunks_exact_mut(width).enumerate() {
+                        let visible = (first + i + 1 - token).min(width);
+                        row[visible..].fill(f32::NEG_INFINITY);
+                    }
+                }
+                products::<S>(simd, &gradient, &values, slopes);
+                let rows = weights
+                    .chunks_exact_mut(width)
+                    .zip(slopes.chunks_exact_mut(width));
+                let of_query = self.softmax[first..].iter().zip(&means[first..]);
+                for ((weights, slopes), (softmax, mean)) in rows.zip(of_query) {
+                    let Softmax { largest, inverse } = *softmax;
+                    for (weight, slope) in weights.iter_mut().zip(slopes) {
+                        *weight = exp((*weight - largest) * scale) * inverse;
+                        *slope = scale * *weight * (*slope - mean);
+                    }
+                }
+                add_values::<S>(simd, &gradient, weights, depth, &mut of_value);
+                add_values::<S>(simd, &query, slopes, depth, &mut of_key);
                 let left = Rows {
-                    values: left,
+                    values: slopes,
                     step: width,
-                    count: seen,
+                    count,
                 };
                 let mut target = Target {
-                    values: out,
+                    values: &mut dquery[first * depth..],
                     step: depth,
                     columns: depth,
                     add: true,
                 };
-                let packed = right.pack(depth, width);
-                multiply(simd, &left, right.count, &packed, &mut target);
+                multiply(simd, &left, key.count, &right, &mut target);
+            }
+            for (sums, out) in [(of_key, &mut *dkey), (of_value, &mut *dvalue)] {
+                let rows = out[token * depth..].chunks_exact_mut(depth);
+                for (j, row) in rows.take(key.count).enumerate() {
+                    let column = sums[j..].iter().step_by(width);
+                    row.iter_mut()
+                        .zip(column)
+                        .for_each(|(out, sum)| *out = *sum);
+                }
             }
         }
         out
-    }
-}
-
-/// From scores to weights: the softmax of every column.
-#[inline(always)]
-fn normalise<S: Simd>(scores: &mut [f32], scale: f32) {
-    let width = tile::width::<S>();
-    let [mut largest, mut totals] = [f32::NEG_INFINITY, 0.0].map(|x| vec![x; width]);
-    exponentials::<S>(scores, &mut largest, &mut totals, scale);
-    for total in &mut totals {
-        *total = 1.0 / *total;
-    }
-    for row in scores.chunks_exact_mut(width) {
-        for (weight, inverse) in row.iter_mut().zip(&totals) {
-            *weight *= inverse;
-        }
-    }
-}
-
-/// From the gradient to the weights to the gradient to the scores before they were scaled.
-#[inline(always)]
-fn through_softmax<S: Simd>(weights: &[f32], slopes: &mut [f32], scale: f32) {
-    let width = tile::width::<S>();
-    let mut means = vec![0.0; width];
-    let blocks = weights.chunks(TOKENS * width);
-    for (weights, slopes) in blocks.zip(slopes.chunks(TOKENS * width)) {
-        let mut sums = vec![0.0; width];
-        for (weights, slopes) in weights.chunks_exact(width).zip(slopes.chunks_exact(width)) {
-            for ((sum, weight), slope) in sums.iter_mut().zip(weights).zip(slopes) {
-                *sum += weight * slope;
-            }
-        }
-        for (mean, sum) in means.iter_mut().zip(sums) {
-            *mean += sum;
-        }
-    }
-    let rows = weights
-        .chunks_exact(width)
-        .zip(slopes.chunks_exact_mut(width));
-    for (weights, slopes) in rows {
-        for ((slope, weight), mean) in slopes.iter_mut().zip(weights).zip(&means) {
-            *slope = scale * weight * (*slope - mean);
-        }
     }
 }

@@ -20,25 +20,34 @@ pub(super) const TOKENS: usize = 32 * ROWS;
 /// # Shapes
 ///
 /// - `query`: `[batch, tokens, channels]`; `key`, `value`: `[batch, tokens seen, channels]`
-/// - result: as `query`
+/// - result: as `query`, and the softmaxes `[batch, tokens, heads]`
 ///
 /// # References
 ///
 /// Dao et al. (2022), "Fast and Memory-Efficient Exact Attention", algorithm 1 (the largest score so far, and sums that are
 /// scaled whenever it grows).
-pub(crate) fn attend(query: &[f32], key: &[f32], value: &[f32], shape: &Shape) -> Vec<f32> {
+pub(crate) fn attend(
+    query: &[f32],
+    key: &[f32],
+    value: &[f32],
+    shape: &Shape,
+) -> (Vec<f32>, Vec<Softmax>) {
     let arch = Arch::new();
     let block = arch.dispatch(tile::Width);
     let [asking, seen] = shape.tokens;
     let mut out = vec![0.0; query.len()];
+    let mut softmaxes = vec![Softmax::default(); shape.batch * asking * shape.heads];
     out.par_chunks_mut(asking * shape.channels)
+        .zip(softmaxes.par_chunks_mut(asking * shape.heads))
         .enumerate()
-        .for_each(|(n, out)| {
+        .for_each(|(n, (out, softmaxes))| {
             out.par_chunks_mut(block * shape.channels)
+                .zip(softmaxes.par_chunks_mut(block * shape.heads))
                 .enumerate()
-                .for_each(|(i, out)| {
+                .for_each(|(i, (out, softmaxes))| {
                     for head in 0..shape.heads {
                         arch.dispatch(Forward {
+                            softmaxes: &mut softmaxes[head..],
                             query: shape.head(query, asking, n, head).from(i * block, block),
                             key: shape.head(key, seen, n, head),
                             value: shape.head(value, seen, n, head),
@@ -49,11 +58,21 @@ pub(crate) fn attend(query: &[f32], key: &[f32], value: &[f32], shape: &Shape) -
                     }
                 });
         });
-    out
+    (out, softmaxes)
+}
+
+/// What makes weights of the scores x of one query: `e^(s (x − largest)) · inverse`.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Softmax {
+    pub(super) largest: f32,
+    /// One over the sum of exponentials.
+    pub(super) inverse: f32,
 }
 
 /// At most a tile's width of queries of one head.
 struct Forward<'a> {
+    /// Of the queries, as many apart as there are heads.
+    softmaxes: &'a mut [Softmax],
     query: Rows<'a>,
     key: Rows<'a>,
     value: Rows<'a>,
@@ -102,11 +121,16 @@ impl WithSimd for Forward<'_> {
             );
         }
         let rows = self.out.chunks_mut(self.shape.channels);
-        for (j, (out, total)) in rows.zip(totals).take(self.query.count).enumerate() {
-            let sums = sums[j..].iter().step_by(width);
+        let softmaxes = self.softmaxes.iter_mut().step_by(self.shape.heads);
+        for (j, (out, softmax)) in rows.zip(softmaxes).take(self.query.count).enumerate() {
+            let (total, sums) = (totals[j], sums[j..].iter().step_by(width));
             for (out, sum) in out[..depth].iter_mut().zip(sums) {
                 *out = sum / total;
             }
+            *softmax = Softmax {
+                largest: largest[j],
+                inverse: 1.0 / total,
+            };
         }
     }
 }
@@ -130,7 +154,7 @@ pub(super) fn products<S: Simd>(simd: S, key: &Rows<'_>, query: &[f32], scores: 
 }
 
 /// Hides tokens after their query.
-pub(super) fn hide(scores: &mut [f32], width: usize, first_token: usize, first_query: usize) {
+fn hide(scores: &mut [f32], width: usize, first_token: usize, first_query: usize) {
     for (k, scores) in scores.chunks_exact_mut(width).enumerate() {
         let before = (first_token + k).saturating_sub(first_query).min(width);
         scores[..before].fill(f32::NEG_INFINITY);
@@ -140,7 +164,7 @@ pub(super) fn hide(scores: &mut [f32], width: usize, first_token: usize, first_q
 /// Replaces each x by `e^(s (x − m))`, m the largest of its query so far; what the query had before has to be multiplied
 /// with what is returned.
 #[inline(always)]
-pub(super) fn exponentials<S: Simd>(
+fn exponentials<S: Simd>(
     scores: &mut [f32],
     largest: &mut [f32],
     totals: &mut [f32],

@@ -8,8 +8,8 @@ use super::product::Rows;
 mod backward;
 mod forward;
 
-pub(crate) use backward::gradients;
-pub(crate) use forward::attend;
+pub(crate) use backward::{Attended, gradients};
+pub(crate) use forward::{Softmax, attend};
 
 /// Sizes of an attention.
 #[derive(Debug, Clone, Copy)]
@@ -121,7 +121,7 @@ mod tests {
     fn values_are_those_of_the_formula() {
         for shape in SHAPES.map(shape) {
             let [q, k, v] = inputs(&shape, 4.0);
-            let ours = attend(&q, &k, &v, &shape);
+            let (ours, _) = attend(&q, &k, &v, &shape);
             let exact = exact([&wide(&q), &wide(&k), &wide(&v)], &shape);
             for (ours, exact) in ours.iter().zip(exact) {
                 // Scores below 16 are off by 16 · 34 · 2⁻²⁴ at most, and so are the weights, relatively.
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn the_largest_score_wins() {
         let shape = shape((1, 1, 1, [2, 2], false));
-        let ours = attend(&[100.0, -100.0], &[100.0, -100.0], &[3.0, 5.0], &shape);
+        let (ours, _) = attend(&[100.0, -100.0], &[100.0, -100.0], &[3.0, 5.0], &shape);
         assert!((ours[0] - 3.0).abs() < 1e-6 && (ours[1] - 5.0).abs() < 1e-6);
     }
 
@@ -147,7 +147,13 @@ mod tests {
         for shape in SHAPES[..5].iter().copied().map(shape) {
             let inputs = inputs(&shape, 2.0);
             let dy = noise(inputs[0].len(), 4);
-            let ours = gradients(inputs.each_ref().map(Vec::as_slice), &dy, &shape);
+            let [q, k, v] = inputs.each_ref().map(Vec::as_slice);
+            let (values, softmax) = attend(q, k, v, &shape);
+            let attended = Attended {
+                values: &values,
+                softmax: &softmax,
+            };
+            let ours = gradients([q, k, v], attended, &dy, &shape);
             for (input, ours) in ours.iter().enumerate() {
                 for i in (0..ours.len()).step_by(1 + ours.len() / 40) {
                     let at = |step: f64| {

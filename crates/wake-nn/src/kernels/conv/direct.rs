@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::geometry::Geometry;
 use super::layout::{Gather, Layout};
+use crate::kernels::columns::columns;
 use crate::kernels::tile::{self, ROWS};
 
 /// Rows of a panel of patches that are multiplied at once: 16 columns of them are 32 KiB.
@@ -74,20 +75,6 @@ fn block_width(geometry: &Geometry, width: usize) -> usize {
     let tasks = 4 * rayon::current_num_threads();
     let share = (panels * geometry.batch).div_ceil(tasks);
     width * share.clamp(1, PANELS).min(panels)
-}
-
-/// Cuts every row of a matrix at the same columns: for each block of columns, its part of each row.
-pub(super) fn columns(matrix: &mut [f32], row: usize, block: usize) -> Vec<Vec<&mut [f32]>> {
-    let rows = matrix.len() / row;
-    let mut blocks: Vec<Vec<&mut [f32]>> = (0..row.div_ceil(block))
-        .map(|_| Vec::with_capacity(rows))
-        .collect();
-    for row in matrix.chunks_mut(row) {
-        for (block, part) in blocks.iter_mut().zip(row.chunks_mut(block)) {
-            block.push(part);
-        }
-    }
-    blocks
 }
 
 /// Some consecutive pixels of all channels of one image.

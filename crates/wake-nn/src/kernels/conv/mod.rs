@@ -8,6 +8,7 @@ mod direct;
 mod geometry;
 mod image;
 mod layout;
+mod scatter;
 mod tiles;
 mod weights;
 

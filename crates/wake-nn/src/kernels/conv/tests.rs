@@ -1,6 +1,6 @@
 //! Every product against the sum that defines it.
 
-use super::image::{phases_of, turn};
+use super::image::{turn, turned};
 use super::*;
 use crate::kernels::noise;
 
@@ -81,6 +81,8 @@ fn products_are_the_sums_that_define_them() {
         (1, [3, 2], [10, 11], 2, 3, [1, 0, 0, 1]),
         (1, [130, 7], [6, 16], 3, 1, [1, 1, 1, 1]),
         (1, [1, 1], [1, 1], 3, 1, [1, 1, 1, 1]),
+        (3, [9, 200], [3, 5], 3, 1, [1, 1, 1, 1]),
+        (1, [3, 2], [20, 33], 3, 2, [1, 1, 1, 1]),
     ];
     for (batch, channels, size, kernel, stride, border) in cases {
         let g = Geometry {
@@ -100,6 +102,12 @@ fn products_are_the_sums_that_define_them() {
         let dx = image_gradient(&dy, &weight, &g);
         let terms = channels[1] * kernel * kernel + 1;
         assert_near(&format!("dx {g:?}"), &dx, &exact.dx, terms);
+        let dx = scatter::image_gradient(&dy, &weight, &g);
+        assert_near(&format!("scattered {g:?}"), &dx, &exact.dx, terms);
+        if stride == 1 {
+            let dx = convolve(&dy, &turn(&weight, &g), None, &turned(&g));
+            assert_near(&format!("turned {g:?}"), &dx, &exact.dx, terms);
+        }
         let dweight = weight_gradient(&x, &dy, &g);
         let terms = batch * g.pixels_out() + 1;
         assert_near(&format!("dw {g:?}"), &dweight, &exact.dweight, terms);
@@ -232,7 +240,7 @@ fn rounding_of_weights(x: &[f32], dy: &[f32], g: &Geometry) -> Vec<f64> {
 }
 
 /// Sides that tiles fill and do not, lopsided borders, channels that rows of a product do not divide, panels of several rows
-/// of tiles, several panels a task, and panels of several small images.
+/// of tiles, several panels a task, more of them than stay near, and panels of several small images.
 #[test]
 fn tiles_give_the_sums_that_define_them() {
     let cases = [
@@ -244,6 +252,7 @@ fn tiles_give_the_sums_that_define_them() {
         (16, [16, 20], [8, 8], [1, 1, 1, 1]),
         (32, [17, 16], [7, 9], [1, 1, 1, 1]),
         (85, [16, 16], [4, 6], [1, 0, 1, 2]),
+        (1, [16, 16], [2, 1100], [1, 1, 1, 1]),
     ];
     for (batch, channels, size, border) in cases {
         let g = Geometry {
@@ -267,7 +276,7 @@ fn tiles_give_the_sums_that_define_them() {
         let bounds = rounding_of_tiles(&x, &weight, &g);
         assert_within(&format!("y {g:?}"), &y, &exact.y, &of_channels, &bounds);
 
-        let (turned, back) = (turn(&weight, &g), phases_of(&g));
+        let (turned, back) = (turn(&weight, &g), turned(&g));
         let dx = image_gradient(&dy, &weight, &g);
         let direct = direct::convolve(&dy, &turned, None, &back);
         assert_ne!(dx, direct, "gradient by tiles: {g:?}");

@@ -6,7 +6,8 @@ use crate::kernels::arch::arch;
 use rayon::prelude::*;
 
 use super::{LANES, PLACES, differences, tiles_of};
-use crate::kernels::conv::direct::{by_blocks, columns};
+use crate::kernels::columns::columns;
+use crate::kernels::conv::direct::by_blocks;
 use crate::kernels::conv::geometry::Geometry;
 use crate::kernels::conv::layout::{Gather, Layout};
 use crate::kernels::tile::{self, ROWS};
@@ -151,20 +152,24 @@ impl WithSimd for Block<'_> {
         let rows = (self.y[0].len() / self.columns).div_ceil(2);
         let windows = self.tiles.batch * rows * self.tiles.size_out()[1];
         let panels = windows.div_ceil(width);
-        let mut image = vec![0.0; panels * PLACES * channels * width];
+        let panel = PLACES * channels * width;
+        // A row of tiles of a wide image exceeds the cache: transform some panels of it at a time.
+        let together = (NEAR / panel).clamp(1, panels);
+        let mut image = vec![0.0; together * panel];
         let mut window = vec![0.0; PLACES * width];
-        for (i, panel) in image
-            .chunks_exact_mut(PLACES * channels * width)
-            .enumerate()
-        {
-            let gather = Gather::new::<S>(&self.layout, &self.tiles, self.first + i * width);
-            for channel in 0..channels {
-                let planes = &self.planes[channel * self.layout.plane()..];
-                gather.read::<S>(planes, &mut window);
-                transform_window(simd, &window, channel, panel);
+        for first in (0..panels).step_by(together) {
+            let image = &mut image[..together.min(panels - first) * panel];
+            for (i, panel) in image.chunks_exact_mut(panel).enumerate() {
+                let begin = self.first + (first + i) * width;
+                let gather = Gather::new::<S>(&self.layout, &self.tiles, begin);
+                for channel in 0..channels {
+                    let planes = &self.planes[channel * self.layout.plane()..];
+                    gather.read::<S>(planes, &mut window);
+                    transform_window(simd, &window, channel, panel);
+                }
             }
+            self.multiply(simd, image, first);
         }
-        self.multiply(simd, &image);
     }
 }
 
@@ -200,19 +205,19 @@ fn transform_window<S: Simd>(simd: S, window: &[f32], channel: usize, panel: &mu
 }
 
 impl Block<'_> {
-    /// The sixteen products of kernels and windows, and the pixels that follow.
+    /// The sixteen products of kernels and windows, from the `first` panel on, and the pixels that follow.
     #[inline(always)]
-    fn multiply<S: Simd>(&mut self, simd: S, image: &[f32]) {
+    fn multiply<S: Simd>(&mut self, simd: S, image: &[f32], first: usize) {
         let width = tile::width::<S>();
         let [channels, channels_out] = self.tiles.channels;
         let panel = PLACES * channels * width;
         // Of every panel: `[row, place, window]`.
         let mut products = vec![0.0; image.len() / panel * ROWS * PLACES * width];
-        for first in (0..channels_out).step_by(ROWS) {
+        for row in (0..channels_out).step_by(ROWS) {
             for place in 0..PLACES {
                 let mut weights = [&self.weight[..0]; ROWS];
                 for (r, weights) in weights.iter_mut().enumerate() {
-                    let row = place * channels_out + (first + r).min(channels_out - 1);
+                    let row = place * channels_out + (row + r).min(channels_out - 1);
                     *weights = &self.weight[row * channels..][..channels];
                 }
                 let products = products.chunks_exact_mut(ROWS * PLACES * width);
@@ -227,11 +232,11 @@ impl Block<'_> {
                 }
             }
             for (i, products) in products.chunks_exact(ROWS * PLACES * width).enumerate() {
-                let channels = first..channels_out.min(first + ROWS);
+                let channels = row..channels_out.min(row + ROWS);
                 for (channel, products) in channels.zip(products.chunks_exact(PLACES * width)) {
                     let bias = self.bias.map_or(0.0, |bias| bias[channel]);
                     let tiles = Run {
-                        first: i * width,
+                        first: (first + i) * width,
                         columns: self.columns,
                         images: channels_out,
                     };
