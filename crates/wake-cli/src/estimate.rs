@@ -77,7 +77,9 @@ fn as_text(bound: &Bound) -> String {
     for (parameter, deviation) in &bound.deviations {
         let name = parameter.name().replace('_', " ");
         lines.push(match deviation.is_finite() {
-            true => format!("{name:<12} ± {deviation:.3} {}", parameter.unit()),
+            true => format!("{name:<12} ± {deviation:.3} {}", parameter.unit())
+                .trim_end()
+                .to_owned(),
             false => format!("{name:<12} cannot be told"),
         });
     }
