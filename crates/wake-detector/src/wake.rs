@@ -55,7 +55,7 @@ impl Wake {
     }
 }
 
-/// How far a line goes.
+/// Visible length of a wake, measured in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// From the tip \[pixels\].

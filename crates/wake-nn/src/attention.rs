@@ -132,7 +132,7 @@ mod native {
     use crate::operation::{Operation, apply, values_of};
     use burn::backend::flex::FlexTensor;
 
-    /// What the gradients need beside the inputs.
+    /// Results of the forward pass that the gradients need beside the inputs.
     #[derive(Debug, Clone)]
     pub(crate) struct Saved {
         softmax: Vec<Softmax>,

@@ -1,4 +1,4 @@
-//! How well any estimator can read a scene: the Cramér–Rao bound, without an image.
+//! Cramér–Rao bound: the smallest standard deviations of unbiased estimates from an image of a scene.
 
 use super::expected::ExpectedImage;
 use super::matrix::Matrix;

@@ -12,7 +12,7 @@ use super::forward::{Softmax, TOKENS, add_values, products};
 /// Queries whose weights are there at a time: as many as tokens on the way forward.
 const QUERIES: usize = TOKENS;
 
-/// What came out of an attention.
+/// Result of an attention, and the sums that its gradients need.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Attended<'a> {
     pub(crate) values: &'a [f32],

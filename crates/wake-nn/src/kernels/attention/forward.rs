@@ -61,7 +61,7 @@ pub(crate) fn attend(
     (out, softmaxes)
 }
 
-/// What makes weights of the scores x of one query: `e^(s (x − largest)) · inverse`.
+/// Largest score and inverse sum of one query, which turn its scores x into weights: `e^(s (x − largest)) · inverse`.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Softmax {
     pub(super) largest: f32,

@@ -1,4 +1,4 @@
-//! What each pixel of a scene with frozen plan returns, and where that is imaged, with all derivatives.
+//! Intensity of each pixel of a scene with a frozen plan, and its place in the image, with all derivatives.
 
 use super::cross_section::CrossSection;
 use super::frozen::{Frozen, imaging};
@@ -55,7 +55,7 @@ impl<const N: usize> EffectField<'_, N> {
     }
 }
 
-/// What one value changes besides fields.
+/// Derivatives by one value, those of the fields aside.
 #[derive(Clone, Copy, Default)]
 struct ValueSlopes {
     at: usize,
@@ -83,7 +83,7 @@ fn dual<const N: usize>(
 }
 
 impl Moved {
-    /// What the value changes besides fields.
+    /// Derivatives by the value, those of the fields aside.
     fn slopes(&self, at: usize, displacement: impl Fn(&Models) -> Displacement) -> ValueSlopes {
         let ship = |of: fn(&crate::kelvin::KelvinWake) -> f64| {
             self.slope(|m| m.wakes.first().map_or(0.0, of))
