@@ -140,16 +140,23 @@ mod native {
         total
     }
 
+    impl ToTokens {
+        /// The layer whose gradient to W is this product.
+        fn sizes(&self) -> Sizes {
+            Sizes {
+                rows: self.from,
+                from: self.pixels,
+                to: self.to,
+            }
+        }
+    }
+
     impl Operation<2> for ToTokens {
         type Saved = ();
 
         fn forward(&self, [x, matrix]: [&[f32]; 2]) -> (Vec<f32>, ()) {
-            let Self { pixels, from, to } = *self;
-            let sizes = Sizes {
-                rows: from,
-                from: pixels,
-                to,
-            };
+            let Self { pixels, from, .. } = *self;
+            let sizes = self.sizes();
             let product = |x: &[f32]| linear::to_weight(x, matrix, sizes);
             (each(x, from * pixels, product), ())
         }
@@ -162,11 +169,7 @@ mod native {
             wanted: [bool; 2],
         ) -> [Vec<f32>; 2] {
             let Self { pixels, from, to } = *self;
-            let back = Sizes {
-                rows: from,
-                from: pixels,
-                to,
-            };
+            let back = self.sizes();
             let images = x
                 .chunks_exact(from * pixels)
                 .zip(dy.chunks_exact(pixels * to));
@@ -178,16 +181,23 @@ mod native {
         }
     }
 
+    impl ToPixels {
+        /// The layer whose gradient to x is this product.
+        fn sizes(&self) -> Sizes {
+            Sizes {
+                rows: self.to,
+                from: self.pixels,
+                to: self.from,
+            }
+        }
+    }
+
     impl Operation<2> for ToPixels {
         type Saved = ();
 
         fn forward(&self, [tokens, matrix]: [&[f32]; 2]) -> (Vec<f32>, ()) {
-            let Self { pixels, from, to } = *self;
-            let sizes = Sizes {
-                rows: to,
-                from: pixels,
-                to: from,
-            };
+            let Self { pixels, from, .. } = *self;
+            let sizes = self.sizes();
             let product = |tokens: &[f32]| linear::to_input(matrix, tokens, sizes);
             (each(tokens, pixels * from, product), ())
         }
@@ -200,11 +210,7 @@ mod native {
             wanted: [bool; 2],
         ) -> [Vec<f32>; 2] {
             let Self { pixels, from, to } = *self;
-            let back = Sizes {
-                rows: to,
-                from: pixels,
-                to: from,
-            };
+            let back = self.sizes();
             let images = dy
                 .chunks_exact(to * pixels)
                 .zip(tokens.chunks_exact(pixels * from));
