@@ -45,8 +45,12 @@ fn bounds_follow_the_scene() {
 #[test]
 fn bad_arguments_are_named() {
     for (arguments, word) in [
-        (&[][..], "--bound"),
-        (&["--bound", "--set", "sea.wind_speed=0"], "sea.wind_speed"),
+        (
+            &["--bound", "--set", "sea.wind_speed=0"][..],
+            "sea.wind_speed",
+        ),
+        (&["--at", "3,4"], "--image"),
+        (&["--bound", "--image", "sea.tif"], "--image"),
         (
             &["--bound", "--set", "ship.turn_rate=0.5"],
             "ship.turn_rate",
@@ -58,4 +62,88 @@ fn bad_arguments_are_named() {
         assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
         assert!(message.contains(word), "no '{word}' in: {message}");
     }
+}
+
+/// An image that `wake simulate` wrote, and a window of it, are read from a guess; one of another size names the way out.
+#[test]
+fn an_image_is_read_from_a_guess() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| {
+        folder
+            .path()
+            .join(name)
+            .to_str()
+            .expect("Unicode")
+            .to_owned()
+    };
+    let keys = |rows: usize, speed: f64| -> Vec<String> {
+        let keys = [
+            format!("grid.rows={rows}"),
+            format!("grid.columns={rows}"),
+            "grid.spacing=4".to_owned(),
+            "ship.position=[60, 40]".to_owned(),
+            "ship.heading=60".to_owned(),
+            format!("ship.speed={speed}"),
+            "model.tolerance=1e-2".to_owned(),
+        ];
+        keys.into_iter()
+            .flat_map(|k| ["--set".to_owned(), k])
+            .collect()
+    };
+    let call = |program: &str, arguments: &[String], keys: &[String]| {
+        let all: Vec<&str> = arguments.iter().chain(keys).map(String::as_str).collect();
+        run(program, &all)
+    };
+    let strings =
+        |words: &[&str]| -> Vec<String> { words.iter().map(|w| (*w).to_owned()).collect() };
+    let out = at("sea");
+    let made = call(
+        "simulate",
+        &strings(&["--out", &out, "--export", "tiff"]),
+        &keys(96, 8.0),
+    );
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let image = at("sea/speckled.tif");
+    let read = call(
+        "estimate",
+        &strings(&["--image", &image, "--json"]),
+        &keys(96, 8.03),
+    );
+    assert!(
+        read.status.success(),
+        "{}",
+        String::from_utf8_lossy(&read.stderr)
+    );
+    let found: Value = serde_json::from_slice(&read.stdout).expect("JSON");
+    let wake = &found["wakes"][0];
+    let number = |name: &str| wake[name].as_f64().expect("a number");
+    let off = (number("speed") - 8.0).abs();
+    assert!(off < 4.0 * number("speed_sd"), "{wake}");
+    assert!(number("speed_sd") < 0.3, "{wake}");
+    let other = call("estimate", &strings(&["--image", &image]), &keys(64, 8.0));
+    let message = String::from_utf8_lossy(&other.stderr);
+    assert!(
+        message.contains("--at") && message.contains("96 x 96"),
+        "{message}"
+    );
+    let window = call(
+        "estimate",
+        &strings(&["--image", &image, "--at", "16,16", "--json"]),
+        &keys(64, 8.0),
+    );
+    assert!(
+        window.status.success(),
+        "{}",
+        String::from_utf8_lossy(&window.stderr)
+    );
+    let beyond = call(
+        "estimate",
+        &strings(&["--image", &image, "--at", "60,0"]),
+        &keys(64, 8.0),
+    );
+    assert_eq!(beyond.status.code(), Some(2), "{beyond:?}");
 }

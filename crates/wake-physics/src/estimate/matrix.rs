@@ -29,6 +29,20 @@ impl Matrix {
         self
     }
 
+    /// A M A of symmetric matrices.
+    pub(super) fn around(&self, middle: &Self) -> Self {
+        let n = self.size;
+        let mut out = Self::zero(n);
+        for i in 0..n {
+            for j in 0..n {
+                let pairs = (0..n).flat_map(|k| (0..n).map(move |l| [k, l]));
+                let terms = pairs.map(|[k, l]| self.at(i, k) * middle.at(k, l) * self.at(l, j));
+                out.add(i, j, terms.sum());
+            }
+        }
+        out
+    }
+
     /// The inverse of a positive definite matrix, by Cholesky's decomposition of the one with diagonal 1; `None` where a
     /// pivot is below 1e-10: some direction of the values is not determined at all.
     pub(super) fn inverse(&self) -> Option<Self> {

@@ -1,13 +1,14 @@
 //! What an image tells of the values of its scene.
 //!
 //! ```text
-//! scene ─► expected image and derivatives ─┬─► likelihood, score and information of an image
+//! scene ─► expected image and derivatives ─┬─► likelihood, score and information of an image ─► the likeliest scene nearby
 //!      └─► covariance of sea and speckle ──┴─► bounds, without any image
 //! ```
 //!
-//! [`expected_with_derivatives`] is the mean image of a scene with its derivatives, [`Likelihood`] reads an image with it, and
-//! [`bound`] says how well any estimate can know ship and wind.
+//! [`expected_with_derivatives`] is the mean image of a scene with its derivatives, [`Likelihood`] reads an image with it,
+//! [`refine`] finds the likeliest scene near a guess with its error bars, and [`bound`] says how well any estimate can know ship and wind.
 
+mod ascent;
 mod bound;
 mod expected;
 mod likelihood;
@@ -16,6 +17,7 @@ mod noise;
 mod observed;
 mod parameter;
 mod priors;
+mod refined;
 mod sea;
 mod torus;
 mod value;
@@ -25,4 +27,5 @@ pub use expected::{Expected, ExpectedImage, expected_with_derivatives};
 pub use likelihood::{Likelihood, Score};
 pub use parameter::{Factors, Parameter};
 pub use priors::Priors;
+pub use refined::{Alternative, Estimate, Estimated, refine};
 pub use value::Value;

@@ -113,17 +113,11 @@ fn error_of(image: &ExpectedImage, scene: &Scene, value: Value, slope: &Field, s
 /// Derivatives that are differences of small stages are off by this much of their root mean square: what the stages are rough by.
 const ROUGH: f64 = 3e-3;
 
-/// The same where waves below the pixels count: beside the ship the rays that carry them are centimetres apart.
-const ROUGH_BELOW: f64 = 3e-2;
-
 /// The error of a central difference falls with the square of the step as far as single precision allows.
 #[test]
 fn derivatives_are_those_of_central_differences() {
     for keys in HARD {
         let scene = scene(keys);
-        let below =
-            keys.contains(&"grid.spacing=10") && !keys.iter().any(|key| key.contains("terms"));
-        let rough = if below { ROUGH_BELOW } else { ROUGH };
         let image = ExpectedImage::new(&scene, &Value::ALL).unwrap();
         let here = image.at(&scene).unwrap();
         for (value, slope) in &here.derivatives {
@@ -133,13 +127,13 @@ fn derivatives_are_those_of_central_differences() {
             println!("{keys:?} {value:?}: {wide:.1e} {narrow:.1e} {rounded:.1e} ({rounding:.1e})");
             // A hundredth, less what rounding adds.
             assert!(
-                narrow < (wide / 50.0).max(rough),
+                narrow < (wide / 50.0).max(ROUGH),
                 "{keys:?} {value:?}: {wide:e} {narrow:e}"
             );
             assert!(wide < 0.1, "{keys:?} {value:?}: {wide:e}");
             // Below the truncation of the wider step, or what rounding adds.
             assert!(
-                rounded < narrow.max(rough).max(rounding),
+                rounded < narrow.max(ROUGH).max(rounding),
                 "{keys:?} {value:?}: {rounded:e} {rounding:e}"
             );
         }

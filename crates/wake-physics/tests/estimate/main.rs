@@ -8,3 +8,4 @@
 
 mod bounds;
 mod derivatives;
+mod refined;

@@ -50,8 +50,6 @@ pub(super) struct At {
     pub(super) value: [f64; 2],
     /// By the slopes along x and y.
     pub(super) slope: [[f64; 2]; 2],
-    /// Second derivatives xx, xy, yy.
-    pub(super) curvature: [[f64; 3]; 2],
     /// By wind speed, wind direction and incidence.
     pub(super) outer: [[f64; OUTER]; 2],
 }
@@ -111,7 +109,7 @@ impl CrossSection {
     pub(super) fn at(&self, slope: [f64; 2]) -> At {
         let per = CELLS as f64 / (2.0 * self.reach);
         let mut first_cell = [0; 2];
-        let mut weights = [[[0.0; 4]; 3]; 2];
+        let mut weights = [[[0.0; 4]; 2]; 2];
         for axis in 0..2 {
             let inside = slope[axis].clamp(-self.reach, self.reach);
             let place = (inside + self.reach) * per + BEYOND as f64;
@@ -119,23 +117,22 @@ impl CrossSection {
             first_cell[axis] = cell - 1;
             weights[axis] = spline_weights(place - cell as f64);
         }
-        let [[u, du, ddu], [v, dv, ddv]] = weights;
+        let [[u, du], [v, dv]] = weights;
         let mut value = [0.0; CHANNELS];
-        let (mut first, mut second) = ([[0.0; 2]; 2], [[0.0; 3]; 2]);
+        let mut first = [[0.0; 2]; 2];
         for j in 0..4 {
             let start = (first_cell[1] + j) * SIDE + first_cell[0];
             let Some(line) = self.coefficients[start..].first_chunk::<4>() else {
                 continue;
             };
             let mut sum = [0.0; CHANNELS];
-            let (mut slope, mut bend) = ([0.0; 2], [0.0; 2]);
+            let mut slope = [0.0; 2];
             for (i, c) in line.iter().enumerate() {
                 for (sum, c) in sum.iter_mut().zip(c) {
                     *sum += u[i] * c;
                 }
                 for (n, c) in [c[0], c[1 + OUTER]].into_iter().enumerate() {
                     slope[n] += du[i] * c;
-                    bend[n] += ddu[i] * c;
                 }
             }
             for (value, sum) in value.iter_mut().zip(&sum) {
@@ -145,15 +142,11 @@ impl CrossSection {
                 let sum = sum[n * (1 + OUTER)];
                 first[n][0] += v[j] * slope[n];
                 first[n][1] += dv[j] * sum;
-                second[n][0] += v[j] * bend[n];
-                second[n][1] += dv[j] * slope[n];
-                second[n][2] += ddv[j] * sum;
             }
         }
         At {
             value: [value[0], value[1 + OUTER]],
             slope: first.map(|d| d.map(|d| per * d)),
-            curvature: second.map(|d| d.map(|d| per * per * d)),
             outer: [0, 1].map(|n| std::array::from_fn(|p| value[n * (1 + OUTER) + 1 + p])),
         }
     }
@@ -189,8 +182,7 @@ impl At {
             for k in 0..2 {
                 self.slope[n][k] += weight * other.slope[n][k];
             }
-            for k in 0..3 {
-                self.curvature[n][k] += weight * other.curvature[n][k];
+            for k in 0..OUTER {
                 self.outer[n][k] += weight * other.outer[n][k];
             }
         }
@@ -217,9 +209,9 @@ fn chebyshev_nodes(count: usize, reach: f64) -> Vec<f64> {
     (0..count).map(node).collect()
 }
 
-/// Weights of four B-splines at t in their middle cell, with first and second derivative.
+/// Weights of four B-splines at t in their middle cell, with their derivatives.
 #[inline(always)]
-fn spline_weights(t: f64) -> [[f64; 4]; 3] {
+fn spline_weights(t: f64) -> [[f64; 4]; 2] {
     let r = 1.0 - t;
     [
         [
@@ -234,7 +226,6 @@ fn spline_weights(t: f64) -> [[f64; 4]; 3] {
             2.0 * r - 1.5 * r * r,
             0.5 * t * t,
         ],
-        [r, 3.0 * t - 2.0, 3.0 * r - 2.0, t],
     ]
 }
 
@@ -417,12 +408,6 @@ mod tests {
             assert!((at.value[1] - (8.0 * x.powi(4) - 8.0 * x * x + 1.0)).abs() < 1e-5);
             assert!((at.slope[0][0] - d3 * t2).abs() < 1e-3);
             assert!((at.slope[0][1] - t3 * d2).abs() < 1e-3);
-            for (found, expected) in at.curvature[0]
-                .iter()
-                .zip([24.0 * x * t2, d3 * d2, 4.0 * t3])
-            {
-                assert!((found - expected).abs() < 0.05, "{found} {expected}");
-            }
         }
     }
 

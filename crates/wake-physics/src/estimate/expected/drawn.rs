@@ -9,6 +9,7 @@ use crate::estimate::value::Value;
 use crate::kelvin::fade_with_slope;
 use crate::models::Models;
 use crate::numeric::Dual;
+use crate::raster::Field;
 use crate::sar::smooth::{Displacement, SMALLEST_VARIANCE, Source};
 use crate::scattering::SlopeCovariance;
 use std::f64::consts::PI;
@@ -32,6 +33,7 @@ pub(super) struct Drawn<'a, const N: usize> {
     variance: Dual<N>,
     sine: Dual<N>,
     effects: [Option<EffectField<'a, N>>; FIELDS],
+    roughness: Option<&'a [Field; 4]>,
     /// Place of each value among the derivatives; beyond the last where there is no derivative.
     slots: [usize; Value::ALL.len()],
 }
@@ -101,7 +103,7 @@ impl Moved {
 }
 
 impl<'a, const N: usize> Drawn<'a, N> {
-    pub(super) fn new(frozen: &Frozen, surface: &'a Surface<'a>) -> Self {
+    pub(super) fn new(frozen: &'a Frozen, surface: &'a Surface<'a>) -> Self {
         let displacement =
             |models: &Models| Displacement::new(&imaging(models, &frozen.plan), &frozen.raster);
         let slopes: Vec<ValueSlopes> = surface
@@ -146,6 +148,7 @@ impl<'a, const N: usize> Drawn<'a, N> {
             variance: dual(&slopes, here.variance, |s| s.variance),
             sine: dual(&slopes, surface.models.incidence.sin(), |s| s.sine),
             effects: std::array::from_fn(effect),
+            roughness: frozen.roughness.as_ref(),
             displacement: here,
             slots,
             surface,
@@ -212,15 +215,20 @@ impl<'a, const N: usize> Drawn<'a, N> {
         let pixel = i * self.raster.columns + j;
         let linear = self.linear((i, j));
         let of = |field: Linear| linear[field as usize];
-        let rough = [2, 3, 4].map(|n| self.effect(n, pixel));
-        let power = self.returned([of(Linear::SlopeX), of(Linear::SlopeY)], rough, || {
+        let rough = self.roughness.map(|fields| {
+            let at = |n: usize| f64::from(fields[n].values[pixel]);
+            let [xx, xy, yy] = [0, 1, 2].map(at);
+            (SlopeCovariance { xx, xy, yy }, at(3))
+        });
+        let covariance = rough.map(|(covariance, _)| covariance);
+        let power = self.returned([of(Linear::SlopeX), of(Linear::SlopeY)], covariance, || {
             let mut factor = of(Linear::Modulation).exp();
             if let Some(remaining) = self.effect(0, pixel) {
                 factor = factor * remaining;
             }
             factor
         });
-        let power = match (self.effect(6, pixel), self.effect(7, pixel)) {
+        let power = match (self.effect(2, pixel), self.effect(3, pixel)) {
             (Some(factor), Some(added)) => power * factor + added,
             _ => power,
         };
@@ -231,8 +239,8 @@ impl<'a, const N: usize> Drawn<'a, N> {
         let d = &self.displacement;
         let acceleration = of(Linear::Acceleration);
         let mut square = acceleration * acceleration;
-        if let Some(rough) = self.effect(5, pixel) {
-            square = square + rough * rough;
+        if let Some((_, rough)) = rough {
+            square = square + Dual::constant(rough * rough);
         }
         let least = SMALLEST_VARIANCE;
         let variance = self.variance + square.times(d.variance_per_square);
@@ -249,37 +257,23 @@ impl<'a, const N: usize> Drawn<'a, N> {
 
     /// σ⁰ without effects that change it as a whole.
     ///
-    /// - `rough`: slope variances xx, xy, yy below the pixels; `factor` on the Bragg return
+    /// - `rough`: slopes below the pixels; `factor` on the Bragg return
     #[inline(always)]
     fn returned(
         &self,
         slope: [Dual<N>; 2],
-        rough: [Option<Dual<N>>; 3],
+        rough: Option<SlopeCovariance>,
         factor: impl FnOnce() -> Dual<N>,
     ) -> Dual<N> {
         let point = slope.map(|s| s.value);
-        let more = match rough {
-            [Some(xx), Some(xy), Some(yy)] if xx.value + yy.value > 0.0 => Some([xx, xy, yy]),
-            _ => None,
-        };
-        let at = match &more {
-            None => self.cross_section.at(point),
-            Some([xx, xy, yy]) => {
-                let [xx, xy, yy] = [xx.value, xy.value, yy.value];
-                self.cross_section
-                    .over(point, &SlopeCovariance { xx, xy, yy })
-            }
+        let at = match rough {
+            Some(rough) if rough.xx + rough.yy > 0.0 => self.cross_section.over(point, &rough),
+            _ => self.cross_section.at(point),
         };
         let part = |n: usize| {
             let mut part = Dual::constant(at.value[n]);
             for (by, along) in at.slope[n].into_iter().zip(&slope) {
                 part.chain(by, along);
-            }
-            if let Some(more) = &more {
-                // The heat equation: ∂σ/∂C = ½ ∇∇σ, twice where C_xy stands for C_yx.
-                for (k, weight) in [0.5, 1.0, 0.5].into_iter().enumerate() {
-                    part.chain(weight * at.curvature[n][k], &more[k]);
-                }
             }
             for (value, slope) in OUTER_VALUES.iter().zip(&at.outer[n]) {
                 if let Some(by) = part.by.get_mut(self.slots[*value as usize]) {

@@ -131,7 +131,8 @@ impl<'a> Surface<'a> {
     }
 
     /// Largest values.
-    pub(super) fn largest(&self, raster: &crate::Raster) -> Largest {
+    pub(super) fn largest(&self, frozen: &Frozen) -> Largest {
+        let raster = &frozen.raster;
         let of = |linear: Linear| {
             let at = self.fields.iter().position(|&f| f == linear);
             let pairs = self.wakes.iter().zip(&self.models.wakes);
@@ -147,7 +148,7 @@ impl<'a> Surface<'a> {
             });
             largest.sum::<f64>()
         };
-        let rough = self.surroundings.roughness.as_ref();
+        let rough = frozen.roughness.as_ref();
         let most = |n: usize| {
             rough.map_or(0.0, |fields| {
                 f64::from(fields[n].values.iter().copied().fold(0.0, f32::max))

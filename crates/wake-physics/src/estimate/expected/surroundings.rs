@@ -3,13 +3,11 @@
 use crate::effects::{Effects, Site};
 use crate::estimate::value::Value;
 use crate::fields::Fields;
-use crate::kelvin::SubpixelWake;
 use crate::models::Models;
 use crate::plan::Plan;
 use crate::raster::{Field, Raster};
 use crate::scene::{Scene, Term};
 use crate::workspace::Workspace;
-use rayon::prelude::*;
 
 /// Fields of the effects of a scene; `None` where no effect has any.
 #[derive(Default)]
@@ -18,9 +16,6 @@ pub(super) struct Surroundings {
     pub(super) remaining: Option<Field>,
     /// Velocity of the water along x [m/s].
     pub(super) velocity_x: Option<Field>,
-    /// Slope variances xx, xy and yy of waves that no pixel carries \[1\], and the acceleration that smears as much as
-    /// their velocities.
-    pub(super) roughness: Option<[Field; 4]>,
     /// Factor on σ⁰, and what is added to it: effects change σ⁰ affinely.
     pub(super) factor: Option<Field>,
     pub(super) added: Option<Field>,
@@ -29,7 +24,7 @@ pub(super) struct Surroundings {
 }
 
 /// Number of the fields.
-pub(super) const FIELDS: usize = 8;
+pub(super) const FIELDS: usize = 4;
 
 impl Surroundings {
     pub(super) fn new(
@@ -61,20 +56,6 @@ impl Surroundings {
             drawn().for_each(|effect| effect.add_velocity(&site, &mut fields));
             out.velocity_x = Some(fields.velocity_x);
         }
-        if plan.uses(Term::SubpixelWake) {
-            let per_velocity = match plan.uses(Term::AzimuthSmear) {
-                true => models.defocus_of_velocity(),
-                false => 0.0,
-            };
-            let waves: Vec<SubpixelWake> = effects
-                .subpixel_wake
-                .waves
-                .iter()
-                .flatten()
-                .map(SubpixelWake::smoothed)
-                .collect();
-            out.roughness = Some(roughness(&waves, raster, (models.incidence, per_velocity)));
-        }
         let changing = [Term::Slicks, Term::Breaking, Term::BrightEdge, Term::Gusts];
         if changing.iter().any(|&term| plan.uses(term)) {
             let probe = |sigma0: f32| {
@@ -101,45 +82,44 @@ impl Surroundings {
 
     /// All fields, in one order.
     pub(super) fn each(&self) -> [Option<&Field>; FIELDS] {
-        let rough = |n: usize| self.roughness.as_ref().map(|fields| &fields[n]);
         [
             self.remaining.as_ref(),
             self.velocity_x.as_ref(),
-            rough(0),
-            rough(1),
-            rough(2),
-            rough(3),
             self.factor.as_ref(),
             self.added.as_ref(),
         ]
     }
 }
 
-/// Slope variances xx, xy and yy of waves, and the acceleration that smears as much as their velocities.
+/// Slope variances xx, xy and yy of the waves of ships that no pixel carries \[1\], and the acceleration that smears as much as their
+/// velocities; `None` where the plan leaves them out.
 ///
-/// - `per_velocity`: acceleration over velocity of the same smear [1/s]
-fn roughness(
-    waves: &[SubpixelWake],
+/// They are frozen: taken in the middle of pixels, where they change within centimetres, they have no derivative that a pixel's mean has.
+pub(super) fn roughness(
+    (scene, models): (&Scene, &Models),
+    plan: &Plan,
     raster: &Raster,
-    (incidence, per_velocity): (f64, f64),
-) -> [Field; 4] {
-    let mut fields = [(); 4].map(|()| Field::constant(raster, 0.0));
-    let columns = raster.columns.max(1);
-    let [xx, xy, yy, acceleration] = fields
-        .each_mut()
-        .map(|field| field.values.par_chunks_mut(columns));
-    let rows = xx.zip(xy).zip(yy).zip(acceleration).enumerate();
-    rows.for_each(|(i, (((xx, xy), yy), acceleration))| {
-        for (j, acceleration) in acceleration.iter_mut().enumerate() {
-            let place = [raster.x(j), raster.y(i)];
-            let each = waves.iter().filter_map(|waves| waves.between(place));
-            if let Some(rough) = each.reduce(|a, b| a.plus(&b)) {
-                [xx[j], xy[j], yy[j]] = rough.slopes.map(|v| v as f32);
-                *acceleration = (rough.radial(incidence).sqrt() * per_velocity) as f32;
-            }
-        }
-    });
-    fields
+) -> Option<[Field; 4]> {
+    if !plan.uses(Term::SubpixelWake) {
+        return None;
+    }
+    let effects = Effects::new(scene, models);
+    let site = Site {
+        scene,
+        models,
+        whole: *raster,
+        raster: *raster,
+        first_row: 0,
+    };
+    let mut fields = Fields {
+        radial_acceleration: Field::constant(raster, 0.0),
+        ..Fields::default()
+    };
+    let smears = plan.uses(Term::AzimuthSmear);
+    let memory = &mut Workspace::default();
+    let waves = &effects.subpixel_wake;
+    let [xx, xy, yy] = waves.variances(&site, memory, &mut fields, smears);
+    Some([xx, xy, yy, fields.radial_acceleration])
 }
 
 /// Derivatives of the fields by one value.

@@ -1,0 +1,224 @@
+//! Fisher scoring: from a start to the nearest maximum of the likelihood.
+
+use super::expected::ExpectedImage;
+use super::matrix::Matrix;
+use super::observed::{Near, Observed, Texture};
+use super::parameter::{Factors, Parameter};
+use super::priors::{Priors, values_of};
+use super::value::Value;
+use crate::error::Result;
+use crate::scene::Scene;
+
+/// A scene, the factors on its image, and the likelihood there.
+pub(super) struct Point {
+    pub(super) scene: Scene,
+    pub(super) factors: Factors,
+    pub(super) near: Near,
+    /// ln likelihood and ln prior of the factors.
+    pub(super) log_posterior: f64,
+}
+
+/// How often a step is shortened that leads down.
+const HALVINGS: usize = 3;
+
+/// A step this small, in standard deviations, is the last.
+const SMALL: f64 = 0.05;
+
+/// Winds that fit the spectra [m/s], and lengths over that of the known ship.
+const WINDS: [f64; 2] = [1.5, 20.0];
+const LENGTHS: [f64; 2] = [0.3, 3.0];
+
+/// A texture and the wind that it is one of.
+struct Known {
+    wind: [f64; 2],
+    texture: Texture,
+}
+
+/// Changes of the wind that make another texture: relative, and in degrees.
+const OTHER: [f64; 2] = [0.01, 1.0];
+
+/// What an ascent goes by.
+pub(super) struct Ascent<'a> {
+    pub(super) observed: &'a Observed,
+    pub(super) parameters: &'a [Parameter],
+    pub(super) priors: &'a Priors,
+    /// Length of the known ship \[m\].
+    pub(super) length: f64,
+}
+
+impl Ascent<'_> {
+    /// The likelihood at a scene.
+    pub(super) fn point(&self, scene: Scene, factors: Factors) -> Result<Point> {
+        let image = ExpectedImage::new(&scene, &values_of(self.parameters))?;
+        self.point_by(&image, &mut None, (scene, factors), true)
+    }
+
+    /// - `image` frozen nearby, `known` the last texture
+    fn point_by(
+        &self,
+        image: &ExpectedImage,
+        known: &mut Option<Known>,
+        (scene, factors): (Scene, Factors),
+        last: bool,
+    ) -> Result<Point> {
+        let wind = [scene.sea.wind_speed, scene.sea.wind_toward];
+        let is_near = |known: &Known| {
+            (wind[0] / known.wind[0] - 1.0).abs() < OTHER[0]
+                && (wind[1] - known.wind[1]).abs() < OTHER[1]
+        };
+        let texture = match known.take().filter(is_near) {
+            Some(known) => known,
+            None => Known {
+                texture: Texture::new(&scene, self.parameters)?,
+                wind,
+            },
+        };
+        let expected = image.at(&scene)?;
+        let texture = &known.insert(texture).texture;
+        let near = self
+            .observed
+            .near(self.parameters, (&factors, &expected), texture, last);
+        let prior = |parameter: &Parameter| {
+            let off = match parameter {
+                Parameter::Gain => factors.gain.ln(),
+                Parameter::Texture => factors.texture.ln(),
+                _ => 0.0,
+            };
+            -0.5 * self.priors.precision(*parameter) * off * off
+        };
+        Ok(Point {
+            log_posterior: near.log_likelihood + self.parameters.iter().map(prior).sum::<f64>(),
+            scene,
+            factors,
+            near,
+        })
+    }
+
+    /// The maximum that steps from a start lead to.
+    pub(super) fn climb(&self, start: Scene, factors: Factors, steps: usize) -> Result<Point> {
+        let image = ExpectedImage::new(&start, &values_of(self.parameters))?;
+        let mut known = None;
+        let mut here = self.point_by(&image, &mut known, (start, factors), false)?;
+        for _ in 0..steps {
+            let (step, size) = self.step(&here);
+            let mut part = 1.0;
+            let mut next = None;
+            for _ in 0..=HALVINGS {
+                let moved = self.moved(&here, &step, part);
+                let there = self.point_by(&image, &mut known, moved, false)?;
+                if there.log_posterior > here.log_posterior {
+                    next = Some(there);
+                    break;
+                }
+                part *= 0.3;
+            }
+            match next {
+                Some(there) => here = there,
+                None => break,
+            }
+            if part * size < SMALL {
+                break;
+            }
+        }
+        Ok(here)
+    }
+
+    /// Expected curvature of the posterior.
+    pub(super) fn precision(&self, point: &Point) -> Matrix {
+        let priors = self.priors.matrix(self.parameters);
+        point.near.information.slope.clone().plus(&priors)
+    }
+
+    /// Covariance of the estimate, (J + Π)⁻¹(V + Π)(J + Π)⁻¹; `None` where the image does not tell.
+    pub(super) fn covariance(&self, point: &Point) -> Option<Matrix> {
+        let inverse = self.precision(point).inverse()?;
+        let priors = self.priors.matrix(self.parameters);
+        let variance = point.near.information.variance.clone().plus(&priors);
+        Some(inverse.around(&variance))
+    }
+
+    /// The step of each parameter, and its size in standard deviations.
+    fn step(&self, here: &Point) -> (Vec<f64>, f64) {
+        let count = self.parameters.len();
+        let mut slope = here
+            .near
+            .information
+            .slope
+            .clone()
+            .plus(&self.priors.matrix(self.parameters));
+        let mut score = here.near.score.clone();
+        for (n, parameter) in self.parameters.iter().enumerate() {
+            let precision = self.priors.precision(*parameter);
+            score[n] -= precision
+                * match parameter {
+                    Parameter::Gain => here.factors.gain.ln(),
+                    Parameter::Texture => here.factors.texture.ln(),
+                    _ => 0.0,
+                };
+            // What the image hardly tells stays where it is.
+            slope.add(n, n, self.longest(*parameter, &here.scene).powi(-2));
+        }
+        let Some(inverse) = slope.inverse() else {
+            return (vec![0.0; count], 0.0);
+        };
+        let product = |n: usize| (0..count).map(|m| inverse.at(n, m) * score[m]).sum::<f64>();
+        let mut step: Vec<f64> = (0..count).map(product).collect();
+        let over = step
+            .iter()
+            .zip(self.parameters)
+            .map(|(step, p)| step.abs() / self.longest(*p, &here.scene))
+            .fold(1.0, f64::max);
+        step.iter_mut().for_each(|s| *s /= over);
+        let size = quadratic(&slope, &step).sqrt();
+        (step, size)
+    }
+
+    /// Longest step of a parameter.
+    fn longest(&self, parameter: Parameter, scene: &Scene) -> f64 {
+        match parameter {
+            Parameter::Value(Value::Speed) => 0.01 * Value::Speed.of(scene),
+            Parameter::Value(Value::Heading) => 1.5,
+            Parameter::Value(Value::X | Value::Y) => {
+                0.03 * Value::Speed.of(scene).powi(2).max(100.0)
+            }
+            Parameter::Value(Value::WindSpeed) => 0.1 * scene.sea.wind_speed,
+            Parameter::Value(Value::WindToward) => 15.0,
+            Parameter::Gain => 0.1,
+            Parameter::Texture => 0.3,
+            Parameter::Size | Parameter::Value(_) => 0.15 * self.length,
+        }
+    }
+
+    fn moved(&self, here: &Point, step: &[f64], part: f64) -> (Scene, Factors) {
+        let (mut scene, mut factors) = (here.scene.clone(), here.factors);
+        for (parameter, step) in self.parameters.iter().zip(step) {
+            let by = part * step;
+            match parameter {
+                Parameter::Gain => factors.gain *= by.exp(),
+                Parameter::Texture => factors.texture *= by.exp(),
+                Parameter::Size | Parameter::Value(_) => {
+                    for value in parameter.values() {
+                        let to = value.of(&scene) + by;
+                        let to = match value {
+                            Value::WindSpeed => to.clamp(WINDS[0], WINDS[1]),
+                            Value::Size => {
+                                to.clamp(LENGTHS[0] * self.length, LENGTHS[1] * self.length)
+                            }
+                            Value::Speed => to.max(0.5),
+                            _ => to,
+                        };
+                        value.set(&mut scene, to);
+                    }
+                }
+            }
+        }
+        (scene, factors)
+    }
+}
+
+/// xᵀ A x.
+fn quadratic(matrix: &Matrix, x: &[f64]) -> f64 {
+    let size = matrix.size;
+    let row = |n: usize| (0..size).map(|m| matrix.at(n, m) * x[m]).sum::<f64>();
+    (0..size).map(|n| x[n] * row(n)).sum::<f64>().max(0.0)
+}
