@@ -1,6 +1,6 @@
 //! How well an image of a scene can tell ship and wind, as text and JSON.
 
-use super::line;
+use super::line::line;
 use crate::exit::Outcome;
 use serde_json::{Map, Value, json};
 use wake_physics::Scene;

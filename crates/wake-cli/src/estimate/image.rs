@@ -1,11 +1,13 @@
 //! Ship and wind of an image, as text and JSON.
 
-use super::line;
+use super::line::line;
 use crate::exit::Outcome;
+use crate::sheet::Picture;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use wake_geo::Product;
-use wake_physics::estimate::{Estimate, Estimated, Priors, refine};
+use wake_physics::estimate::{Estimate, Estimated, ExpectedImage};
+use wake_physics::grey::GreyScale;
 use wake_physics::{Field, Scene, simulate};
 
 /// Relative change of the speed and turn of the heading \[deg\] of the guess in the example.
@@ -14,11 +16,11 @@ const OFF: (f64, f64) = (0.005, 0.5);
 /// Reads the pixels of a scene's grid.
 ///
 /// - `at`: row and column of the first in the image
-pub(super) fn read(path: &Path, at: Option<&[usize]>, scene: &Scene) -> Outcome<Field> {
+pub(super) fn read(path: &Path, at: Option<[usize; 2]>, scene: &Scene) -> Outcome<Field> {
     let product = Product::open(path)?;
     let (rows, columns) = (scene.grid.rows, scene.grid.columns);
     let [row, column] = match at {
-        Some(&[row, column]) => [row, column],
+        Some(first) => first,
         _ if product.size() == (rows, columns) => [0, 0],
         _ => {
             let (lines, pixels) = product.size();
@@ -37,27 +39,57 @@ pub(super) fn read(path: &Path, at: Option<&[usize]>, scene: &Scene) -> Outcome<
     })
 }
 
-/// A simulated image of the scene, found again.
-pub(super) fn example(scene: &Scene, priors: &Priors, as_json: bool) -> Outcome<String> {
+/// Simulated image of the scene, and a guess that is slightly wrong.
+pub(super) fn example(scene: &Scene) -> Outcome<(Field, Scene)> {
     let image = simulate(scene)?.speckled;
     let mut guess = scene.clone();
     for ship in &mut guess.ships {
         ship.speed *= 1.0 + OFF.0;
         ship.heading += OFF.1;
     }
-    told(&image, &guess, priors, as_json)
+    Ok((image, guess))
 }
 
-pub(super) fn told(
-    image: &Field,
-    guess: &Scene,
-    priors: &Priors,
-    as_json: bool,
-) -> Outcome<String> {
-    let found = refine(image, guess, priors)?;
+/// Draws the image, the mean image of the estimate, and their ratio.
+pub(super) fn draw(path: &Path, image: &Field, found: &Estimate) -> Outcome<()> {
+    let mean = ExpectedImage::new(&found.scene, &[])?.intensity(&found.scene)?;
+    let mut over = image.clone();
+    for (over, mean) in over.values.iter_mut().zip(&mean.values) {
+        *over /= mean.max(f32::MIN_POSITIVE);
+    }
+    let grey = GreyScale::filling(image);
+    let panels = [
+        ("image", image, &grey),
+        ("mean image", &mean, &grey),
+        ("image over mean", &over, &GreyScale::filling(&over)),
+    ];
+    let panels = panels.map(|(caption, field, grey)| {
+        let levels: Vec<u8> = field
+            .values
+            .iter()
+            .map(|&v| grey.level(f64::from(v)))
+            .collect();
+        Picture::from_levels(&levels, field.columns).captioned(caption)
+    });
+    Ok(Picture::sheet(&panels, panels.len()).write(path)?)
+}
+
+/// Estimate as JSON or text, with the prompt of its scene.
+pub(super) fn told(found: &Estimate, as_json: bool) -> Outcome<String> {
+    #[cfg(feature = "prompt")]
+    let sentence = Some(wake_text::prompt(&found.scene)?);
+    #[cfg(not(feature = "prompt"))]
+    let sentence: Option<String> = None;
     Ok(match as_json {
-        true => format!("{:#}", in_json(&found)),
-        false => in_words(&found),
+        true => {
+            let mut json = in_json(found);
+            json["wakes"][0]["sentence"] = json!(sentence);
+            format!("{json:#}")
+        }
+        false => match sentence {
+            Some(sentence) => format!("{}\n{sentence}", in_words(found)),
+            None => in_words(found),
+        },
     })
 }
 
@@ -96,8 +128,8 @@ fn in_json(found: &Estimate) -> Value {
 
 fn in_words(found: &Estimate) -> String {
     let verdict = match found.identifiable {
-        true => "the scene nearby explains the image",
-        false => "not identifiable: the likeliest scene nearby, and what speaks against it, below",
+        true => "estimate",
+        false => "not identifiable: the best scene near the guess does not explain the image",
     };
     let mut lines = vec![verdict.to_owned()];
     let shown = |e: &Estimated| match e.parameter.unit() {
@@ -109,31 +141,17 @@ fn in_words(found: &Estimate) -> String {
     for other in &found.alternatives {
         let toward = other.scene.sea.wind_toward.rem_euclid(360.0);
         lines.push(format!(
-            "or a wind toward {toward:.0} deg, with a probability of {:.2}",
+            "opposite wind, toward {toward:.0} deg: probability {:.2}",
             other.weight
         ));
     }
     lines.push(format!(
-        "ln likelihood {:.0} above that of a sea without the ship",
+        "log-likelihood ratio to a sea without the ship: {:.0}",
         found.over_open_sea
     ));
     lines.push(format!(
-        "residual {:.2} times that of the model at most, by length of the waves",
+        "largest misfit of the residual spectrum: factor {:.2}",
         found.misfit()
     ));
     lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use wake_physics::estimate::Parameter;
-
-    #[test]
-    fn units_are_those_of_the_parameters() {
-        let text = line(Parameter::Size, Some(195.0), 1.5);
-        assert_eq!(text, "length         195.000 ± 1.500 m");
-        let unknown = line(Parameter::Texture, Some(0.0), f64::INFINITY);
-        assert_eq!(unknown, "texture      cannot be told");
-    }
 }

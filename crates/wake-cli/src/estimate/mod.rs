@@ -2,6 +2,7 @@
 
 mod bound;
 mod image;
+mod line;
 #[cfg(feature = "train")]
 mod map;
 
@@ -9,12 +10,12 @@ use crate::exit::{self, Outcome};
 use clap::Args;
 use std::path::PathBuf;
 use wake_physics::Scene;
-use wake_physics::estimate::{Parameter, Priors};
+use wake_physics::estimate::{Priors, refine};
 
-/// Estimate ship and wind from an image near a guess, with error bars, or print how well an image can tell them.
+/// Estimate ship and wind from an image and a guess, with error bars.
 ///
-/// `--image` climbs from the guess `--scene` to the likeliest scene nearby. `--bound` needs no image: the smallest standard deviations that any unbiased
-/// estimate can reach (Cramér–Rao). Without either the scene is simulated, and found again from a guess that is a little off.
+/// With --image, maximises the likelihood near the guess --scene. With --bound, prints the smallest standard deviations of any unbiased estimate
+/// (Cramér–Rao); it needs no image. Without either, simulates the scene and estimates it from a guess that is slightly wrong.
 #[derive(Args)]
 #[command(
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
@@ -25,22 +26,19 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE", conflicts_with = "bound")]
     image: Option<PathBuf>,
     /// First row and column of the scene's grid in the image
-    #[arg(
-        long,
-        value_name = "ROW,COLUMN",
-        value_delimiter = ',',
-        num_args = 2,
-        requires = "image"
-    )]
-    at: Option<Vec<usize>>,
-    /// Print how well an image of the scene can tell ship and wind
+    #[arg(long, value_name = "ROW,COLUMN", value_parser = row_and_column, requires = "image")]
+    at: Option<[usize; 2]>,
+    /// Write a PNG of the image, the mean image of the estimate, and their ratio
+    #[arg(long, value_name = "FILE", conflicts_with = "bound")]
+    picture: Option<PathBuf>,
+    /// Print the Cramér–Rao bound of ship and wind for an image of the scene
     #[arg(long)]
     bound: bool,
     /// Draw the bound of the speed by wind and heading for seven sensors as SVG, some 13 minutes on two cores
     #[cfg(feature = "train")]
     #[arg(long, value_name = "FILE", requires = "bound", conflicts_with = "json")]
     map: Option<PathBuf>,
-    /// Scene file (TOML) of pixels, radar, sea and ship: what is known, and the guess; without it the default scene on 256 x 256 pixels of 4 m
+    /// Scene file (TOML) of the known values and the guess; without it the default scene on 256 x 256 pixels of 4 m
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Change one value of the scene, such as radar.incidence=35; may be repeated
@@ -68,11 +66,19 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     if let Some(path) = &arguments.map {
         return map::draw(path, &scene, &priors);
     }
-    let text = match (&arguments.image, arguments.bound) {
-        (_, true) => bound::told(&scene, &priors, arguments.json)?,
-        (Some(path), _) => image::read(path, arguments.at.as_deref(), &scene)
-            .and_then(|field| image::told(&field, &scene, &priors, arguments.json))?,
-        (None, false) => image::example(&scene, &priors, arguments.json)?,
+    let text = match arguments.bound {
+        true => bound::told(&scene, &priors, arguments.json)?,
+        false => {
+            let (field, guess) = match &arguments.image {
+                Some(path) => (image::read(path, arguments.at, &scene)?, scene),
+                None => image::example(&scene)?,
+            };
+            let found = refine(&field, &guess, &priors)?;
+            if let Some(path) = &arguments.picture {
+                image::draw(path, &field, &found)?;
+            }
+            image::told(&found, arguments.json)?
+        }
     };
     Ok(exit::say(&text)?)
 }
@@ -84,14 +90,12 @@ fn example() -> Scene {
     scene
 }
 
-/// A value as people read it: name, number, deviation, unit.
-fn line(parameter: Parameter, value: Option<f64>, deviation: f64) -> String {
-    let name = parameter.name().replace('_', " ");
-    let value = value.map_or(String::new(), |value| format!("{value:9.3} "));
-    match deviation.is_finite() {
-        true => format!("{name:<12} {value}± {deviation:.3} {}", parameter.unit())
-            .trim_end()
-            .to_owned(),
-        false => format!("{name:<12} cannot be told"),
+/// Two numbers with a comma between them.
+fn row_and_column(text: &str) -> Result<[usize; 2], String> {
+    let pair = text.split_once(',');
+    let numbers = pair.map(|(row, column)| (row.trim().parse(), column.trim().parse()));
+    match numbers {
+        Some((Ok(row), Ok(column))) => Ok([row, column]),
+        _ => Err("it is two whole numbers such as 1200,3400".to_owned()),
     }
 }

@@ -1,4 +1,4 @@
-//! Fisher scoring: from a start to the nearest maximum of the likelihood.
+//! Fisher scoring: ascent to the nearest maximum of the likelihood.
 
 use super::expected::ExpectedImage;
 use super::matrix::Matrix;
@@ -9,51 +9,53 @@ use super::value::Value;
 use crate::error::Result;
 use crate::scene::Scene;
 
-/// A scene, the factors on its image, and the likelihood there.
+/// Scene, factors on its image, and its likelihood.
 pub(super) struct Point {
     pub(super) scene: Scene,
     pub(super) factors: Factors,
     pub(super) near: Near,
-    /// ln likelihood and ln prior of the factors.
+    /// Log-likelihood plus log-prior of the factors.
     pub(super) log_posterior: f64,
 }
 
-/// How often a step is shortened that leads down.
+/// How often a step that lowers the posterior is shortened.
 const HALVINGS: usize = 3;
 
-/// A step this small, in standard deviations, is the last.
+/// Length of the last step, in standard deviations.
 const SMALL: f64 = 0.05;
 
-/// Winds that fit the spectra [m/s], and lengths over that of the known ship.
+/// Limits of the wind speed [m/s], and of the ship's length relative to the guess.
 const WINDS: [f64; 2] = [1.5, 20.0];
 const LENGTHS: [f64; 2] = [0.3, 3.0];
 
-/// A texture and the wind that it is one of.
+/// Texture of a sea, and its wind.
 struct Known {
     wind: [f64; 2],
     texture: Texture,
 }
 
-/// Changes of the wind that make another texture: relative, and in degrees.
+/// Changes of wind speed (relative) and direction \[deg\] that need a new texture.
 const OTHER: [f64; 2] = [0.01, 1.0];
 
-/// What an ascent goes by.
+/// Image, parameters and priors of an ascent.
 pub(super) struct Ascent<'a> {
     pub(super) observed: &'a Observed,
     pub(super) parameters: &'a [Parameter],
     pub(super) priors: &'a Priors,
-    /// Length of the known ship \[m\].
+    /// Length of the guessed ship \[m\].
     pub(super) length: f64,
 }
 
 impl Ascent<'_> {
-    /// The likelihood at a scene.
+    /// Likelihood at a scene, with the variance of the score.
     pub(super) fn point(&self, scene: Scene, factors: Factors) -> Result<Point> {
         let image = ExpectedImage::new(&scene, &values_of(self.parameters))?;
         self.point_by(&image, &mut None, (scene, factors), true)
     }
 
-    /// - `image` frozen nearby, `known` the last texture
+    /// - `image`: plan frozen at a scene nearby
+    /// - `known`: last texture
+    /// - `last`: compute the variance of the score
     fn point_by(
         &self,
         image: &ExpectedImage,
@@ -94,7 +96,7 @@ impl Ascent<'_> {
         })
     }
 
-    /// The maximum that steps from a start lead to.
+    /// Ascent from a start, of at most `steps` steps.
     pub(super) fn climb(&self, start: Scene, factors: Factors, steps: usize) -> Result<Point> {
         let image = ExpectedImage::new(&start, &values_of(self.parameters))?;
         let mut known = None;
@@ -137,7 +139,7 @@ impl Ascent<'_> {
         Some(inverse.around(&variance))
     }
 
-    /// The step of each parameter, and its size in standard deviations.
+    /// Step of each parameter, and its length in standard deviations.
     fn step(&self, here: &Point) -> (Vec<f64>, f64) {
         let count = self.parameters.len();
         let mut slope = here
@@ -155,7 +157,7 @@ impl Ascent<'_> {
                     Parameter::Texture => here.factors.texture.ln(),
                     _ => 0.0,
                 };
-            // What the image hardly tells stays where it is.
+            // Damping: parameters that the image hardly determines keep their values.
             slope.add(n, n, self.longest(*parameter, &here.scene).powi(-2));
         }
         let Some(inverse) = slope.inverse() else {

@@ -1,12 +1,12 @@
 //! What an image tells of the values of its scene.
 //!
 //! ```text
-//! scene ─► expected image and derivatives ─┬─► likelihood, score and information of an image ─► the likeliest scene nearby
+//! scene ─► expected image and derivatives ─┬─► likelihood, score and information of an image ─► estimate near a guess
 //!      └─► covariance of sea and speckle ──┴─► bounds, without any image
 //! ```
 //!
 //! [`expected_with_derivatives`] is the mean image of a scene with its derivatives, [`Likelihood`] reads an image with it,
-//! [`refine`] finds the likeliest scene near a guess with its error bars, and [`bound`] says how well any estimate can know ship and wind.
+//! [`refine`] estimates ship and wind near a guess, and [`bound`] says how well any estimate can know ship and wind.
 
 mod ascent;
 mod bound;

@@ -6,7 +6,7 @@ use wake_physics::{Scene, simulate};
 const SPEED: Parameter = Parameter::Value(Value::Speed);
 const HEADING: Parameter = Parameter::Value(Value::Heading);
 
-/// A number of a stream, uniform between two bounds (SplitMix64).
+/// A number of a stream, uniform between two bounds (`SplitMix64`).
 fn uniform(state: &mut u64, low: f64, high: f64) -> f64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let mut z = *state;
@@ -93,7 +93,7 @@ fn a_ship_is_found_from_a_guess_and_only_where_there_is_one() {
     }
     assert!(found.identifiable, "{found:?}");
     assert_eq!(found.covariance.len(), 81);
-    let mut open = scene.clone();
+    let mut open = scene;
     open.ships.clear();
     let image = simulate(&open).unwrap().speckled;
     let none = refine(&image, &guess, &Priors::default()).unwrap();
@@ -112,7 +112,7 @@ fn what_cannot_be_refined_is_refused() {
     open.ships.clear();
     let error = refine(&image, &open, &Priors::default()).unwrap_err();
     assert!(error.to_string().contains("one ship"), "{error}");
-    let mut wide = scene.clone();
+    let mut wide = scene;
     wide.grid.columns = 97;
     let error = refine(&image, &wide, &Priors::default()).unwrap_err();
     assert!(error.to_string().contains("96 x 97"), "{error}");

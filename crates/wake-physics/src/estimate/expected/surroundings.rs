@@ -34,13 +34,7 @@ impl Surroundings {
         raster: &Raster,
     ) -> Self {
         let effects = Effects::new(scene, models);
-        let site = Site {
-            scene,
-            models,
-            whole: *raster,
-            raster: *raster,
-            first_row: 0,
-        };
+        let site = site(scene, models, raster);
         let mut out = Self::default();
         let drawn = || effects.each().filter(|e| plan.uses(e.term()));
         let flat = || Field::constant(raster, 0.0);
@@ -91,6 +85,17 @@ impl Surroundings {
     }
 }
 
+/// All pixels at once.
+fn site<'a>(scene: &'a Scene, models: &'a Models, raster: &Raster) -> Site<'a> {
+    Site {
+        scene,
+        models,
+        whole: *raster,
+        raster: *raster,
+        first_row: 0,
+    }
+}
+
 /// Slope variances xx, xy and yy of the waves of ships that no pixel carries \[1\], and the acceleration that smears as much as their
 /// velocities; `None` where the plan leaves them out.
 ///
@@ -104,13 +109,7 @@ pub(super) fn roughness(
         return None;
     }
     let effects = Effects::new(scene, models);
-    let site = Site {
-        scene,
-        models,
-        whole: *raster,
-        raster: *raster,
-        first_row: 0,
-    };
+    let site = site(scene, models, raster);
     let mut fields = Fields {
         radial_acceleration: Field::constant(raster, 0.0),
         ..Fields::default()
