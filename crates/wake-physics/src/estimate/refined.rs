@@ -100,7 +100,7 @@ const VAGUE: f64 = 0.15;
 /// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind. Standard deviations are those of the
 /// information times a factor for the error of the mean image (1.5 to 5, measured on simulated scenes).
 ///
-/// The estimate is identifiable if the residual power is within 25 % of the model's, the factors on brightness and texture agree with their priors (3 and 2
+/// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
 /// standard deviations), the ship raises the log-likelihood by more than 20, and the standard deviation of the speed is below 15 %.
 ///
 /// - `image`: intensity with speckle, in the unit of σ⁰, `[rows, columns]` of the scene's grid
@@ -277,9 +277,13 @@ fn concluded(ascent: &Ascent<'_>, [first, second]: [Point; 2], open: f64) -> Res
             weight: 1.0 - weight,
         });
     }
+    // Largest acceptable misfit, and three standard deviations of the mean over a ring.
+    let explained =
+        best.near.rings.iter().all(|&[power, count]| {
+            power.max(power.recip()) < EXPLAINED + 3.0 / count.max(1.0).sqrt()
+        });
     let [speed, deviation] = found.of(Parameter::Value(Value::Speed));
-    found.identifiable =
-        usual && over_open_sea > CERTAIN && found.misfit() < EXPLAINED && deviation < VAGUE * speed;
+    found.identifiable = usual && over_open_sea > CERTAIN && explained && deviation < VAGUE * speed;
     Ok(found)
 }
 

@@ -18,7 +18,7 @@ fn scene(keys: &[&str]) -> Scene {
 }
 
 /// Scenes that a derivative may fail on.
-const HARD: [&[&str]; 8] = [
+const HARD: [&[&str]; 7] = [
     &[],
     &["sea.depth=12", "ship.speed=8"],
     &["radar.range_to_velocity=0"],
@@ -38,15 +38,6 @@ const HARD: [&[&str]; 8] = [
         "ship.speed=7",
         "ship.edge=true",
         "model.terms=[\"kelvin\", \"turbulent\", \"tilt_average\", \"specular\", \"bright_edge\", \"hydrodynamic\", \"bunching\", \"coherence\", \"impulse_response\", \"noise\", \"sea\"]",
-    ],
-    // Waves below the pixels, too.
-    &[
-        "radar.sensor=sentinel-1-iw",
-        "grid.spacing=10",
-        "grid.rows=48",
-        "grid.columns=48",
-        "radar.incidence=35",
-        "ship.speed=8",
     ],
 ];
 

@@ -9,7 +9,7 @@
 //! those of the polynomial, derivatives by wind and incidence are central differences of whole tables of nodes.
 
 use crate::numeric::vectorized;
-use crate::scattering::{Backscatter, SlopeCovariance};
+use crate::scattering::Backscatter;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -37,8 +37,6 @@ pub(super) struct CrossSection {
     nodes: usize,
     /// Coefficients of B-splines, `[side, side]`, that of the slope along x running fastest.
     coefficients: Vec<[f64; CHANNELS]>,
-    /// Largest variance of the averaged slopes \[1\].
-    pub(super) averaged: f64,
 }
 
 /// Coefficients along each axis.
@@ -96,7 +94,6 @@ impl CrossSection {
             reach,
             nodes,
             coefficients: spline(&coefficients(&channels, nodes), nodes),
-            averaged: axes.variance[1],
         }
     }
 
@@ -150,58 +147,7 @@ impl CrossSection {
             outer: [0, 1].map(|n| std::array::from_fn(|p| value[n * (1 + OUTER) + 1 + p])),
         }
     }
-
-    /// The mean over more Gaussian slopes, by Gauss–Hermite rules along their axes.
-    #[inline(always)]
-    pub(super) fn over(&self, slope: [f64; 2], more: &SlopeCovariance) -> At {
-        let axes = more.principal_axes();
-        let rule: &[[f64; 2]] = match axes.variance[0] > 0.02 * self.averaged {
-            true => &HERMITE_5,
-            false => &HERMITE_3,
-        };
-        let deviation = axes.variance.map(f64::sqrt);
-        let mut sum = At::default();
-        for [v, weight_v] in rule {
-            for [u, weight_u] in rule {
-                let [dx, dy] = axes.slope([u * deviation[0], v * deviation[1]]);
-                sum.add(
-                    weight_u * weight_v,
-                    &self.at([slope[0] + dx, slope[1] + dy]),
-                );
-            }
-        }
-        sum
-    }
 }
-
-impl At {
-    #[inline(always)]
-    fn add(&mut self, weight: f64, other: &Self) {
-        for n in 0..2 {
-            self.value[n] += weight * other.value[n];
-            for k in 0..2 {
-                self.slope[n][k] += weight * other.slope[n][k];
-            }
-            for k in 0..OUTER {
-                self.outer[n][k] += weight * other.outer[n][k];
-            }
-        }
-    }
-}
-
-/// Nodes and weights of the mean over a unit Gaussian, exact to the fifth power, and to the ninth.
-const HERMITE_3: [[f64; 2]; 3] = [
-    [-1.732_050_807_568_877_2, 1.0 / 6.0],
-    [0.0, 2.0 / 3.0],
-    [1.732_050_807_568_877_2, 1.0 / 6.0],
-];
-const HERMITE_5: [[f64; 2]; 5] = [
-    [-2.856_970_013_872_805_6, 0.011_257_411_327_720_69],
-    [-1.355_626_179_974_265_8, 0.222_075_922_005_612_64],
-    [0.0, 8.0 / 15.0],
-    [1.355_626_179_974_265_8, 0.222_075_922_005_612_64],
-    [2.856_970_013_872_805_6, 0.011_257_411_327_720_69],
-];
 
 /// Zeros of the Chebyshev polynomial of degree `count`, scaled to ±`reach`.
 fn chebyshev_nodes(count: usize, reach: f64) -> Vec<f64> {
@@ -397,7 +343,6 @@ mod tests {
             reach: 1.0 / (1.0 + 2.0 * BEYOND as f64 / CELLS as f64),
             nodes: count,
             coefficients: spline(&polynomial, count),
-            averaged: 1.0,
         };
         for [x, y] in [[0.0, 0.0], [0.31, -0.52], [-0.8, 0.7], [0.123, 0.456]] {
             let at = section.at([x, y]);
@@ -411,7 +356,7 @@ mod tests {
         }
     }
 
-    /// The fitted σ⁰ is the one by direct quadrature, also where a ship's waves roughen the sea.
+    /// The fitted σ⁰ is the one by direct quadrature.
     #[test]
     fn it_is_the_exact_cross_section() {
         for keys in [
@@ -432,24 +377,6 @@ mod tests {
                         "{keys:?} {slope:?}: {found} {expected}"
                     );
                 }
-                // Second order in the slopes: what is left out falls with the square of their variance, down to the error above.
-                let error = |part: f64| {
-                    let more = SlopeCovariance {
-                        xx: 4e-3 * part,
-                        xy: 1e-3 * part,
-                        yy: 2e-3 * part,
-                    };
-                    let rough = exact.tilt.plus(&more);
-                    let rough = exact.two_scale.tilt_averaged(slope, &rough);
-                    (section.over(slope, &more).value[0] - rough).abs()
-                };
-                let [whole, half, quarter] = [1.0, 0.5, 0.25].map(error);
-                assert!(whole < 5e-3 * calm, "{keys:?} {slope:?}: {whole}");
-                let least = 2e-4 * calm.max(exact.two_scale.tilt_averaged(slope, &exact.tilt));
-                assert!(
-                    quarter < (0.3 * half).max(least),
-                    "{keys:?} {slope:?}: {half} {quarter}"
-                );
             }
         }
     }

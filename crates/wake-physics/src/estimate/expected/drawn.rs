@@ -9,9 +9,7 @@ use crate::estimate::value::Value;
 use crate::kelvin::fade_with_slope;
 use crate::models::Models;
 use crate::numeric::Dual;
-use crate::raster::Field;
 use crate::sar::smooth::{Displacement, SMALLEST_VARIANCE, Source};
-use crate::scattering::SlopeCovariance;
 use std::f64::consts::PI;
 
 /// Numbers of the first ship's place, with their derivatives by value.
@@ -33,7 +31,6 @@ pub(super) struct Drawn<'a, const N: usize> {
     variance: Dual<N>,
     sine: Dual<N>,
     effects: [Option<EffectField<'a, N>>; FIELDS],
-    roughness: Option<&'a [Field; 4]>,
     /// Place of each value among the derivatives; beyond the last where there is no derivative.
     slots: [usize; Value::ALL.len()],
 }
@@ -103,7 +100,7 @@ impl Moved {
 }
 
 impl<'a, const N: usize> Drawn<'a, N> {
-    pub(super) fn new(frozen: &'a Frozen, surface: &'a Surface<'a>) -> Self {
+    pub(super) fn new(frozen: &Frozen, surface: &'a Surface<'a>) -> Self {
         let displacement =
             |models: &Models| Displacement::new(&imaging(models, &frozen.plan), &frozen.raster);
         let slopes: Vec<ValueSlopes> = surface
@@ -148,7 +145,6 @@ impl<'a, const N: usize> Drawn<'a, N> {
             variance: dual(&slopes, here.variance, |s| s.variance),
             sine: dual(&slopes, surface.models.incidence.sin(), |s| s.sine),
             effects: std::array::from_fn(effect),
-            roughness: frozen.roughness.as_ref(),
             displacement: here,
             slots,
             surface,
@@ -215,13 +211,7 @@ impl<'a, const N: usize> Drawn<'a, N> {
         let pixel = i * self.raster.columns + j;
         let linear = self.linear((i, j));
         let of = |field: Linear| linear[field as usize];
-        let rough = self.roughness.map(|fields| {
-            let at = |n: usize| f64::from(fields[n].values[pixel]);
-            let [xx, xy, yy] = [0, 1, 2].map(at);
-            (SlopeCovariance { xx, xy, yy }, at(3))
-        });
-        let covariance = rough.map(|(covariance, _)| covariance);
-        let power = self.returned([of(Linear::SlopeX), of(Linear::SlopeY)], covariance, || {
+        let power = self.returned([of(Linear::SlopeX), of(Linear::SlopeY)], || {
             let mut factor = of(Linear::Modulation).exp();
             if let Some(remaining) = self.effect(0, pixel) {
                 factor = factor * remaining;
@@ -238,10 +228,7 @@ impl<'a, const N: usize> Drawn<'a, N> {
         }
         let d = &self.displacement;
         let acceleration = of(Linear::Acceleration);
-        let mut square = acceleration * acceleration;
-        if let Some((_, rough)) = rough {
-            square = square + Dual::constant(rough * rough);
-        }
+        let square = acceleration * acceleration;
         let least = SMALLEST_VARIANCE;
         let variance = self.variance + square.times(d.variance_per_square);
         Source {
@@ -257,19 +244,11 @@ impl<'a, const N: usize> Drawn<'a, N> {
 
     /// σ⁰ without effects that change it as a whole.
     ///
-    /// - `rough`: slopes below the pixels; `factor` on the Bragg return
+    /// - `factor` on the Bragg return
     #[inline(always)]
-    fn returned(
-        &self,
-        slope: [Dual<N>; 2],
-        rough: Option<SlopeCovariance>,
-        factor: impl FnOnce() -> Dual<N>,
-    ) -> Dual<N> {
+    fn returned(&self, slope: [Dual<N>; 2], factor: impl FnOnce() -> Dual<N>) -> Dual<N> {
         let point = slope.map(|s| s.value);
-        let at = match rough {
-            Some(rough) if rough.xx + rough.yy > 0.0 => self.cross_section.over(point, &rough),
-            _ => self.cross_section.at(point),
-        };
+        let at = self.cross_section.at(point);
         let part = |n: usize| {
             let mut part = Dual::constant(at.value[n]);
             for (by, along) in at.slope[n].into_iter().zip(&slope) {

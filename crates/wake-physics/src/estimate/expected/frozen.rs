@@ -4,7 +4,7 @@ use super::waves::Linear;
 use crate::linear::OpenSea;
 use crate::models::{Models, kelvin_wake};
 use crate::plan::Plan;
-use crate::raster::{Field, Raster};
+use crate::raster::Raster;
 use crate::sar::Imaging;
 use crate::scene::{Scene, Term};
 
@@ -23,8 +23,6 @@ pub(super) struct Frozen {
     pub(super) nodes: usize,
     /// Of sums of waves.
     pub(super) tolerance: f64,
-    /// Waves that no pixel carries, see [`roughness`](super::surroundings::roughness).
-    pub(super) roughness: Option<[Field; 4]>,
 }
 
 /// Models of a scene that average over the whole sea.

@@ -28,7 +28,6 @@ use crate::scene::{Scene, Term};
 use drawn::Drawn;
 use frozen::{Frozen, averaged, imaging};
 use surface::Surface;
-use surroundings::roughness;
 use waves::Linear;
 
 /// The expected image of a scene, and its derivatives.
@@ -63,11 +62,12 @@ pub struct Expected {
 /// - σ⁰ is a polynomial of the slope, constant beyond 1.25 times the steepest slope of the frozen scene.
 /// - Derivatives of effects (turbulent wake, edges, gusts) and of σ⁰ by wind and incidence are differences of small stages,
 ///   about 1e-5 of themselves off.
-/// - Waves cross no limit: those of the frozen band stay, and those that modulate. Waves below the pixels stay as they are.
+/// - Waves cross no limit: those of the frozen band stay, and those that modulate.
 ///
 /// # Limits
 ///
-/// Ships that go straight, and a sea with wind. Echoes of ships are no part of it.
+/// Ships that go straight, and a sea with wind. Echoes of ships and waves below the pixels ([`Term::SubpixelWake`]) are left out: these waves change within
+/// centimetres, and their value at the middle of a pixel has not the derivative of the pixel's mean.
 #[derive(Debug)]
 pub struct ExpectedImage {
     values: Vec<Value>,
@@ -128,12 +128,10 @@ impl ExpectedImage {
             reach: 0.0,
             nodes: 0,
             tolerance,
-            roughness: roughness((scene, models), plan, &raster),
         };
         let surface = Surface::new(&frozen, scene, models, &[]);
         let largest = surface.largest(&frozen);
-        let rough = largest.roughness.sqrt();
-        frozen.reach = (STEEPER * (largest.slope + 2.9 * rough)).clamp(0.1, 1.5);
+        frozen.reach = (STEEPER * largest.slope).clamp(0.1, 1.5);
         frozen.nodes = surface.cross_section(&frozen, None).nodes();
         let square = STEEPER * largest.acceleration.powi(2);
         let narrowest = displacement.variance;
@@ -200,7 +198,7 @@ impl ExpectedImage {
         let surface = Surface::new(&self.frozen, scene, &models, values);
         let drawn = Drawn::<N>::new(&self.frozen, &surface);
         let by: Vec<usize> = (0..values.len()).collect();
-        let mut fields = match surface.is_uniform() && self.frozen.roughness.is_none() {
+        let mut fields = match surface.is_uniform() {
             true => {
                 let power = drawn.source(0, 0).power;
                 let values = std::iter::once(power.value).chain(by.iter().map(|&n| power.by[n]));

@@ -67,8 +67,6 @@ pub(super) struct Largest {
     pub(super) slope: f64,
     pub(super) elevation: f64,
     pub(super) acceleration: f64,
-    /// Variance of slopes below the pixels.
-    pub(super) roughness: f64,
 }
 
 impl<'a> Surface<'a> {
@@ -148,17 +146,10 @@ impl<'a> Surface<'a> {
             });
             largest.sum::<f64>()
         };
-        let rough = frozen.roughness.as_ref();
-        let most = |n: usize| {
-            rough.map_or(0.0, |fields| {
-                f64::from(fields[n].values.iter().copied().fold(0.0, f32::max))
-            })
-        };
         Largest {
             slope: of(Linear::SlopeX).max(of(Linear::SlopeY)),
             elevation: of(Linear::Elevation),
-            acceleration: of(Linear::Acceleration).hypot(most(3)),
-            roughness: most(0).max(most(2)),
+            acceleration: of(Linear::Acceleration),
         }
     }
 

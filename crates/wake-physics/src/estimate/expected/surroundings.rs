@@ -34,7 +34,13 @@ impl Surroundings {
         raster: &Raster,
     ) -> Self {
         let effects = Effects::new(scene, models);
-        let site = site(scene, models, raster);
+        let site = Site {
+            scene,
+            models,
+            whole: *raster,
+            raster: *raster,
+            first_row: 0,
+        };
         let mut out = Self::default();
         let drawn = || effects.each().filter(|e| plan.uses(e.term()));
         let flat = || Field::constant(raster, 0.0);
@@ -83,42 +89,6 @@ impl Surroundings {
             self.added.as_ref(),
         ]
     }
-}
-
-/// All pixels at once.
-fn site<'a>(scene: &'a Scene, models: &'a Models, raster: &Raster) -> Site<'a> {
-    Site {
-        scene,
-        models,
-        whole: *raster,
-        raster: *raster,
-        first_row: 0,
-    }
-}
-
-/// Slope variances xx, xy and yy of the waves of ships that no pixel carries \[1\], and the acceleration that smears as much as their
-/// velocities; `None` where the plan leaves them out.
-///
-/// They are frozen: taken in the middle of pixels, where they change within centimetres, they have no derivative that a pixel's mean has.
-pub(super) fn roughness(
-    (scene, models): (&Scene, &Models),
-    plan: &Plan,
-    raster: &Raster,
-) -> Option<[Field; 4]> {
-    if !plan.uses(Term::SubpixelWake) {
-        return None;
-    }
-    let effects = Effects::new(scene, models);
-    let site = site(scene, models, raster);
-    let mut fields = Fields {
-        radial_acceleration: Field::constant(raster, 0.0),
-        ..Fields::default()
-    };
-    let smears = plan.uses(Term::AzimuthSmear);
-    let memory = &mut Workspace::default();
-    let waves = &effects.subpixel_wake;
-    let [xx, xy, yy] = waves.variances(&site, memory, &mut fields, smears);
-    Some([xx, xy, yy, fields.radial_acceleration])
 }
 
 /// Derivatives of the fields by one value.
