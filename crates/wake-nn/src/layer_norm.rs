@@ -119,7 +119,7 @@ mod tests {
         }
     }
 
-    /// How far two orders of summation may be apart, in `y` and in the gradients of `½ Σ y²` by x, weight and bias.
+    /// Largest difference between two orders of summation, in `y` and in the gradients of `½ Σ y²` by x, weight and bias.
     ///
     /// A token's mean μ and deviation σ are sums of as many terms as there are channels, so that x̂ = (x − μ)/σ is
     /// uncertain by u = terms · ε · max|x|/σ · max(1, x̂²), and y by γ u. The gradient by x is γ (y − …)/σ, three

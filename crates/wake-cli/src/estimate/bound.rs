@@ -1,4 +1,4 @@
-//! How well an image of a scene can tell ship and wind, as text and JSON.
+//! Cramér–Rao bound of ship and wind, as text and JSON.
 
 use super::line::line;
 use crate::exit::Outcome;

@@ -18,7 +18,7 @@ pub(super) struct Point {
     pub(super) log_posterior: f64,
 }
 
-/// How often a step that lowers the posterior is shortened.
+/// Largest number of reductions of a step that lowers the posterior.
 const HALVINGS: usize = 3;
 
 /// Length of the last step, in standard deviations.

@@ -76,7 +76,7 @@ fn small(keys: &[&str]) -> Scene {
         .unwrap()
 }
 
-/// The truth lies within four deviations; a sea without the ship, and an image of other looks, are told apart.
+/// Errors are below four standard deviations; a sea without the ship and an image with half the looks are not identifiable.
 #[test]
 fn a_ship_is_found_from_a_guess_and_only_where_there_is_one() {
     let scene = small(&[]);
