@@ -88,10 +88,15 @@ impl Window {
         -10.0 * (self.moment(1).powi(2) / self.moment(2)).log10()
     }
 
-    /// Correlation ρ² of the intensity of a rough surface at a distance x \[1/B\], up to 20.
+    /// Correlation ρ² of the intensity of a rough surface at a distance x \[1/B\].
     #[must_use]
     pub fn correlation(self, x: f64) -> f64 {
-        let transform = over_band(|f| self.weight(f).powi(2) * (TAU * f * x).cos());
+        let panels = (x.abs() / FARTHEST).ceil().max(1.0);
+        let panel = |n: u32| {
+            let ends = [n, n + 1].map(|n| f64::from(n) / panels - 0.5);
+            RULE.integrate(ends, |f| self.weight(f).powi(2) * (TAU * f * x).cos())
+        };
+        let transform: f64 = (0..panels as u32).map(panel).sum();
         (transform / self.moment(2)).powi(2)
     }
 
@@ -293,8 +298,21 @@ mod tests {
             }
         }
         // Uniform: sinc², in closed form.
-        for x in [0.1, 0.7, 3.3, 17.2] {
+        for x in [0.1, 0.7, 3.3, 17.2, 31.5, 287.3] {
             assert!((Window::Uniform.correlation(x) - sinc(x).powi(2)).abs() < 1e-12);
+        }
+        // Hamming: W² is a sum of three cosines.
+        let (a, b) = (0.6, 0.4);
+        for x in [0.7, 17.2, 31.5, 287.3] {
+            let pair = |n: f64| 0.5 * (sinc(x - n) + sinc(x + n));
+            let square = |pair: &dyn Fn(f64) -> f64| {
+                (a * a + 0.5 * b * b) * pair(0.0)
+                    + 2.0 * a * b * pair(1.0)
+                    + 0.5 * b * b * pair(2.0)
+            };
+            let norm = a * a + 0.5 * b * b;
+            let expected = (square(&pair) / norm).powi(2);
+            assert!((Window::Hamming(a).correlation(x) - expected).abs() < 1e-12);
         }
         assert!((Window::Uniform.pixel_correlation(1.5) - 0.042).abs() < 6e-4);
         assert!((Window::Hamming(0.75).pixel_correlation(1.0) - 0.099).abs() < 6e-4);

@@ -6,12 +6,12 @@ use crate::sheet::Picture;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use wake_geo::Product;
-use wake_physics::estimate::{Estimate, Estimated, ExpectedImage};
+use wake_physics::estimate::{Estimate, Estimated, Sighting};
 use wake_physics::grey::GreyScale;
-use wake_physics::{Field, Scene, simulate};
+use wake_physics::{Field, Scene};
 
-/// Relative change of the speed and turn of the heading \[deg\] of the guess in the example.
-const OFF: (f64, f64) = (0.005, 0.5);
+/// Errors of place \[m\] and heading \[deg\] of the sighting in the example.
+const OFF: ([f64; 2], f64) = ([40.0, -30.0], 2.0);
 
 /// Reads the pixels of a scene's grid.
 ///
@@ -39,20 +39,19 @@ pub(super) fn read(path: &Path, at: Option<[usize; 2]>, scene: &Scene) -> Outcom
     })
 }
 
-/// Simulated image of the scene, and a guess that is slightly wrong.
-pub(super) fn example(scene: &Scene) -> Outcome<(Field, Scene)> {
-    let image = simulate(scene)?.speckled;
-    let mut guess = scene.clone();
-    for ship in &mut guess.ships {
-        ship.speed *= 1.0 + OFF.0;
-        ship.heading += OFF.1;
+/// A sighting with a wrong place and heading.
+pub(super) fn mistaken(sighting: &Sighting) -> Sighting {
+    let ([x, y], turn) = OFF;
+    Sighting {
+        place: [sighting.place[0] + x, sighting.place[1] + y],
+        heading: sighting.heading + turn,
+        ..*sighting
     }
-    Ok((image, guess))
 }
 
 /// Draws the image, the mean image of the estimate, and their ratio.
 pub(super) fn draw(path: &Path, image: &Field, found: &Estimate) -> Outcome<()> {
-    let mean = ExpectedImage::new(&found.scene, &[])?.intensity(&found.scene)?;
+    let mean = &found.mean;
     let mut over = image.clone();
     for (over, mean) in over.values.iter_mut().zip(&mean.values) {
         *over /= mean.max(f32::MIN_POSITIVE);
@@ -60,7 +59,7 @@ pub(super) fn draw(path: &Path, image: &Field, found: &Estimate) -> Outcome<()> 
     let grey = GreyScale::filling(image);
     let panels = [
         ("image", image, &grey),
-        ("mean image", &mean, &grey),
+        ("mean image", mean, &grey),
         ("image over mean", &over, &GreyScale::filling(&over)),
     ];
     let panels = panels.map(|(caption, field, grey)| {
@@ -109,6 +108,7 @@ fn in_json(found: &Estimate) -> Value {
     let alternatives: Vec<Value> = alternatives
         .map(|other| {
             json!({
+                "speed": other.scene.ships.first().map(|ship| ship.speed),
                 "wind_toward": other.scene.sea.wind_toward.rem_euclid(360.0),
                 "wind_speed": other.scene.sea.wind_speed,
                 "weight": other.weight,
@@ -129,7 +129,7 @@ fn in_json(found: &Estimate) -> Value {
 fn in_words(found: &Estimate) -> String {
     let verdict = match found.identifiable {
         true => "estimate",
-        false => "not identifiable: the best scene near the guess does not explain the image",
+        false => "not identifiable: no scene that was found explains the image alone",
     };
     let mut lines = vec![verdict.to_owned()];
     let shown = |e: &Estimated| match e.parameter.unit() {
@@ -138,10 +138,15 @@ fn in_words(found: &Estimate) -> String {
     };
     let values = found.values.iter();
     lines.extend(values.map(|e| line(e.parameter, Some(shown(e)), e.deviation)));
-    for other in &found.alternatives {
+    for other in found.alternatives.iter().filter(|a| a.weight > 0.005) {
         let toward = other.scene.sea.wind_toward.rem_euclid(360.0);
+        let speed = other
+            .scene
+            .ships
+            .first()
+            .map_or(f64::NAN, |ship| ship.speed);
         lines.push(format!(
-            "opposite wind, toward {toward:.0} deg: probability {:.2}",
+            "or {speed:.2} m/s with wind toward {toward:.0} deg: probability {:.2}",
             other.weight
         ));
     }

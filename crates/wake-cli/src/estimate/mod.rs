@@ -7,13 +7,14 @@ mod line;
 use crate::exit::{self, Outcome};
 use clap::Args;
 use std::path::PathBuf;
-use wake_physics::Scene;
-use wake_physics::estimate::{Priors, refine};
+use wake_physics::estimate::{Priors, Sighting, estimate};
+use wake_physics::{Scene, simulate};
 
-/// Estimate ship and wind from an image and a guess, with error bars.
+/// Estimate ship and wind from an image of a wake, with error bars.
 ///
-/// With --image, maximises the likelihood near the guess --scene. With --bound, prints the smallest standard deviations of any unbiased estimate
-/// (Cramér–Rao); it needs no image. Without either, simulates the scene and estimates it from a guess that is slightly wrong.
+/// With --image, searches for the ship within some 150 m and 7 degrees of place and heading in --scene, at any speed from 3.5 to 17 m/s, and maximises the
+/// likelihood. With --bound, prints the smallest standard deviations of any unbiased estimate (Cramér–Rao); it needs no image. Without either, simulates the scene and
+/// estimates it from a place and a heading that are wrong.
 #[derive(Args)]
 #[command(
     after_help = "Scene keys with their units, ranges and defaults: docs/scene_keys.md\n\
@@ -32,7 +33,7 @@ pub(crate) struct Arguments {
     /// Print the Cramér–Rao bound of ship and wind for an image of the scene
     #[arg(long)]
     bound: bool,
-    /// Scene file (TOML) of the known values and the guess; without it the default scene on 256 x 256 pixels of 4 m
+    /// Scene file (TOML) of the known values with place and heading of the ship; without it the default scene on 256 x 256 pixels of 4 m
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Change one value of the scene, such as radar.incidence=35; may be repeated
@@ -59,11 +60,13 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let text = match arguments.bound {
         true => bound::told(&scene, &priors, arguments.json)?,
         false => {
-            let (field, guess) = match &arguments.image {
-                Some(path) => (image::read(path, arguments.at, &scene)?, scene),
-                None => image::example(&scene)?,
+            let sighting = Sighting::of_ship(&scene);
+            let sighting = sighting.ok_or("the scene has no ship: name its place and heading")?;
+            let (field, sighting) = match &arguments.image {
+                Some(path) => (image::read(path, arguments.at, &scene)?, sighting),
+                None => (simulate(&scene)?.speckled, image::mistaken(&sighting)),
             };
-            let found = refine(&field, &guess, &priors)?;
+            let found = estimate(&field, &scene, &sighting, &priors)?;
             if let Some(path) = &arguments.picture {
                 image::draw(path, &field, &found)?;
             }

@@ -19,10 +19,10 @@ pub(super) struct Point {
 }
 
 /// Largest number of reductions of a step that lowers the posterior.
-const HALVINGS: usize = 3;
+const REDUCTIONS: usize = 2;
 
-/// Length of the last step, in standard deviations.
-const SMALL: f64 = 0.05;
+/// Length of the last step, in standard deviations of the information: errors of the mean image are larger.
+const SMALL: f64 = 0.2;
 
 /// Limits of the wind speed [m/s], and of the ship's length relative to the guess.
 const WINDS: [f64; 2] = [1.5, 20.0];
@@ -105,7 +105,7 @@ impl Ascent<'_> {
             let (step, size) = self.step(&here);
             let mut part = 1.0;
             let mut next = None;
-            for _ in 0..=HALVINGS {
+            for _ in 0..=REDUCTIONS {
                 let moved = self.moved(&here, &step, part);
                 let there = self.point_by(&image, &mut known, moved, false)?;
                 if there.log_posterior > here.log_posterior {

@@ -6,10 +6,12 @@
 //! ```
 //!
 //! [`expected_with_derivatives`] is the mean image of a scene with its derivatives, [`Likelihood`] reads an image with it,
-//! [`refine`] estimates ship and wind near a guess, and [`bound`] says how well any estimate can know ship and wind.
+//! [`estimate`] searches for ship and wind around a sighting, [`refine`] near a guess, and [`bound`] says how well any estimate can know ship and wind.
 
 mod ascent;
 mod bound;
+mod echo;
+mod estimator;
 mod expected;
 mod likelihood;
 mod matrix;
@@ -19,13 +21,19 @@ mod parameter;
 mod priors;
 mod refined;
 mod sea;
+mod search;
+mod sighting;
+mod similar;
 mod torus;
 mod value;
+mod winds;
 
 pub use bound::{Bound, bound};
+pub use estimator::estimate;
 pub use expected::{Expected, ExpectedImage, expected_with_derivatives};
 pub use likelihood::{Likelihood, Score};
 pub use parameter::{Factors, Parameter};
 pub use priors::Priors;
 pub use refined::{Alternative, Estimate, Estimated, refine};
+pub use sighting::Sighting;
 pub use value::Value;

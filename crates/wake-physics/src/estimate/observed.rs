@@ -112,6 +112,26 @@ impl Observed {
         self.taper.of(pairs.map(|(i, m)| i / m - 1.0))
     }
 
+    /// Mean of the image over that of a mean image, in the window.
+    pub(super) fn gain(&self, mean: &Field) -> f64 {
+        let pairs = self.image.values.iter().zip(&mean.values);
+        let weighed = pairs.zip(&self.taper.weights.values);
+        let (above, below) = weighed.fold((0.0, 0.0), |(a, b), ((image, mean), w)| {
+            (a + f64::from(w * image), b + f64::from(w * mean))
+        });
+        above / below
+    }
+
+    /// ln L of a noise around a mean image with the brightness of the image.
+    pub(super) fn log_likelihood_of(&self, noise: &Noise, mean: &Field) -> f64 {
+        let gain = self.gain(mean) as f32;
+        let mut scaled = mean.clone();
+        scaled.values.iter_mut().for_each(|v| *v *= gain);
+        let left = self.torus.spectrum(&self.residual(&scaled));
+        let scale = self.taper.energy / (self.torus.size * self.torus.size) as f64;
+        self.log_likelihood(scale, (&left, &self.power(noise)), 1.0, &scaled.values)
+    }
+
     /// Power of a noise.
     pub(super) fn power(&self, noise: &Noise) -> Vec<f32> {
         let power = self.taper.power(&self.torus, &noise.covariance(1.0));

@@ -1,6 +1,8 @@
 //! Maximum-likelihood estimate of ship and wind near a guess, with error bars.
 
 use super::ascent::{Ascent, Point};
+use super::echo::Echo;
+use super::expected::ExpectedImage;
 use super::observed::Observed;
 use super::parameter::{Factors, Parameter};
 use super::priors::Priors;
@@ -24,7 +26,7 @@ pub struct Estimated {
     pub deviation: f64,
 }
 
-/// Another maximum of the likelihood: the opposite wind.
+/// Another maximum of the likelihood: the opposite wind, or another speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alternative {
     /// Scene at the maximum.
@@ -38,13 +40,15 @@ pub struct Alternative {
 pub struct Estimate {
     /// Maximum-likelihood scene.
     pub scene: Scene,
+    /// Its mean image, in the unit of the estimated image.
+    pub mean: Field,
     /// Estimated values, in the order of [`Parameter::OF_WAKE`].
     pub values: Vec<Estimated>,
     /// Covariance of the values, row after row; empty if the image does not determine one of them.
     pub covariance: Vec<f64>,
     /// Posterior probability of this maximum, 0 to 1.
     pub weight: f64,
-    /// Opposite wind, if it is another maximum.
+    /// Other maxima: the opposite wind, and other speeds that were found.
     pub alternatives: Vec<Alternative>,
     /// Log-likelihood, up to a constant of the image.
     pub log_likelihood: f64,
@@ -72,9 +76,9 @@ impl Estimate {
     }
 }
 
-/// Largest number of Fisher scoring steps of an ascent, and of each ascent from around the guess.
+/// Largest number of Fisher scoring steps of an ascent, and of each ascent from a start.
 const STEPS: usize = 20;
-const FIRST_STEPS: usize = 4;
+const FIRST_STEPS: usize = 5;
 
 /// Starts around a guess: relative changes of the speed and changes of the heading \[deg\], about the width of a maximum.
 const AROUND: [[f64; 2]; 5] = [
@@ -92,8 +96,9 @@ const CERTAIN: f64 = 20.0;
 const EXPLAINED: f64 = 1.25;
 const USUAL: [f64; 2] = [3.0, 2.0];
 
-/// Relative standard deviation above which the speed is unknown (chosen).
+/// Relative standard deviation above which the speed is unknown, and largest probability of other speeds (chosen).
 const VAGUE: f64 = 0.15;
+const DOUBT: f64 = 0.05;
 
 /// Maximum-likelihood estimate of ship and wind near a guess.
 ///
@@ -101,7 +106,7 @@ const VAGUE: f64 = 0.15;
 /// information times a factor for the error of the mean image (1.5 to 5, measured on simulated scenes).
 ///
 /// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
-/// standard deviations), the ship raises the log-likelihood by more than 20, and the standard deviation of the speed is below 15 %.
+/// standard deviations), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.
 ///
 /// - `image`: intensity with speckle, in the unit of σ⁰, `[rows, columns]` of the scene's grid
 /// - `guess`: known radar, grid and water, and a guess of ship and wind
@@ -115,49 +120,64 @@ const VAGUE: f64 = 0.15;
 /// # Validity
 ///
 /// Start within 1 % of the speed, 1 degree of the heading, and a tenth of the transverse wavelength (2πU²/g) of the position. Farther starts can converge to another
-/// maximum with similar standard deviations. One ship on a straight track. The mean image has the limits of [`Likelihood`](super::Likelihood).
+/// maximum with similar standard deviations; [`estimate`](super::estimate) searches for the start. One ship on a straight track. The mean image has the limits of
+/// [`Likelihood`](super::Likelihood).
 pub fn refine(image: &Field, guess: &Scene, priors: &Priors) -> Result<Estimate> {
     check(image, guess)?;
-    let observed = Observed::new(image.clone(), guess, |_, _| 1.0);
-    let ascent = Ascent {
-        observed: &observed,
-        parameters: &Parameter::OF_WAKE,
-        priors,
-        length: guess.ships[0].length,
-    };
-    let first = around(&ascent, guess)?;
-    let first = ascent.climb(first.scene, first.factors, STEPS)?;
-    let mut opposite = first.scene.clone();
-    opposite.sea.wind_toward = (opposite.sea.wind_toward + 180.0).rem_euclid(360.0);
-    let second = ascent.climb(opposite, Factors::default(), STEPS)?;
-    let points = match second.log_posterior > first.log_posterior {
-        true => [second, first],
-        false => [first, second],
-    };
-    let open = without_ship(&observed, &points[0], priors)?;
-    concluded(&ascent, points, open)
-}
-
-/// Best of the ascents from the starts around a guess.
-fn around(ascent: &Ascent<'_>, guess: &Scene) -> Result<Point> {
-    let mut best: Option<Point> = None;
-    for [faster, turned] in AROUND {
+    let echo = Echo::of(image, guess);
+    let observed = Observed::new(image.clone(), guess, |i, j| echo.shown(i, j));
+    let around = AROUND.map(|[faster, turned]| {
         let mut start = guess.clone();
         start.ships[0].speed *= 1.0 + faster;
         start.ships[0].heading += turned;
-        let point = ascent.climb(start, Factors::default(), FIRST_STEPS)?;
-        let better = |best: &Point| point.log_posterior > best.log_posterior;
-        if best.as_ref().is_none_or(better) {
-            best = Some(point);
-        }
+        start
+    });
+    settled(&observed, &around, priors)
+}
+
+/// Highest maximum that is reached from the starts, with its alternatives.
+pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) -> Result<Estimate> {
+    let Some((first_start, ship)) = starts.first().and_then(|s| Some((s, s.ships.first()?))) else {
+        return Err(no_start());
+    };
+    let ascent = Ascent {
+        observed,
+        parameters: &Parameter::OF_WAKE,
+        priors,
+        length: ship.length,
+    };
+    // The brightness of an uncalibrated image is that of its first start.
+    let mut factors = Factors::default();
+    if priors.gain.is_infinite() {
+        let mean = ExpectedImage::new(first_start, &[])?.intensity(first_start)?;
+        factors.gain = observed.gain(&mean);
     }
-    match best {
-        Some(point) => Ok(point),
-        None => ascent.point(guess.clone(), Factors::default()),
+    let mut points = Vec::new();
+    for start in starts {
+        points.push(ascent.climb(start.clone(), factors, FIRST_STEPS)?);
+    }
+    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+    let first = points.swap_remove(0);
+    let first = ascent.climb(first.scene, first.factors, STEPS)?;
+    let mut opposite = first.scene.clone();
+    opposite.sea.wind_toward = (opposite.sea.wind_toward + 180.0).rem_euclid(360.0);
+    points.push(ascent.climb(opposite, first.factors, STEPS)?);
+    points.push(first);
+    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+    let open = without_ship(observed, &points[0], priors)?;
+    concluded(&ascent, points, open)
+}
+
+fn no_start() -> Error {
+    Error::Conflict {
+        name: "ship".to_owned(),
+        value: "no start".to_owned(),
+        requirement: "but an estimate begins at one".to_owned(),
     }
 }
 
-fn check(image: &Field, guess: &Scene) -> Result<()> {
+/// Checks an image against the scene of its estimate.
+pub(super) fn check(image: &Field, guess: &Scene) -> Result<()> {
     guess.validate()?;
     let conflict = |name: &str, value: String, requirement: String| {
         Err(Error::Conflict {
@@ -215,14 +235,27 @@ fn model_error(parameter: Parameter) -> f64 {
 /// Factor on the difference of log-likelihood between opposite winds: about the inverse square of [`model_error`].
 const BELIEVED: f64 = 0.05;
 
-/// Estimate from two maxima, the higher one first.
-fn concluded(ascent: &Ascent<'_>, [first, second]: [Point; 2], open: f64) -> Result<Estimate> {
-    let other = match same(&first.scene, &second.scene) {
-        true => 0.0,
-        false => (BELIEVED * (second.log_posterior - first.log_posterior)).exp(),
-    };
-    let weight = 1.0 / (1.0 + other);
+/// Estimate from maxima, the highest one first.
+fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estimate> {
+    let mut points = points.into_iter();
+    let first = points.next().ok_or_else(no_start)?;
+    let top = first.log_posterior;
     let best = ascent.point(first.scene, first.factors)?;
+    let mut others: Vec<Alternative> = Vec::new();
+    for point in points {
+        let seen = |other: &Alternative| same(&other.scene, &point.scene);
+        if !same(&best.scene, &point.scene) && !others.iter().any(seen) {
+            others.push(Alternative {
+                weight: (BELIEVED * (point.log_posterior - top)).exp(),
+                scene: point.scene,
+            });
+        }
+    }
+    let total = 1.0 + others.iter().map(|a| a.weight).sum::<f64>();
+    for other in &mut others {
+        other.weight /= total;
+        other.scene = corrected(&other.scene);
+    }
     let mut covariance = ascent.covariance(&best);
     if let Some(covariance) = &mut covariance {
         let factors: Vec<f64> = ascent.parameters.iter().map(|p| model_error(*p)).collect();
@@ -235,13 +268,10 @@ fn concluded(ascent: &Ascent<'_>, [first, second]: [Point; 2], open: f64) -> Res
         let of = covariance.as_ref();
         of.map_or(f64::INFINITY, |c| c.at(n, n).max(0.0).sqrt())
     };
-    // Bright waves of the sea shift the image of the wake, not the ship.
-    let mut scene = best.scene.clone();
-    scene.sea.wind_toward = scene.sea.wind_toward.rem_euclid(360.0);
-    if let Some(ship) = scene.ships.first_mut() {
-        ship.position[1] -= drift(&best.scene);
-        ship.heading = ship.heading.rem_euclid(360.0);
-    }
+    let mut mean = ExpectedImage::new(&best.scene, &[])?.intensity(&best.scene)?;
+    let factor = best.factors.gain as f32;
+    mean.values.iter_mut().for_each(|v| *v *= factor);
+    let scene = corrected(&best.scene);
     let (gain, texture) = (best.factors.gain.ln(), best.factors.texture.ln());
     let value = |parameter: Parameter| match parameter {
         Parameter::Gain => gain,
@@ -258,33 +288,53 @@ fn concluded(ascent: &Ascent<'_>, [first, second]: [Point; 2], open: f64) -> Res
         })
         .collect();
     let over_open_sea = best.log_posterior - open;
-    let priors = ascent.priors;
-    let usual = gain.abs() < USUAL[0] * priors.gain && texture.abs() < USUAL[1] * priors.texture;
     let mut found = Estimate {
         scene,
+        mean,
         covariance: covariance.map_or(Vec::new(), |c| c.values),
-        weight,
-        alternatives: Vec::new(),
+        weight: total.recip(),
+        alternatives: others.into_iter().filter(|a| a.weight > 0.0).collect(),
         log_likelihood: best.near.log_likelihood,
         over_open_sea,
         power: best.near.rings.iter().map(|ring| ring[0]).collect(),
         identifiable: false,
         values,
     };
-    if other > 0.0 {
-        found.alternatives.push(Alternative {
-            scene: second.scene,
-            weight: 1.0 - weight,
-        });
-    }
+    found.identifiable = is_identifiable(&found, &best, ascent.priors);
+    Ok(found)
+}
+
+/// Tests of [`refine`].
+fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
+    let off = |parameter: Parameter| found.of(parameter)[0].abs();
+    let usual = off(Parameter::Gain) < USUAL[0] * priors.gain
+        && off(Parameter::Texture) < USUAL[1] * priors.texture;
     // Largest acceptable misfit, and three standard deviations of the mean over a ring.
     let explained =
         best.near.rings.iter().all(|&[power, count]| {
             power.max(power.recip()) < EXPLAINED + 3.0 / count.max(1.0).sqrt()
         });
     let [speed, deviation] = found.of(Parameter::Value(Value::Speed));
-    found.identifiable = usual && over_open_sea > CERTAIN && explained && deviation < VAGUE * speed;
-    Ok(found)
+    let is_other = |a: &&Alternative| (Value::Speed.of(&a.scene) / speed).ln().abs() > SAME_SPEED;
+    let others = found.alternatives.iter().filter(is_other);
+    let doubt: f64 = others.map(|a| a.weight).sum();
+    usual
+        && explained
+        && found.over_open_sea > CERTAIN
+        && deviation < VAGUE * speed
+        && doubt < DOUBT
+}
+
+/// The scene with directions from 0 to 360 degrees, and its ship where bright waves of the sea do not shift it.
+fn corrected(scene: &Scene) -> Scene {
+    let shift = drift(scene);
+    let mut scene = scene.clone();
+    scene.sea.wind_toward = scene.sea.wind_toward.rem_euclid(360.0);
+    if let Some(ship) = scene.ships.first_mut() {
+        ship.position[1] -= shift;
+        ship.heading = ship.heading.rem_euclid(360.0);
+    }
+    scene
 }
 
 /// Azimuth shift of the mean image \[m\], to first order: brightness-weighted mean displacement by velocity bunching.
@@ -305,9 +355,12 @@ fn drift(scene: &Scene) -> f64 {
     models.range_to_velocity * waves.sum::<f64>()
 }
 
+/// Relative difference below which two speeds are the same.
+const SAME_SPEED: f64 = 0.005;
+
 /// Whether two scenes belong to the same maximum.
 fn same(a: &Scene, b: &Scene) -> bool {
     let speed = (Value::Speed.of(a) / Value::Speed.of(b)).ln().abs();
     let turned = angle_between(a.sea.wind_toward, b.sea.wind_toward);
-    speed < 0.005 && turned.abs() < 20.0
+    speed < SAME_SPEED && turned.abs() < 20.0
 }

@@ -8,6 +8,7 @@
 //! width of p. The Bragg return is sampled once on a lattice of slopes and averaged at the nodes; derivatives by the slope are
 //! those of the polynomial, derivatives by wind and incidence are central differences of whole tables of nodes.
 
+use crate::numeric::vector::exp;
 use crate::numeric::vectorized;
 use crate::scattering::Backscatter;
 use rayon::prelude::*;
@@ -17,7 +18,7 @@ use std::f64::consts::PI;
 const SPACING: f64 = 0.02;
 
 /// Standard deviations that an average looks at.
-const REACH: f64 = 5.5;
+const REACH: f64 = 5.0;
 
 /// Values by which tables are differenced: wind speed, wind direction, incidence.
 pub(super) const OUTER: usize = 3;
@@ -34,7 +35,6 @@ const BEYOND: usize = 6;
 pub(super) struct CrossSection {
     /// Half the side of the square of slopes that it covers \[1\].
     reach: f64,
-    nodes: usize,
     /// Coefficients of B-splines, `[side, side]`, that of the slope along x running fastest.
     coefficients: Vec<[f64; CHANNELS]>,
 }
@@ -52,9 +52,10 @@ pub(super) struct At {
     pub(super) outer: [[f64; OUTER]; 2],
 }
 
-/// Nodes that a polynomial needs over slopes up to `reach` for averages of a standard deviation.
-fn nodes_for(reach: f64, deviation: f64) -> usize {
-    (7.0 + 6.0 * reach / deviation).ceil().min(48.0) as usize
+/// Nodes that a polynomial needs over slopes up to `reach`.
+pub(super) fn nodes_for(backscatter: &Backscatter, reach: f64) -> usize {
+    let narrowest = backscatter.tilt.principal_axes().variance[1].sqrt();
+    (7.0 + 6.0 * reach / narrowest).ceil().min(48.0) as usize
 }
 
 impl CrossSection {
@@ -65,10 +66,9 @@ impl CrossSection {
         here: &Backscatter,
         outer: &[Option<([&Backscatter; 2], f64)>; OUTER],
         reach: f64,
-        nodes: Option<usize>,
+        nodes: usize,
     ) -> Self {
         let axes = here.tilt.principal_axes();
-        let nodes = nodes.unwrap_or_else(|| nodes_for(reach, axes.variance[1].sqrt()));
         let beyond = reach * (1.0 + 2.0 * BEYOND as f64 / CELLS as f64);
         let far = beyond + REACH * axes.variance[0].sqrt();
         let places = chebyshev_nodes(nodes, beyond);
@@ -92,13 +92,8 @@ impl CrossSection {
         }
         Self {
             reach,
-            nodes,
             coefficients: spline(&coefficients(&channels, nodes), nodes),
         }
-    }
-
-    pub(super) fn nodes(&self) -> usize {
-        self.nodes
     }
 
     /// σ⁰ at a slope; steeper slopes than the polynomial covers are taken as its edge.
@@ -269,11 +264,11 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
     let first = -f64::from(half) * SPACING;
     let at = |n: usize| first + n as f64 * SPACING;
     let mut facets = vec![0.0; side * side];
-    for (j, row) in facets.chunks_exact_mut(side).enumerate() {
-        backscatter
-            .two_scale
-            .facets([first, at(j)], [SPACING, 0.0], row);
-    }
+    let rows = facets.par_chunks_exact_mut(side).enumerate();
+    rows.for_each(|(j, row)| {
+        let two_scale = &backscatter.two_scale;
+        two_scale.facets([first, at(j)], [SPACING, 0.0], row);
+    });
     let tilt = &backscatter.tilt;
     let determinant = tilt.determinant();
     let [xx, xy, yy] = [tilt.yy, -tilt.xy, tilt.xx].map(|c| 0.5 * c / determinant);
@@ -283,7 +278,7 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
         .map(|n| {
             let [x, y] = [places[n % count], places[n / count]];
             let (mut sum, mut weights) = (0.0, 0.0);
-            let around = (REACH + 1.0) * tilt.xx.sqrt() / SPACING;
+            let around = REACH * tilt.xx.sqrt() / SPACING;
             let middle = (x - first) / SPACING;
             let from = (middle - around).max(0.0) as usize;
             let to = ((middle + around).ceil() as usize).min(side);
@@ -292,7 +287,7 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
                 let dx = at(from) - x;
                 let start = xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy;
                 // Rows this far weigh nothing.
-                if dy * dy > tilt.yy * (REACH * REACH + 16.0) {
+                if dy * dy > tilt.yy * REACH * REACH {
                     continue;
                 }
                 let slope = 2.0 * (xx * dx + xy * dy) * SPACING + xx * SPACING * SPACING;
@@ -307,23 +302,35 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
 }
 
 /// Σ f e^{−q(n)} and Σ e^{−q(n)} of a quadratic q with the given start, first and second difference.
+///
+/// Weights that are eight apart follow from one another: e^{−q(n+8)} = e^{−q(n)} r(n), and r(n+8) = r(n) e^{−64 q''}.
 fn weighed_row(row: &[f64], start: f64, slope: f64, bend: f64) -> [f64; 2] {
+    const LANES: usize = 8;
+    let lanes = LANES as f64;
+    let (mut sum, mut weights) = ([0.0; LANES], [0.0; LANES]);
     vectorized(
         #[inline(always)]
         || {
-            let (mut sum, mut weights) = ([0.0; 8], [0.0; 8]);
-            for (c, chunk) in row.chunks(8).enumerate() {
+            let (mut weight, mut ratio) = ([0.0; LANES], [0.0; LANES]);
+            for n in 0..LANES {
+                let at = n as f64;
+                weight[n] = exp(-start - at * slope - 0.5 * at * (at - 1.0) * bend);
+                ratio[n] = exp(-lanes * slope - bend * (lanes * at + 0.5 * lanes * (lanes - 1.0)));
+            }
+            let change = exp(-lanes * lanes * bend);
+            for chunk in row.chunks(LANES) {
                 for (lane, &value) in chunk.iter().enumerate() {
-                    let n = (8 * c + lane) as f64;
-                    let q = start + n * slope + 0.5 * n * (n - 1.0) * bend;
-                    let weight = crate::numeric::vector::exp(-q);
-                    sum[lane] += weight * value;
-                    weights[lane] += weight;
+                    sum[lane] += weight[lane] * value;
+                    weights[lane] += weight[lane];
+                }
+                for lane in 0..LANES {
+                    weight[lane] *= ratio[lane];
+                    ratio[lane] *= change;
                 }
             }
-            [sum.iter().sum(), weights.iter().sum()]
         },
-    )
+    );
+    [sum.iter().sum(), weights.iter().sum()]
 }
 
 #[cfg(test)]
@@ -341,7 +348,6 @@ mod tests {
         polynomial[4][1 + OUTER] = 1.0;
         let section = CrossSection {
             reach: 1.0 / (1.0 + 2.0 * BEYOND as f64 / CELLS as f64),
-            nodes: count,
             coefficients: spline(&polynomial, count),
         };
         for [x, y] in [[0.0, 0.0], [0.31, -0.52], [-0.8, 0.7], [0.123, 0.456]] {
@@ -356,6 +362,25 @@ mod tests {
         }
     }
 
+    /// Weights by recurrence are those of the exponential function.
+    #[test]
+    fn rows_are_weighed_by_the_exponential_function() {
+        let row: Vec<f64> = (0..117).map(|n| 1.0 + 0.3 * f64::from(n % 7)).collect();
+        let (start, slope, bend) = (14.0, -0.52, 0.0093);
+        let weight = |n: usize| {
+            let n = n as f64;
+            (-start - n * slope - 0.5 * n * (n - 1.0) * bend).exp()
+        };
+        let expected: [f64; 2] = [
+            (0..117).map(|n| weight(n) * row[n]).sum(),
+            (0..117).map(weight).sum(),
+        ];
+        let found = weighed_row(&row, start, slope, bend);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found / expected - 1.0).abs() < 1e-12);
+        }
+    }
+
     /// The fitted σ⁰ is the one by direct quadrature.
     #[test]
     fn it_is_the_exact_cross_section() {
@@ -367,7 +392,8 @@ mod tests {
             let scene = Scene::default().with_assignments(keys).unwrap();
             let models = super::super::frozen::averaged(&scene);
             let exact = models.backscatter(true, true);
-            let section = CrossSection::new(&exact, &[const { None }; OUTER], 0.4, None);
+            let nodes = nodes_for(&exact, 0.4);
+            let section = CrossSection::new(&exact, &[const { None }; OUTER], 0.4, nodes);
             let calm: f64 = exact.parts([0.0; 2]).iter().sum();
             for slope in [[0.0, 0.0], [0.2, -0.1], [-0.35, 0.3]] {
                 let found = section.at(slope).value;

@@ -136,7 +136,7 @@ impl<'a, const N: usize> Drawn<'a, N> {
             })
         };
         Self {
-            cross_section: surface.cross_section(frozen, Some(frozen.nodes)),
+            cross_section: surface.cross_section(frozen),
             raster: frozen.raster,
             places: places.collect(),
             columns_per_elevation: dual(&slopes, here.columns_per_elevation, |s| {

@@ -6,6 +6,7 @@ use crate::models::{Models, kelvin_wake};
 use crate::plan::Plan;
 use crate::raster::Raster;
 use crate::sar::Imaging;
+use crate::scattering::Backscatter;
 use crate::scene::{Scene, Term};
 
 /// Choices that are frozen.
@@ -23,6 +24,14 @@ pub(super) struct Frozen {
     pub(super) nodes: usize,
     /// Of sums of waves.
     pub(super) tolerance: f64,
+}
+
+impl Frozen {
+    /// Backscatter of the terms of the plan.
+    pub(super) fn backscatter(&self, models: &Models) -> Backscatter {
+        let uses = |term| self.plan.uses(term);
+        models.backscatter(uses(Term::TiltAverage), uses(Term::Specular))
+    }
 }
 
 /// Models of a scene that average over the whole sea.

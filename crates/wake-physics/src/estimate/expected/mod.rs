@@ -25,6 +25,7 @@ use crate::raster::{Field, Raster};
 use crate::sar::impulse::Reflectivity;
 use crate::sar::smooth::{Displacement, SmoothSum};
 use crate::scene::{Scene, Term};
+use cross_section::nodes_for;
 use drawn::Drawn;
 use frozen::{Frozen, averaged, imaging};
 use surface::Surface;
@@ -132,7 +133,7 @@ impl ExpectedImage {
         let surface = Surface::new(&frozen, scene, models, &[]);
         let largest = surface.largest(&frozen);
         frozen.reach = (STEEPER * largest.slope).clamp(0.1, 1.5);
-        frozen.nodes = surface.cross_section(&frozen, None).nodes();
+        frozen.nodes = nodes_for(&frozen.backscatter(models), frozen.reach);
         let square = STEEPER * largest.acceleration.powi(2);
         let narrowest = displacement.variance;
         let widest = 1.3 * narrowest + displacement.variance_per_square * square;

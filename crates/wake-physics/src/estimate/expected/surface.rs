@@ -153,12 +153,9 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// σ⁰ by the slope, with `nodes` nodes or as many as it needs.
-    pub(super) fn cross_section(&self, frozen: &Frozen, nodes: Option<usize>) -> CrossSection {
-        let of = |models: &Models| {
-            let uses = |term| frozen.plan.uses(term);
-            models.backscatter(uses(Term::TiltAverage), uses(Term::Specular))
-        };
+    /// σ⁰ by the slope.
+    pub(super) fn cross_section(&self, frozen: &Frozen) -> CrossSection {
+        let of = |models: &Models| frozen.backscatter(models);
         let outer: Vec<Option<([Backscatter; 2], f64)>> = OUTER_VALUES
             .iter()
             .map(|value| {
@@ -173,7 +170,7 @@ impl<'a> Surface<'a> {
             let (pair, width) = outer[n].as_ref()?;
             Some((pair.each_ref(), *width))
         });
-        CrossSection::new(&of(self.models), &outer, frozen.reach, nodes)
+        CrossSection::new(&of(self.models), &outer, frozen.reach, frozen.nodes)
     }
 }
 
