@@ -20,7 +20,10 @@ impl Echo {
         let mut sorted = image.values.clone();
         let middle = sorted.len() / 2;
         let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
-        let limit = BRIGHT * *median;
+        let limit = match *median > 0.0 {
+            true => BRIGHT * *median,
+            false => f32::INFINITY,
+        };
         let resolution = scene.radar.range_resolution.unwrap_or(0.0);
         let around = AROUND + 2.0 * resolution.max(scene.radar.azimuth_resolution);
         let reach = (around / scene.grid.spacing).ceil() as usize;

@@ -68,15 +68,8 @@ pub fn estimate(
     let observed = Observed::new(image.clone(), known, |i, j| echo.shown(i, j));
     let with_wind = |wind| WithWind::new(&observed, known, wind, sighting);
     let searches: Vec<WithWind<'_>> = likely(&winds).into_iter().map(with_wind).collect();
-    let mut near = Vec::new();
-    if let Some(first) = searches.first()
-        && let Some(line) = first.search.line()?
-    {
-        let line = first.search.whole(&line)?;
-        for (n, one) in searches.iter().enumerate() {
-            near.extend(one.along(&line, n)?);
-        }
-    }
+    let near = searches.iter().enumerate().map(|(n, one)| one.near_ship(n));
+    let near = near.collect::<Result<Vec<_>>>()?.concat();
     // Once from the answers near the ship, then from better ones.
     let whole = with_whole_wake(&searches, &apart(near, WHOLE))?;
     let best = apart(with_whole_wake(&searches, &whole)?, CANDIDATES);
@@ -112,9 +105,9 @@ impl<'a> WithWind<'a> {
         }
     }
 
-    /// Answers of all speeds near a line.
-    fn along(&self, line: &Found, search: usize) -> Result<Vec<Answer>> {
-        let found = self.search.along(line)?.into_iter();
+    /// Answers of the part of the wake near the ship.
+    fn near_ship(&self, search: usize) -> Result<Vec<Answer>> {
+        let found = self.search.near_ship()?.into_iter();
         let answers = found.map(|found| self.answer(found, search));
         Ok(answers.collect())
     }

@@ -1,12 +1,12 @@
 //! Coarse search for speed, heading and place around a sighting: a matched filter of mean images.
 //!
-//! The relative changes t of the mean image by waves (1) and by the turbulent wake (2) are correlated with the whitened image v at all places at once,
+//! The relative change t of the mean image by a wake is correlated with the whitened image v at all places at once,
 //!
 //! ```text
-//! v = w Σw² F⁻¹[R/S],     aₙ(p) = Σ v(x) tₙ(x − p),     Eₙₘ = c Σ Re F[w tₙ] F[w tₘ]*/S,     gain = ½ aᵀ E⁻¹ a
+//! v = w Σw² F⁻¹[R/S],     a(p) = Σ v(x) t(x − p),     E = c Σ |F[w t]|²/S,     gain = a²/(2E)
 //! ```
 //!
-//! the log-likelihood that both add with unknown strengths: a dark line says nothing of the speed, and must not outweigh the waves. First only the part of the wake near the ship counts: there it has few wavelengths,
+//! the log-likelihood that a wake of unknown strength adds. First only the part of the wake near the ship counts: there it has few wavelengths,
 //! so a step of the speed may be large. Then the whole wake counts, near the best answers.
 
 use super::noise::Noise;
@@ -43,9 +43,8 @@ const DRAWN: f64 = 0.08;
 const NEAR: f64 = 450.0;
 const ASTERN: f64 = 0.38;
 
-/// Step of the headings for the part near the ship, and headings beside a line \[deg\].
-const TURN: f64 = 1.5;
-const ASIDE: f64 = 0.6;
+/// Step of the headings for the part near the ship \[deg\].
+const TURN: f64 = 2.5;
 
 /// Tolerance of drawn wakes.
 const TOLERANCE: f64 = 0.05;
@@ -99,65 +98,35 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Best answer of few speeds, by the part of the wake near the ship: its line shows the heading.
-    pub(super) fn line(&self) -> Result<Option<Found>> {
+    /// Best answers of the part of the wake near the ship, one for each speed.
+    pub(super) fn near_ship(&self) -> Result<Vec<Found>> {
+        let drawn = ((SPEEDS[1] / SPEEDS[0]).ln() / DRAWN).ceil() as i32;
+        let step = (SPEEDS[1] / SPEEDS[0]).ln() / f64::from(drawn);
+        let between = |n: i32| {
+            let first = SPEEDS[0] * (f64::from(n) * step).exp();
+            self.near_between([first, first * step.exp()])
+        };
+        let found = (0..drawn).into_par_iter().map(between);
+        Ok(found.collect::<Result<Vec<_>>>()?.concat())
+    }
+
+    /// The same for speeds between two, which follow from one drawn wake.
+    fn near_between(&self, speeds: [f64; 2]) -> Result<Vec<Found>> {
         let Sighting {
             heading,
             heading_sd,
             place,
             place_sd,
         } = *self.sighting;
-        let steps = (Sighting::REACH * heading_sd / TURN).ceil();
-        let step = Sighting::REACH * heading_sd / steps;
-        let off = (-steps as i32..=steps as i32).map(|n| f64::from(n) * step);
-        let headings: Vec<f64> = off.map(|off| heading + off).collect();
-        let found = self.near(&headings, (place, Sighting::REACH * place_sd), both, |_| 1)?;
-        Ok(found.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain)))
-    }
-
-    /// Answers of all speeds near the line of another answer, one for each speed.
-    pub(super) fn along(&self, line: &Found) -> Result<Vec<Found>> {
-        let headings = [-ASIDE, 0.0, ASIDE].map(|off| line.course.heading + off);
-        let reach = 0.5 * Sighting::REACH * self.sighting.place_sd;
-        self.near(&headings, (line.place, reach), of_waves, |speeds| {
-            let middle = (speeds[0] * speeds[1]).sqrt();
-            ((speeds[1] / speeds[0]).ln() / step(middle, NEAR).min(STEP)).ceil() as i32
-        })
-    }
-
-    /// Best answers of the part of the wake near the ship, one for each speed.
-    ///
-    /// - `around`: place and distance from it that is searched
-    /// - `count`: number of speeds between two, which follow from one drawn wake
-    fn near(
-        &self,
-        headings: &[f64],
-        around: ([f64; 2], f64),
-        by: Gain,
-        count: impl Fn([f64; 2]) -> i32 + Sync,
-    ) -> Result<Vec<Found>> {
-        let drawn = ((SPEEDS[1] / SPEEDS[0]).ln() / DRAWN).ceil() as i32;
-        let step = (SPEEDS[1] / SPEEDS[0]).ln() / f64::from(drawn);
-        let between = |n: i32| {
-            let first = SPEEDS[0] * (f64::from(n) * step).exp();
-            let speeds = [first, first * step.exp()];
-            self.near_between(speeds, count(speeds), (headings, by), around)
-        };
-        let found = (0..drawn).into_par_iter().map(between);
-        Ok(found.collect::<Result<Vec<_>>>()?.concat())
-    }
-
-    fn near_between(
-        &self,
-        speeds: [f64; 2],
-        count: i32,
-        (headings, by): (&[f64], Gain),
-        around: ([f64; 2], f64),
-    ) -> Result<Vec<Found>> {
+        let around = (place, Sighting::REACH * place_sd);
+        let turns = (Sighting::REACH * heading_sd / TURN).ceil().max(1.0);
+        let turn = Sighting::REACH * heading_sd / turns;
         let course = Course {
             speed: (speeds[0] * speeds[1]).sqrt(),
-            heading: headings[headings.len() / 2],
+            heading,
         };
+        let step = step(course.speed, NEAR).min(STEP);
+        let count = ((speeds[1] / speeds[0]).ln() / step).ceil() as i32;
         let side = (1.3 * NEAR / self.scene.grid.spacing).ceil() as usize;
         let mut scene = self.scene.clone();
         (scene.grid.rows, scene.grid.columns) = (side, side);
@@ -178,11 +147,9 @@ impl<'a> Search<'a> {
         let best = |n: i32| {
             let part = (f64::from(n) + 0.5) / f64::from(count);
             let speed = speeds[0] * (speeds[1] / speeds[0]).powf(part);
-            let each = headings.iter().map(|&heading| {
-                let course = Course { speed, heading };
-                self.placed((course, by), around, changes(course))
-            });
-            each.max_by(|a, b| a.gain.total_cmp(&b.gain))
+            let headings = (-turns as i32..=turns as i32).map(|m| heading + f64::from(m) * turn);
+            let each: Vec<Course> = headings.map(|heading| Course { speed, heading }).collect();
+            self.best(&each, around, changes)
         };
         Ok((0..count).filter_map(best).collect())
     }
@@ -215,52 +182,67 @@ impl<'a> Search<'a> {
                 })
             })
             .collect();
-        let fields = |course: &Course| drawn.moved(&self.image, (*course, place), |_| 1.0);
+        let changes = |course| drawn.moved(&self.image, (course, place), |_| 1.0);
         let reach = TAU * course.speed.powi(2) / GRAVITY;
         let all = each
-            .par_iter()
-            .map(|course| self.placed((*course, both), (place, 1.2 * reach), fields(course)));
+            .par_chunks(2)
+            .filter_map(|pair| self.best(pair, (place, 1.2 * reach), changes));
         let best = all.max_by(|a, b| a.gain.total_cmp(&b.gain));
         Ok(best.unwrap_or(*found))
     }
 
-    /// Best place of the changes of a course.
-    fn placed(
+    /// Best of some courses, each at its best place.
+    fn best(
         &self,
-        course: (Course, Gain),
+        courses: &[Course],
         around: ([f64; 2], f64),
-        changes: [Field; 2],
-    ) -> Found {
-        let torus = &self.observed.torus;
-        let windowed = changes.each_ref();
-        let windowed = windowed.map(|c| self.observed.taper.of(c.values.iter().copied()));
-        let energy = self.energy(&torus.spectra([&windowed[0], &windowed[1]]));
-        let mut products = torus.spectra([&changes[0], &changes[1]]);
+        change: impl Fn(Course) -> Field,
+    ) -> Option<Found> {
+        let found = courses.chunks(2).flat_map(|pair| {
+            let changes: Vec<Field> = pair.iter().map(|course| change(*course)).collect();
+            self.placed(pair, around, &changes)
+        });
+        found.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    /// Best places of the changes of one or two courses.
+    fn placed(&self, courses: &[Course], around: ([f64; 2], f64), changes: &[Field]) -> Vec<Found> {
+        let [Some(first), Some(last)] = [changes.first(), changes.last()] else {
+            return Vec::new();
+        };
+        let (torus, pair) = (&self.observed.torus, [first, last]);
+        let windowed = pair.map(|c| self.observed.taper.of(c.values.iter().copied()));
+        let windowed = torus.spectra([&windowed[0], &windowed[1]]);
+        let mut products = torus.spectra(pair);
         for product in &mut products {
             for (value, white) in product.iter_mut().zip(&self.white) {
                 *value = white * value.conj();
             }
         }
         let maps = torus.fields([&products[0], &products[1]], [torus.size; 2]);
-        self.peak(course, around, (&maps, energy))
+        let each = courses.iter().zip(&maps).zip(&windowed);
+        each.map(|((course, map), spectrum)| {
+            self.peak(*course, around, (map, self.energy(spectrum)))
+        })
+        .collect()
     }
 
-    /// Highest gain of the maps of places.
+    /// Highest gain of the map of places.
     ///
     /// - `place` and distance from it that is searched
     fn peak(
         &self,
-        (course, by): (Course, Gain),
+        course: Course,
         (place, reach): ([f64; 2], f64),
-        (maps, energy): (&[Field; 2], [f64; 3]),
+        (map, energy): (&Field, f64),
     ) -> Found {
         let spacing = self.image.spacing;
-        let size = maps[0].rows as i64;
+        let size = map.rows as i64;
         let pixels = ((reach / spacing).floor() as i64).min(size / 2 - 2);
         let turned = (course.heading - self.sighting.heading) / self.sighting.heading_sd;
         let fitted = |down: i64, right: i64| {
             let [i, j] = [down, right].map(|n| n.rem_euclid(size) as usize);
-            by(maps.each_ref().map(|map| f64::from(map.at(i, j))), energy)
+            0.5 * f64::from(map.at(i, j)).max(0.0).powi(2) / energy.max(1e-9)
         };
         let moved = |down: f64, right: f64| [place[0] + right * spacing, place[1] - down * spacing];
         let mut best = ([0, 0], f64::NEG_INFINITY);
@@ -297,44 +279,15 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// E₁₁, E₁₂ and E₂₂ of changes in the window.
-    fn energy(&self, windowed: &[Spectrum; 2]) -> [f64; 3] {
+    /// E of a change in the window.
+    fn energy(&self, windowed: &Spectrum) -> f64 {
         let torus = &self.observed.torus;
-        let [waves, rest] = windowed;
-        let mut sums = [0.0; 3];
-        for (n, ((waves, rest), power)) in waves.iter().zip(rest).zip(&self.power).enumerate() {
-            let products = [waves.norm_sqr(), (waves * rest.conj()).re, rest.norm_sqr()];
-            for (sum, product) in sums.iter_mut().zip(products) {
-                *sum += torus.weight(n) * f64::from(product / power);
-            }
-        }
-        sums.map(|sum| sum * self.observed.taper.energy / (torus.size * torus.size) as f64)
+        let terms = windowed.iter().zip(&self.power).enumerate();
+        let sum: f64 = terms
+            .map(|(n, (value, power))| torus.weight(n) * f64::from(value.norm_sqr() / power))
+            .sum();
+        sum * self.observed.taper.energy / (torus.size * torus.size) as f64
     }
-}
-
-/// Log-likelihood that answers a of two changes of energies E add.
-type Gain = fn([f64; 2], [f64; 3]) -> f64;
-
-/// Log-likelihood that the first change adds to the second.
-fn of_waves([a, b]: [f64; 2], [aa, ab, bb]: [f64; 3]) -> f64 {
-    let (answer, energy) = match bb > 0.0 {
-        true => (a - ab / bb * b, aa - ab * ab / bb),
-        false => (a, aa),
-    };
-    0.5 * answer.max(0.0).powi(2) / energy.max(1e-6 * aa).max(1e-9)
-}
-
-/// Log-likelihood that two changes add with the best strengths, none below 0.
-fn both([a, b]: [f64; 2], [aa, ab, bb]: [f64; 3]) -> f64 {
-    let determinant = aa * bb - ab * ab;
-    if determinant > 1e-6 * aa * bb {
-        let [first, second] = [a * bb - b * ab, b * aa - a * ab];
-        if first >= 0.0 && second >= 0.0 {
-            return 0.5 * (a * first + b * second) / determinant;
-        }
-    }
-    let alone = |a: f64, aa: f64| 0.5 * a.max(0.0).powi(2) / aa.max(1e-9);
-    alone(a, aa).max(alone(b, bb))
 }
 
 /// Relative step of the speed for a wake of a length: the phase at its ends is off by 2π/5 halfway between two steps.

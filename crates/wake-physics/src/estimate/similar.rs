@@ -18,10 +18,9 @@ pub(super) struct Course {
     pub(super) heading: f64,
 }
 
-/// Relative change of an image by a wake, its waves apart from its turbulent part.
+/// Relative change of an image by a wake.
 pub(super) struct Drawn {
-    /// By waves, and the rest.
-    changes: [Field; 2],
+    change: Field,
     raster: Raster,
     /// Midship in the raster.
     midship: [f64; 2],
@@ -41,26 +40,20 @@ impl Drawn {
             (ship.speed, ship.heading) = (course.speed, course.heading);
             ship.position = Track::new(midship, course.heading, -run).position;
         }
-        let drawn = |scene: &Scene| ExpectedImage::new(scene, &[])?.intensity(scene);
-        let mut rest = drawn(&scene)?;
-        if let Some(ship) = scene.ships.first_mut() {
-            ship.damping = 0.0;
-        }
-        let mut waves = drawn(&scene)?;
-        for (rest, waves) in rest.values.iter_mut().zip(&mut waves.values) {
-            *rest = (*rest - *waves) / open;
-            *waves = *waves / open - 1.0;
+        let mut change = ExpectedImage::new(&scene, &[])?.intensity(&scene)?;
+        for value in &mut change.values {
+            *value = *value / open - 1.0;
         }
         let grid = &scene.grid;
         Ok(Self {
-            changes: [waves, rest],
+            change,
             raster: Raster::image(grid.rows, grid.columns, grid.spacing),
             midship,
             course,
         })
     }
 
-    /// Changes by a ship of another course.
+    /// Change by a ship of another course.
     ///
     /// - `raster` of the result, `midship` there, `weight` by place relative to midship
     pub(super) fn moved(
@@ -68,13 +61,13 @@ impl Drawn {
         raster: &Raster,
         (course, midship): (Course, [f64; 2]),
         weight: impl Fn([f64; 2]) -> f32,
-    ) -> [Field; 2] {
+    ) -> Field {
         let scale = (self.course.speed / course.speed).powi(2);
         let turn = (course.heading - self.course.heading).to_radians();
         let (sin, cos) = turn.sin_cos();
         let [x0, y0] = [self.raster.x(0), self.raster.y(0)];
         let spacing = self.raster.spacing;
-        let mut out = [(); 2].map(|()| Field::constant(raster, 0.0));
+        let mut out = Field::constant(raster, 0.0);
         for n in 0..raster.rows * raster.columns {
             let place = [
                 raster.x(n % raster.columns) - midship[0],
@@ -91,9 +84,7 @@ impl Drawn {
             ];
             let column = (self.midship[0] + x - x0) / spacing;
             let row = (y0 - self.midship[1] - y) / spacing;
-            for (out, change) in out.iter_mut().zip(&self.changes) {
-                out.values[n] = weight * cubic(change, row, column);
-            }
+            out.values[n] = weight * cubic(&self.change, row, column);
         }
         out
     }

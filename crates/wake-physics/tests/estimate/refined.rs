@@ -1,24 +1,10 @@
 //! Ship and wind of simulated images, found again from a sighting and from a guess.
 
-use wake_physics::estimate::{Estimate, Parameter, Priors, Sighting, Value, estimate, refine};
+use super::report::off;
+use wake_physics::estimate::{Parameter, Priors, Sighting, Value, estimate, refine};
 use wake_physics::{Scene, simulate};
 
 const HEADING: Parameter = Parameter::Value(Value::Heading);
-
-/// Error of a value; of the wind's direction that of its axis.
-fn off(found: &Estimate, scene: &Scene, parameter: Parameter) -> f64 {
-    let truth = match parameter {
-        Parameter::Size => Value::Size.of(scene),
-        Parameter::Value(value) => value.of(scene),
-        _ => 0.0,
-    };
-    let off = found.of(parameter)[0] - truth;
-    match parameter {
-        Parameter::Value(Value::WindToward) => (off + 90.0).rem_euclid(180.0) - 90.0,
-        HEADING => (off + 180.0).rem_euclid(360.0) - 180.0,
-        _ => off,
-    }
-}
 
 fn small(keys: &[&str]) -> Scene {
     let small = [
