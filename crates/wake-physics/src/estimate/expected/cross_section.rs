@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 const SPACING: f64 = 0.02;
 
 /// Standard deviations that an average looks at.
-const REACH: f64 = 5.0;
+const REACH: f64 = 5.5;
 
 /// Values by which tables are differenced: wind speed, wind direction, incidence.
 pub(super) const OUTER: usize = 3;
@@ -278,7 +278,7 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
         .map(|n| {
             let [x, y] = [places[n % count], places[n / count]];
             let (mut sum, mut weights) = (0.0, 0.0);
-            let around = REACH * tilt.xx.sqrt() / SPACING;
+            let around = (REACH + 1.0) * tilt.xx.sqrt() / SPACING;
             let middle = (x - first) / SPACING;
             let from = (middle - around).max(0.0) as usize;
             let to = ((middle + around).ceil() as usize).min(side);
@@ -287,7 +287,7 @@ fn averages(backscatter: &Backscatter, places: &[f64], far: f64) -> Vec<[f64; 2]
                 let dx = at(from) - x;
                 let start = xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy;
                 // Rows this far weigh nothing.
-                if dy * dy > tilt.yy * REACH * REACH {
+                if dy * dy > tilt.yy * (REACH * REACH + 16.0) {
                     continue;
                 }
                 let slope = 2.0 * (xx * dx + xy * dy) * SPACING + xx * SPACING * SPACING;
