@@ -295,7 +295,7 @@ fn step(speed: f64, length: f64) -> f64 {
     TAU * speed * speed / (2.5 * GRAVITY * length)
 }
 
-/// Whether the speeds of two answers are neighbours in the search.
+/// Whether two answers differ by less than 1.5 steps of the speed.
 pub(super) fn are_neighbours(a: &Found, b: &Found) -> bool {
     let speed = a.course.speed;
     (b.course.speed / speed).ln().abs() < 1.5 * step(speed, NEAR).min(STEP)
