@@ -70,9 +70,10 @@ pub fn estimate(
     let searches: Vec<WithWind<'_>> = likely(&winds).into_iter().map(with_wind).collect();
     let near = searches.iter().enumerate().map(|(n, one)| one.near_ship(n));
     let near = near.collect::<Result<Vec<_>>>()?.concat();
-    // Once from the answers near the ship, then from better ones.
+    // Once from the answers near the ship, then from the best of all.
     let whole = with_whole_wake(&searches, &apart(near, WHOLE))?;
-    let best = apart(with_whole_wake(&searches, &whole)?, CANDIDATES);
+    let whole = with_whole_wake(&searches, &apart(whole, CANDIDATES))?;
+    let best = apart(whole, CANDIDATES);
     // The likeliest course with each wind, and the other courses with theirs.
     let likeliest = best.first().map(|answer| &answer.found);
     let with_each_wind = searches
@@ -122,14 +123,7 @@ impl<'a> WithWind<'a> {
 
     /// Scene from which the likelihood is maximised.
     fn start(&self, found: &Found) -> Scene {
-        let mut scene = self.scene.clone();
-        let Found { course, place, .. } = *found;
-        let run = course.speed * scene.sea.time;
-        if let Some(ship) = scene.ships.first_mut() {
-            (ship.speed, ship.heading) = (course.speed, course.heading);
-            ship.position = Track::new(place, course.heading, -run).position;
-        }
-        scene
+        found.course.on(&self.scene, found.place)
     }
 }
 

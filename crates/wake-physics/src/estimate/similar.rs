@@ -1,10 +1,11 @@
 //! Relative change of an image by a wake, drawn once and stretched and turned to other speeds and headings.
 //!
-//! In deep water the wakes of all speeds are similar: lengths grow as U². A radar sees a wake that is turned by a few degrees almost like the turned image. So
-//! images of nearby speeds and headings follow from one by a similarity transform about midship.
+//! In deep water the wakes of all speeds are similar: lengths grow as U². So images of nearby speeds and headings follow from one by a similarity transform about
+//! midship. Amplitudes and the displacement by velocity bunching do not follow it: this is for a search alone.
 
 use super::expected::ExpectedImage;
 use crate::error::Result;
+use crate::numeric::catmull_rom;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
 use crate::track::Track;
@@ -16,6 +17,21 @@ pub(super) struct Course {
     pub(super) speed: f64,
     /// Heading \[deg\].
     pub(super) heading: f64,
+}
+
+impl Course {
+    /// The scene with its ship on the course.
+    ///
+    /// - `midship` (x, y) at the time of the image \[m\]
+    pub(super) fn on(self, scene: &Scene, midship: [f64; 2]) -> Scene {
+        let mut scene = scene.clone();
+        let run = self.speed * scene.sea.time;
+        if let Some(ship) = scene.ships.first_mut() {
+            (ship.speed, ship.heading) = (self.speed, self.heading);
+            ship.position = Track::new(midship, self.heading, -run).position;
+        }
+        scene
+    }
 }
 
 /// Relative change of an image by a wake.
@@ -34,12 +50,7 @@ impl Drawn {
     /// - `midship` at the time of the image, from the middle of the grid \[m\]
     /// - `open`: intensity of the open sea
     pub(super) fn new(scene: &Scene, course: Course, midship: [f64; 2], open: f32) -> Result<Self> {
-        let mut scene = scene.clone();
-        let run = course.speed * scene.sea.time;
-        if let Some(ship) = scene.ships.first_mut() {
-            (ship.speed, ship.heading) = (course.speed, course.heading);
-            ship.position = Track::new(midship, course.heading, -run).position;
-        }
+        let scene = course.on(scene, midship);
         let mut change = ExpectedImage::new(&scene, &[])?.intensity(&scene)?;
         for value in &mut change.values {
             *value = *value / open - 1.0;
@@ -97,8 +108,8 @@ fn cubic(field: &Field, row: f64, column: f64) -> f32 {
         return 0.0;
     }
     let (i, j) = (row as usize, column as usize);
-    let down = weights((row - i as f64) as f32);
-    let right = weights((column - j as f64) as f32);
+    let weights = |part: f64| catmull_rom(part).map(|weight| weight as f32);
+    let (down, right) = (weights(row - i as f64), weights(column - j as f64));
     let mut sum = 0.0;
     for (m, down) in down.iter().enumerate() {
         let start = (i + m - 1) * field.columns + j - 1;
@@ -108,13 +119,47 @@ fn cubic(field: &Field, row: f64, column: f64) -> f32 {
     sum
 }
 
-/// Weights of four points at t between the middle two.
-fn weights(t: f32) -> [f32; 4] {
-    let (square, cube) = (t * t, t * t * t);
-    [
-        -0.5 * cube + square - 0.5 * t,
-        1.5 * cube - 2.5 * square + 1.0,
-        -1.5 * cube + 2.0 * square + 0.5 * t,
-        0.5 * (cube - square),
-    ]
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A spot to port astern that grows as U² and turns with the ship.
+    fn spot(course: Course, place: [f64; 2]) -> f64 {
+        let scale = (9.0 / course.speed).powi(2);
+        let seen = Track::new([0.0; 2], course.heading, 0.0).seen_from_ship(place);
+        let [ahead, port] = seen.map(|v| scale * v);
+        let (ahead, port) = (ahead + 65.0, port - 25.0);
+        (-(ahead * ahead + port * port) / 800.0).exp()
+    }
+
+    /// Similar patterns are moved into each other, up to the error of the interpolation: (spacing/width)³ = 0.008.
+    #[test]
+    fn similar_patterns_are_moved_into_each_other() {
+        let raster = Raster::image(100, 100, 4.0);
+        let of = |speed, heading| Course { speed, heading };
+        let pattern = |course, [x, y]: [f64; 2]| {
+            let at = |n: usize| [raster.x(n % 100) - x, raster.y(n / 100) - y];
+            let values = (0..10_000).map(|n| spot(course, at(n)) as f32);
+            Field {
+                rows: 100,
+                columns: 100,
+                values: values.collect(),
+            }
+        };
+        let drawn = Drawn {
+            change: pattern(of(9.0, 40.0), [31.0, 42.0]),
+            raster,
+            midship: [31.0, 42.0],
+            course: of(9.0, 40.0),
+        };
+        let there = [22.0, 51.0];
+        let expected = pattern(of(9.6, 52.0), there);
+        let off = |course| {
+            let found = drawn.moved(&raster, (course, there), |_| 1.0);
+            found.difference(&expected).0
+        };
+        assert!(off(of(9.6, 52.0)) < 0.008, "{}", off(of(9.6, 52.0)));
+        // Turned or stretched the other way.
+        assert!(off(of(9.6, 28.0)) > 0.1 && off(of(8.4, 52.0)) > 0.1);
+    }
 }

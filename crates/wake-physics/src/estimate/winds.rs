@@ -5,6 +5,7 @@ use super::noise::Noise;
 use super::observed::Observed;
 use crate::error::Result;
 use crate::measure::{axis_between, mean_sigma0};
+use crate::numeric::root;
 use crate::raster::Field;
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -71,14 +72,14 @@ pub(super) fn winds(observed: &Observed, scene: &Scene, bright: Option<f64>) -> 
 
 /// Wind speed that gives the brightness, or the nearest end of the range.
 fn as_bright(scene: &Scene, bright: f64) -> Result<f64> {
-    let mut scene = scene.clone();
-    let [mut low, mut high] = SPEEDS;
-    for _ in 0..BISECTIONS {
-        scene.sea.wind_speed = 0.5 * (low + high);
-        match mean_sigma0(&scene)? < bright {
-            true => low = scene.sea.wind_speed,
-            false => high = scene.sea.wind_speed,
-        }
-    }
-    Ok(0.5 * (low + high))
+    scene.validate()?;
+    let over = |speed: f64| {
+        let mut scene = scene.clone();
+        scene.sea.wind_speed = speed;
+        mean_sigma0(&scene).map_or(f64::NAN, |sigma0| sigma0 - bright)
+    };
+    Ok(match over(SPEEDS[0]) > 0.0 {
+        true => SPEEDS[0],
+        false => root(over, SPEEDS, BISECTIONS),
+    })
 }

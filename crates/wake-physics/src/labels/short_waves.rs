@@ -6,6 +6,7 @@
 use crate::effects::Effects;
 use crate::kelvin::{KelvinWake, SubpixelWake};
 use crate::models::Models;
+use crate::numeric::catmull_rom;
 use crate::scattering::{Backscatter, SlopeCovariance};
 use crate::scene::Term;
 use std::f64::consts::PI;
@@ -89,16 +90,9 @@ impl ShortWaves {
             start + part * (row[next] - start)
         };
         let whole = direction.floor();
-        let t = direction - whole;
-        // Catmull and Rom's cubic through four neighbours.
-        let weights = [
-            ((2.0 - t) * t - 1.0) * t,
-            (3.0 * t - 5.0) * t * t + 2.0,
-            ((4.0 - 3.0 * t) * t + 1.0) * t,
-            (t - 1.0) * t * t,
-        ];
+        let weights = catmull_rom(direction - whole);
         let neighbours = weights.iter().zip(whole as i64 - 1..);
-        let logarithm: f64 = neighbours.map(|(weight, at)| 0.5 * weight * of(at)).sum();
+        let logarithm: f64 = neighbours.map(|(weight, at)| weight * of(at)).sum();
         logarithm.exp() - 1.0
     }
 

@@ -5,7 +5,6 @@ use wake_physics::estimate::{
 };
 use wake_physics::{Scene, simulate};
 
-const SPEED: Parameter = Parameter::Value(Value::Speed);
 const HEADING: Parameter = Parameter::Value(Value::Heading);
 
 /// A number of a stream, uniform between two bounds (`SplitMix64`).
@@ -77,7 +76,7 @@ fn report() {
     let first = number("FIRST", 18);
     let from_guess = number("GUESS", 0) == 1;
     let mut pulls: Vec<[f64; 9]> = Vec::new();
-    let mut errors: Vec<[f64; 2]> = Vec::new();
+    let mut errors: Vec<[f64; 9]> = Vec::new();
     let count = number("SCENES", 16);
     for n in first..first + count {
         let (scene, sighting, guess) = drawn(n);
@@ -118,7 +117,7 @@ fn report() {
         }
         if found.identifiable {
             pulls.push(Parameter::OF_WAKE.map(|p| of(p) / found.of(p)[1]));
-            errors.push([of(SPEED).abs(), of(HEADING).abs()]);
+            errors.push(Parameter::OF_WAKE.map(of));
         }
     }
     println!("identifiable: {} of {count}", pulls.len());
@@ -134,12 +133,13 @@ fn report() {
             square.sqrt()
         );
     }
-    for (n, name) in ["speed [m/s]", "heading [deg]"].into_iter().enumerate() {
-        let mut values: Vec<f64> = errors.iter().map(|e| e[n]).collect();
+    for (n, parameter) in Parameter::OF_WAKE.iter().enumerate() {
+        let mut values: Vec<f64> = errors.iter().map(|e| e[n].abs()).collect();
         values.sort_by(f64::total_cmp);
         let at = |share: f64| values[(share * (values.len() - 1) as f64).round() as usize];
         println!(
-            "{name}: error {:.3} median, {:.3} of 90 %",
+            "{:<12} error {:.3} median, {:.3} of 90 %",
+            parameter.name(),
             at(0.5),
             at(0.9)
         );
