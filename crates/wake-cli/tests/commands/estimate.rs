@@ -64,9 +64,9 @@ fn bad_arguments_are_named() {
     }
 }
 
-/// An image that `wake simulate` wrote, and a window of it, are read from a guess; one of another size names the way out.
+/// An image that `wake simulate` wrote, and a window of it, are read around place and heading of the ship; one of another size names the way out.
 #[test]
-fn an_image_is_read_from_a_guess() {
+fn an_image_is_read_around_a_place() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| {
         folder
