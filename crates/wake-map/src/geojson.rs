@@ -41,6 +41,7 @@ pub fn geojson(wakes: &[MappedWake], image: &str) -> Value {
 /// The properties of a wake, with their units in their names.
 pub(crate) fn properties(wake: &MappedWake) -> Map<String, Value> {
     let echo = wake.echo.as_ref();
+    let ship = wake.ship.as_ref();
     let properties = json!({
         "type": "wake", "probability": wake.probability, "sure": wake.sure, "score": wake.score,
         "direction_probability": wake.direction_probability, "heading_deg": wake.heading, "length_m": wake.length, "length_sd_m": wake.length_deviation,
@@ -49,6 +50,11 @@ pub(crate) fn properties(wake: &MappedWake) -> Map<String, Value> {
         "displacement_m": echo.and_then(|echo| echo.displacement),
         "radial_velocity_m_s": echo.and_then(|echo| echo.radial_velocity),
         "radial_velocity_deviation_m_s": echo.and_then(|echo| echo.radial_velocity_deviation),
+        "identifiable": ship.map(|ship| ship.identifiable),
+        "speed_m_s": ship.map(|ship| ship.speed), "speed_sd_m_s": ship.map(|ship| ship.speed_deviation),
+        "estimated_heading_deg": ship.map(|ship| ship.heading), "estimated_heading_sd_deg": ship.map(|ship| ship.heading_deviation),
+        "wind_speed_m_s": ship.map(|ship| ship.wind_speed), "wind_speed_sd_m_s": ship.map(|ship| ship.wind_speed_deviation),
+        "wind_toward_deg": ship.map(|ship| ship.wind_toward), "misfit": ship.map(|ship| ship.misfit),
     });
     match properties {
         Value::Object(properties) => properties,

@@ -16,6 +16,7 @@ mod profile;
 
 mod seen;
 
+mod ship;
 mod wake;
 
 mod geojson;
@@ -28,5 +29,6 @@ pub use geojson::geojson;
 pub use profile::Kind;
 pub use report::html;
 pub use search::{Search, search};
+pub use ship::EstimatedShip;
 pub use table::csv;
 pub use wake::{MappedWake, mapped};

@@ -6,7 +6,7 @@ use crate::geojson::properties;
 use crate::wake::MappedWake;
 
 /// The columns of the table.
-const COLUMNS: [&str; 17] = [
+const COLUMNS: [&str; 26] = [
     "probability",
     "sure",
     "score",
@@ -24,6 +24,15 @@ const COLUMNS: [&str; 17] = [
     "displacement_m",
     "radial_velocity_m_s",
     "radial_velocity_deviation_m_s",
+    "identifiable",
+    "speed_m_s",
+    "speed_sd_m_s",
+    "estimated_heading_deg",
+    "estimated_heading_sd_deg",
+    "wind_speed_m_s",
+    "wind_speed_sd_m_s",
+    "wind_toward_deg",
+    "misfit",
 ];
 
 /// Comma-separated values with a header: a line for each wake, the surest first; what is not known is empty.

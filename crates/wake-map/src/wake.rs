@@ -9,6 +9,7 @@ use crate::echo::Echo;
 use crate::error::Result;
 use crate::profile::{Contrast, Kind};
 use crate::seen::{Seen, one_a_ship};
+use crate::ship::EstimatedShip;
 
 /// A wake with all that is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -52,6 +53,8 @@ pub struct MappedWake {
     pub time: Option<String>,
     /// The ship's echo.
     pub echo: Option<Echo>,
+    /// Ship and wind, if the caller estimates them.
+    pub ship: Option<EstimatedShip>,
 }
 
 /// The wakes of a product with all that is known of them, the surest first; further detections of a ship's wake are left out.
@@ -102,6 +105,7 @@ fn one_mapped(product: &Product, one: &Seen) -> Result<MappedWake> {
         incidence: None,
         time: None,
         echo,
+        ship: None,
     };
     if product.has_places() {
         let [from, to] = [product.place(tip.0, tip.1)?, product.place(end.0, end.1)?];

@@ -7,9 +7,11 @@ mod ships;
 mod blocks;
 mod scenes;
 
+mod estimate;
 mod simulate;
 
 pub use error::{Error, Result};
+pub use estimate::{MappedEstimate, estimate_wake};
 pub use scenes::Wind;
 pub use ships::{ShipAt, read_ships};
 pub use simulate::{Options, Written, simulate};

@@ -112,8 +112,6 @@ impl<'a> Scenes<'a> {
         }
         scene.sea.wind_toward = in_scene(&axes, self.wind.toward);
         let spacing = scene.grid.spacing;
-        let first_row = (lines.len() / 2) as f64 - (lines.len() - 1) as f64;
-        let first_column = -((pixels.len() / 2) as f64);
         for (ship, [line, pixel]) in &self.ships {
             let away = |at: f64, range: &Range<usize>| {
                 (range.start as f64 - at)
@@ -125,10 +123,7 @@ impl<'a> Scenes<'a> {
                 continue;
             }
             scene.ships.push(Ship {
-                position: [
-                    (pixel - pixels.start as f64 + first_column) * spacing,
-                    (line - lines.start as f64 + first_row) * spacing,
-                ],
+                position: in_part(spacing, (lines, pixels), [*line, *pixel]),
                 heading: in_scene(&axes, ship.heading),
                 speed: ship.speed,
                 length: ship.length,
@@ -144,13 +139,39 @@ impl<'a> Scenes<'a> {
     }
 }
 
+/// (x, y) in the scene of a part \[m\].
+///
+/// - `at`: line and pixel of the product
+pub(crate) fn in_part(
+    spacing: f64,
+    (lines, pixels): (&Range<usize>, &Range<usize>),
+    at: [f64; 2],
+) -> [f64; 2] {
+    let first_row = (lines.len() / 2) as f64 - (lines.len() - 1) as f64;
+    let first_column = -((pixels.len() / 2) as f64);
+    [
+        (at[1] - pixels.start as f64 + first_column) * spacing,
+        (at[0] - lines.start as f64 + first_row) * spacing,
+    ]
+}
+
 /// A direction clockwise from true north as that of a scene, clockwise from the direction of lines: so that a ship runs over the
 /// same pixels, though lines and pixels of the product are neither quite at right angles nor equally far apart \[degrees\].
-fn in_scene(axes: &PixelAxes, toward: f64) -> f64 {
+pub(crate) fn in_scene(axes: &PixelAxes, toward: f64) -> f64 {
     let sine = |degrees: f64| degrees.to_radians().sin();
     let lines = sine(axes.pixel_azimuth - toward) / axes.line_spacing;
     let pixels = sine(toward - axes.line_azimuth) / axes.pixel_spacing;
     pixels.atan2(lines).to_degrees().rem_euclid(360.0)
+}
+
+/// The inverse of [`in_scene`].
+pub(crate) fn on_map(axes: &PixelAxes, in_scene: f64) -> f64 {
+    let (sin, cos) = in_scene.to_radians().sin_cos();
+    let [line, pixel] = [axes.line_azimuth, axes.pixel_azimuth].map(f64::to_radians);
+    let (lines, pixels) = (cos * axes.line_spacing, sin * axes.pixel_spacing);
+    let east = lines * line.sin() + pixels * pixel.sin();
+    let north = lines * line.cos() + pixels * pixel.cos();
+    east.atan2(north).to_degrees().rem_euclid(360.0)
 }
 
 /// The Sentinel-1 product.
@@ -215,5 +236,9 @@ mod tests {
         assert!((0..2).all(|k| (step[k] / length - expected[k]).abs() < 1e-12));
         let square = axes(10.0, 10.0, 283.0);
         assert!((in_scene(&square, 30.0) - 197.0).abs() < 1e-9);
+        for toward in [0.0, 30.0, 170.0, 305.0] {
+            let back = on_map(&skew, in_scene(&skew, toward));
+            assert!((back - toward).abs() < 1e-9, "{toward}: {back}");
+        }
     }
 }

@@ -8,6 +8,7 @@ mod dataset;
 #[cfg(feature = "models")]
 mod detector;
 mod error;
+mod estimate;
 mod product;
 #[cfg(feature = "models")]
 mod sampler;
@@ -22,6 +23,7 @@ use pyo3::prelude::*;
 fn core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     simulate::register(module)?;
+    estimate::register(module)?;
     dataset::register(module)?;
     product::register(module)?;
     #[cfg(feature = "models")]

@@ -61,6 +61,10 @@ pub(crate) struct ProductArguments {
     /// Sea closer to land than this is left out [m]
     #[arg(long, value_name = "N", default_value_t = 1000.0)]
     pub(super) coast: f64,
+    /// Estimate speed, heading and wind of each sure wake of a Sentinel-1 product, with standard deviations; up to a minute a wake
+    #[cfg(feature = "simulate")]
+    #[arg(long)]
+    pub(super) estimate: bool,
     /// VV, HH, VH or HV, by default the first of these that the product has
     #[arg(long, value_parser = locate::polarization)]
     pub(super) polarization: Option<wake_geo::Polarization>,

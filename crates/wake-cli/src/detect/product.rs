@@ -9,6 +9,8 @@ use serde_json::json;
 use wake_detector::drawing::Drawing;
 use wake_detector::{Detection, GreyImage, Wake, angle_of};
 use wake_geo::{Land, LandMask, Product, Values};
+#[cfg(feature = "simulate")]
+use wake_map::EstimatedShip;
 use wake_map::{MappedWake, Search, csv, geojson, html, mapped, search};
 use whole_files::{make_folder, write_atomically, write_json};
 
@@ -79,7 +81,15 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
     let found = search(product, &detector, search_options, &watched);
     bar.finish_and_clear();
     let found = found?;
-    let wakes = mapped(product, &found)?;
+    #[cfg_attr(
+        not(feature = "simulate"),
+        expect(unused_mut, reason = "nothing is estimated")
+    )]
+    let mut wakes = mapped(product, &found)?;
+    #[cfg(feature = "simulate")]
+    if options.estimate {
+        estimate(product, &mut wakes)?;
+    }
     let collection = geojson(&wakes, &name);
     let picture = quick_look(product, &wakes)?;
     let mut png = Cursor::new(Vec::new());
@@ -129,6 +139,45 @@ pub(crate) fn run(product: &Product, arguments: &Arguments) -> Outcome<()> {
         true => exit::say(&json!({"product": name, "wakes": wakes}).to_string())?,
         false => exit::say(&summary(&name, &wakes, out))?,
     }
+    Ok(())
+}
+
+/// Adds speed, heading and wind to the sure wakes; a wake at land or a border, which cannot be estimated, is noted.
+#[cfg(feature = "simulate")]
+fn estimate(product: &Product, wakes: &mut [MappedWake]) -> Outcome<()> {
+    use wake_physics::estimate::{Parameter, Value};
+
+    let sure = wakes.iter().filter(|wake| wake.sure).count();
+    let bar = progress::bar(sure as u64, "wakes");
+    for wake in wakes.iter_mut().filter(|wake| wake.sure) {
+        let Some(heading) = wake.heading else {
+            continue;
+        };
+        let found = match wake_product::estimate_wake(product, [wake.line, wake.pixel], heading) {
+            Ok(found) => found,
+            Err(error @ wake_product::Error::Product(_)) => return Err(error.into()),
+            Err(error) => {
+                bar.suspend(|| exit::note(&format!("not estimated: {error}")));
+                bar.inc(1);
+                continue;
+            }
+        };
+        let of = |value| found.estimate.of(Parameter::Value(value));
+        let (speed, wind) = (of(Value::Speed), of(Value::WindSpeed));
+        wake.ship = Some(EstimatedShip {
+            identifiable: found.estimate.identifiable,
+            speed: speed[0],
+            speed_deviation: speed[1],
+            heading: found.heading,
+            heading_deviation: of(Value::Heading)[1],
+            wind_speed: wind[0],
+            wind_speed_deviation: wind[1],
+            wind_toward: found.wind_toward,
+            misfit: found.estimate.misfit(),
+        });
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
     Ok(())
 }
 
@@ -243,6 +292,15 @@ fn summary(name: &str, wakes: &[MappedWake], out: &Path) -> String {
             number(wake.length, " m"),
             number(echo, " m/s")
         );
+        if let Some(ship) = wake.ship {
+            text += &match ship.identifiable {
+                true => format!(
+                    ", speed {:.2} ± {:.2} m/s, heading {:.1} ± {:.1} deg by its waves",
+                    ship.speed, ship.speed_deviation, ship.heading, ship.heading_deviation
+                ),
+                false => ", speed not identifiable".to_owned(),
+            };
+        }
     }
     text + &format!("\nwritten to {}", out.display())
 }

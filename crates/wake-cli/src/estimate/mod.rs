@@ -3,6 +3,8 @@
 mod bound;
 mod image;
 mod line;
+#[cfg(feature = "train")]
+mod map;
 
 use crate::exit::{self, Outcome};
 use clap::Args;
@@ -33,6 +35,10 @@ pub(crate) struct Arguments {
     /// Print the Cramér–Rao bound of ship and wind for an image of the scene
     #[arg(long)]
     bound: bool,
+    /// Draw the bound of the speed by wind and heading for seven sensors as SVG, some 10 minutes on two cores
+    #[cfg(feature = "train")]
+    #[arg(long, value_name = "FILE", requires = "bound", conflicts_with = "json")]
+    map: Option<PathBuf>,
     /// Scene file (TOML) of the known values with place and heading of the ship; without it the default scene on 256 x 256 pixels of 4 m
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
@@ -56,6 +62,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let mut priors = Priors::default();
     if arguments.uncalibrated {
         priors.gain = f64::INFINITY;
+    }
+    #[cfg(feature = "train")]
+    if let Some(path) = &arguments.map {
+        return map::draw(path, &scene, &priors);
     }
     let text = match arguments.bound {
         true => bound::told(&scene, &priors, arguments.json)?,

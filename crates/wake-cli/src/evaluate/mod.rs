@@ -8,6 +8,7 @@ mod detector;
 mod domain;
 mod domain_report;
 mod effects;
+mod estimate;
 mod judged;
 mod model;
 mod options;
@@ -36,6 +37,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         Some(Task::Sea(options)) => sea::run(options),
         Some(Task::Detector(options)) => detector::run(options),
         Some(Task::Calibration(options)) => calibration::run(options),
+        Some(Task::Estimate(options)) => estimate::run(options),
     }
 }
 

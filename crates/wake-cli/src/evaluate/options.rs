@@ -1,7 +1,7 @@
 //! The command line, and what it names.
 
 use super::common::Common;
-use super::{calibration, detector, domain, pipeline, sea};
+use super::{calibration, detector, domain, estimate, pipeline, sea};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
@@ -31,4 +31,5 @@ pub(crate) enum Task {
     Sea(sea::Options),
     Detector(detector::Options),
     Calibration(calibration::Options),
+    Estimate(estimate::Options),
 }

@@ -58,3 +58,35 @@ fn one_scene_of_a_recipe_is_compared() {
     }
     assert_eq!(names(&out), ["domain.json", "domain.md", "domain.png"]);
 }
+
+/// One image is estimated; a second run reads it from the first's lines.
+#[test]
+fn estimates_are_compared_with_the_truth() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let arguments = [
+        "estimate",
+        "--count",
+        "1",
+        "--satellites",
+        "0",
+        "--others",
+        "0",
+    ];
+    let printed = done("evaluate", &arguments, &out);
+    assert!(
+        printed.contains("paper's ranges") && printed.contains("1 images"),
+        "{printed}"
+    );
+    assert_eq!(names(&out), ["estimates.jsonl", "report.json", "report.md"]);
+    let lines = || std::fs::read_to_string(out.join("estimates.jsonl")).expect("lines");
+    let (first, of_first) = (lines(), std::time::Instant::now());
+    assert_eq!(first.lines().count(), 1);
+    assert_eq!(done("evaluate", &arguments, &out), printed);
+    assert_eq!(
+        lines(),
+        first,
+        "estimated again after {:?}",
+        of_first.elapsed()
+    );
+}

@@ -5,8 +5,10 @@ use super::matrix::Matrix;
 use super::observed::{Near, Observed, Texture};
 use super::parameter::{Factors, Parameter};
 use super::priors::{Priors, values_of};
+use super::torus::Spectrum;
 use super::value::Value;
 use crate::error::Result;
+use crate::raster::Field;
 use crate::scene::Scene;
 
 /// Scene, factors on its image, and its likelihood.
@@ -18,11 +20,14 @@ pub(super) struct Point {
     pub(super) log_posterior: f64,
 }
 
-/// Largest number of reductions of a step that lowers the posterior.
-const REDUCTIONS: usize = 2;
+/// Smallest part of a step that is tried.
+const SHORTEST: f64 = 0.05;
+
+/// Smallest gain relative to its prediction with which derivatives are kept.
+const TRUSTED: f64 = 0.6;
 
 /// Length of the last step, in standard deviations of the information: errors of the mean image are larger.
-const SMALL: f64 = 0.2;
+const SMALL: f64 = 0.4;
 
 /// Limits of the wind speed [m/s], and of the ship's length relative to the guess.
 const WINDS: [f64; 2] = [1.5, 20.0];
@@ -38,6 +43,7 @@ struct Known {
 const OTHER: [f64; 2] = [0.01, 1.0];
 
 /// Image, parameters and priors of an ascent.
+#[derive(Clone, Copy)]
 pub(super) struct Ascent<'a> {
     pub(super) observed: &'a Observed,
     pub(super) parameters: &'a [Parameter],
@@ -46,21 +52,64 @@ pub(super) struct Ascent<'a> {
     pub(super) length: f64,
 }
 
+/// A step of an ascent.
+struct Step {
+    /// Of each parameter.
+    by: Vec<f64>,
+    /// Length in standard deviations.
+    size: f64,
+    /// First order of what it gains.
+    rise: f64,
+}
+
+/// Frozen plan of an ascent, with what its last points needed.
+struct Path {
+    image: ExpectedImage,
+    texture: Option<Known>,
+    /// Derivatives of the mean image at a point before.
+    spectra: Vec<Spectrum>,
+}
+
 impl Ascent<'_> {
     /// Likelihood at a scene, with the variance of the score.
     pub(super) fn point(&self, scene: Scene, factors: Factors) -> Result<Point> {
-        let image = ExpectedImage::new(&scene, &values_of(self.parameters))?;
-        self.point_by(&image, &mut None, (scene, factors), true)
+        let mut path = self.path(&scene)?;
+        self.linearised(&mut path, (scene, factors), true)
     }
 
-    /// - `image`: plan frozen at a scene nearby
-    /// - `known`: last texture
+    /// A path that begins at a scene.
+    fn path(&self, start: &Scene) -> Result<Path> {
+        Ok(Path {
+            image: ExpectedImage::new(start, &values_of(self.parameters))?,
+            texture: None,
+            spectra: Vec::new(),
+        })
+    }
+
+    /// Likelihood at a scene, with its own derivatives.
+    ///
     /// - `last`: compute the variance of the score
+    fn linearised(
+        &self,
+        path: &mut Path,
+        (scene, factors): (Scene, Factors),
+        last: bool,
+    ) -> Result<Point> {
+        let expected = path.image.at(&scene)?;
+        path.spectra = self.observed.spectra(self.parameters, &expected);
+        self.point_by(path, (scene, factors, &expected.intensity), last)
+    }
+
+    /// Likelihood at a scene, with the derivatives of the path.
+    fn beside(&self, path: &mut Path, (scene, factors): (Scene, Factors)) -> Result<Point> {
+        let mean = path.image.intensity(&scene)?;
+        self.point_by(path, (scene, factors, &mean), false)
+    }
+
     fn point_by(
         &self,
-        image: &ExpectedImage,
-        known: &mut Option<Known>,
-        (scene, factors): (Scene, Factors),
+        path: &mut Path,
+        (scene, factors, mean): (Scene, Factors, &Field),
         last: bool,
     ) -> Result<Point> {
         let wind = [scene.sea.wind_speed, scene.sea.wind_toward];
@@ -68,18 +117,16 @@ impl Ascent<'_> {
             (wind[0] / known.wind[0] - 1.0).abs() < OTHER[0]
                 && (wind[1] - known.wind[1]).abs() < OTHER[1]
         };
-        let texture = match known.take().filter(is_near) {
+        let texture = match path.texture.take().filter(is_near) {
             Some(known) => known,
             None => Known {
                 texture: Texture::new(&scene, self.parameters)?,
                 wind,
             },
         };
-        let expected = image.at(&scene)?;
-        let texture = &known.insert(texture).texture;
-        let near = self
-            .observed
-            .near(self.parameters, (&factors, &expected), texture, last);
+        let texture = &path.texture.insert(texture).texture;
+        let here = (&factors, mean, &path.spectra[..]);
+        let near = self.observed.near_by(self.parameters, here, texture, last);
         let prior = |parameter: &Parameter| {
             let off = match parameter {
                 Parameter::Gain => factors.gain.ln(),
@@ -97,29 +144,34 @@ impl Ascent<'_> {
     }
 
     /// Ascent from a start, of at most `steps` steps.
+    ///
+    /// Derivatives cost several images, so they are kept as long as they predict what a step gains.
     pub(super) fn climb(&self, start: Scene, factors: Factors, steps: usize) -> Result<Point> {
-        let image = ExpectedImage::new(&start, &values_of(self.parameters))?;
-        let mut known = None;
-        let mut here = self.point_by(&image, &mut known, (start, factors), false)?;
+        let mut path = self.path(&start)?;
+        let mut here = self.linearised(&mut path, (start, factors), false)?;
+        let (mut fresh, mut part) = (true, 1.0);
         for _ in 0..steps {
-            let (step, size) = self.step(&here);
-            let mut part = 1.0;
-            let mut next = None;
-            for _ in 0..=REDUCTIONS {
-                let moved = self.moved(&here, &step, part);
-                let there = self.point_by(&image, &mut known, moved, false)?;
-                if there.log_posterior > here.log_posterior {
-                    next = Some(there);
-                    break;
-                }
-                part *= 0.3;
-            }
-            match next {
-                Some(there) => here = there,
-                None => break,
+            let Step { by, size, rise } = self.step(&here);
+            let there = self.beside(&mut path, self.moved(&here, &by, part))?;
+            let gain = there.log_posterior - here.log_posterior;
+            let trusted = gain > TRUSTED * (part * rise - 0.5 * (part * size).powi(2));
+            if gain > 0.0 {
+                here = there;
             }
             if part * size < SMALL {
                 break;
+            }
+            if gain <= 0.0 && fresh {
+                part *= 0.3;
+                if part < SHORTEST {
+                    break;
+                }
+                continue;
+            }
+            part = 1.0;
+            fresh = !trusted;
+            if fresh {
+                here = self.linearised(&mut path, (here.scene, here.factors), false)?;
             }
         }
         Ok(here)
@@ -139,8 +191,7 @@ impl Ascent<'_> {
         Some(inverse.around(&variance))
     }
 
-    /// Step of each parameter, and its length in standard deviations.
-    fn step(&self, here: &Point) -> (Vec<f64>, f64) {
+    fn step(&self, here: &Point) -> Step {
         let count = self.parameters.len();
         let mut slope = here
             .near
@@ -161,7 +212,11 @@ impl Ascent<'_> {
             slope.add(n, n, self.longest(*parameter, &here.scene).powi(-2));
         }
         let Some(inverse) = slope.inverse() else {
-            return (vec![0.0; count], 0.0);
+            return Step {
+                by: vec![0.0; count],
+                size: 0.0,
+                rise: 0.0,
+            };
         };
         let product = |n: usize| (0..count).map(|m| inverse.at(n, m) * score[m]).sum::<f64>();
         let mut step: Vec<f64> = (0..count).map(product).collect();
@@ -171,8 +226,11 @@ impl Ascent<'_> {
             .map(|(step, p)| step.abs() / self.longest(*p, &here.scene))
             .fold(1.0, f64::max);
         step.iter_mut().for_each(|s| *s /= over);
-        let size = quadratic(&slope, &step).sqrt();
-        (step, size)
+        Step {
+            size: quadratic(&slope, &step).sqrt(),
+            rise: step.iter().zip(&score).map(|(s, g)| s * g).sum(),
+            by: step,
+        }
     }
 
     /// Longest step of a parameter.

@@ -19,8 +19,8 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Answers of the part near the ship that the whole wake is compared with, and answers from which the likelihood is maximised.
-const WHOLE: usize = 6;
-const CANDIDATES: usize = 3;
+const WHOLE: usize = 8;
+const CANDIDATES: usize = 4;
 
 /// Part of the best answer's gain by which an answer may be worse and is still followed (chosen).
 const WORSE: f64 = 0.5;
@@ -146,7 +146,7 @@ struct Answer {
     log_likelihood: f64,
 }
 
-/// The best answers whose speeds are no neighbours, without those that gain much less than the best.
+/// The best answers that are no neighbours, without those that gain much less than the best.
 fn apart(mut answers: Vec<Answer>, count: usize) -> Vec<Answer> {
     answers.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
     let mut kept: Vec<Answer> = Vec::new();

@@ -147,37 +147,35 @@ impl Observed {
         texture: &Texture,
         with_variance: bool,
     ) -> Near {
+        let spectra = self.spectra(parameters, expected);
+        let mean = &expected.intensity;
+        self.near_by(
+            parameters,
+            (factors, mean, &spectra),
+            texture,
+            with_variance,
+        )
+    }
+
+    /// The same with spectra of a scene nearby.
+    ///
+    /// - `spectra`: as [`Self::spectra`] gives them
+    pub(super) fn near_by(
+        &self,
+        parameters: &[Parameter],
+        (factors, mean, spectra): (&Factors, &Field, &[Spectrum]),
+        texture: &Texture,
+        with_variance: bool,
+    ) -> Near {
         let (torus, taper) = (&self.torus, &self.taper);
         let factor = factors.texture;
         let power = taper.power(torus, &texture.noise.covariance(factor));
         let floor = 1e-6 * power.iter().copied().fold(0.0, f32::max);
         let power: Vec<f32> = power.into_iter().map(|p| p.max(floor)).collect();
         let gain = factors.gain as f32;
-        let mean = &expected.intensity.values;
-        let residual = taper.of(self
-            .image
-            .values
-            .iter()
-            .zip(mean)
-            .map(|(i, m)| i / (gain * m) - 1.0));
-        let directions = self.directions(parameters, expected);
-        let zero = Field::default();
-        let mut spectra: Vec<Spectrum> = Vec::new();
-        let all: Vec<&Field> = std::iter::once(&residual).chain(&directions).collect();
-        for pair in all.chunks(2) {
-            let second = pair.get(1).copied().unwrap_or(&zero);
-            let second = if second.values.is_empty() {
-                pair[0]
-            } else {
-                second
-            };
-            let [a, b] = torus.spectra([pair[0], second]);
-            spectra.push(a);
-            if pair.len() > 1 {
-                spectra.push(b);
-            }
-        }
-        let left = spectra.remove(0);
+        let mean = &mean.values;
+        let pairs = self.image.values.iter().zip(mean);
+        let left = torus.spectrum(&taper.of(pairs.map(|(i, m)| i / (gain * m) - 1.0)));
         let slopes = texture.slopes(parameters, factor);
         let slopes: Vec<Option<Vec<f32>>> = slopes
             .par_iter()
@@ -185,9 +183,9 @@ impl Observed {
             .collect();
         let scale = taper.energy / (torus.size * torus.size) as f64;
         let (information, of_power) =
-            self.information(scale, &power, (&spectra, &slopes), taper.peakedness);
+            self.information(scale, &power, (spectra, &slopes), taper.peakedness);
         let mut near = Near {
-            score: score(torus, scale, (&left, &power), (&spectra, &slopes)),
+            score: score(torus, scale, (&left, &power), (spectra, &slopes)),
             log_likelihood: self.log_likelihood(scale, (&left, &power), gain, mean),
             information,
             of_power,
@@ -196,9 +194,25 @@ impl Observed {
         if with_variance {
             let covariance = texture.noise.covariance(factor);
             near.information.variance =
-                self.variance(scale, (&power, &covariance), (&spectra, &slopes));
+                self.variance(scale, (&power, &covariance), (spectra, &slopes));
         }
         near
+    }
+
+    /// F[w ∂ln μ] by each parameter.
+    pub(super) fn spectra(&self, parameters: &[Parameter], expected: &Expected) -> Vec<Spectrum> {
+        let directions = self.directions(parameters, expected);
+        let mut spectra = Vec::new();
+        for pair in directions.chunks(2) {
+            let [first, last] = [&pair[0], &pair[pair.len() - 1]];
+            spectra.extend(
+                self.torus
+                    .spectra([first, last])
+                    .into_iter()
+                    .take(pair.len()),
+            );
+        }
+        spectra
     }
 
     /// The same image without a taper.

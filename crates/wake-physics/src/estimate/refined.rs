@@ -79,6 +79,7 @@ impl Estimate {
 /// Largest number of Fisher scoring steps of an ascent, and of each ascent from a start.
 const STEPS: usize = 20;
 const FIRST_STEPS: usize = 5;
+const SHIP_STEPS: usize = 8;
 
 /// Starts around a guess: relative changes of the speed and changes of the heading \[deg\], about the width of a maximum.
 const AROUND: [[f64; 2]; 5] = [
@@ -146,15 +147,26 @@ pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) ->
         priors,
         length: ship.length,
     };
-    // The brightness of an uncalibrated image is that of its first start.
-    let mut factors = Factors::default();
-    if priors.gain.is_infinite() {
-        let mean = ExpectedImage::new(first_start, &[])?.intensity(first_start)?;
-        factors.gain = observed.gain(&mean);
-    }
+    let of_ship = Parameter::OF_WAKE.into_iter().filter(|p| p.is_of_ship());
+    let of_ship: Vec<Parameter> = of_ship.collect();
+    let with_wind = Ascent {
+        parameters: &of_ship,
+        ..ascent
+    };
+    // A wrong brightness would be explained as texture.
+    let mean = ExpectedImage::new(first_start, &[])?.intensity(first_start)?;
+    let factors = Factors {
+        gain: observed.gain(&mean),
+        ..Factors::default()
+    };
+    // The ship first, with the wind of the start: a wind that varies before the ship is found explains its residual as texture.
+    let both = |scene: Scene, factors: Factors| -> Result<Point> {
+        let ship = with_wind.climb(scene, factors, SHIP_STEPS)?;
+        ascent.climb(ship.scene, ship.factors, FIRST_STEPS)
+    };
     let mut points = Vec::new();
     for start in starts {
-        points.push(ascent.climb(start.clone(), factors, FIRST_STEPS)?);
+        points.push(both(start.clone(), factors)?);
     }
     points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
     let first = points.swap_remove(0);

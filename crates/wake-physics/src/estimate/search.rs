@@ -295,8 +295,10 @@ fn step(speed: f64, length: f64) -> f64 {
     TAU * speed * speed / (2.5 * GRAVITY * length)
 }
 
-/// Whether two answers differ by less than 1.5 steps of the speed.
+/// Whether two answers differ by less than 1.5 steps of the speed and half a transverse wave.
 pub(super) fn are_neighbours(a: &Found, b: &Found) -> bool {
     let speed = a.course.speed;
+    let apart = (b.place[0] - a.place[0]).hypot(b.place[1] - a.place[1]);
     (b.course.speed / speed).ln().abs() < 1.5 * step(speed, NEAR).min(STEP)
+        && apart < 0.5 * TAU * speed * speed / GRAVITY
 }

@@ -10,3 +10,4 @@ mod bounds;
 mod derivatives;
 mod refined;
 mod report;
+mod probe;

@@ -17,6 +17,7 @@ from . import errors
 from ._core import __version__
 from .dataset import CLASSES, Batch, Dataset, Item, merge_shards
 from .detector import Detection, Detector
+from .estimation import Alternative, Estimate, bound, estimate
 from .labels import Labels, Object
 from .plan import Plan, PlannedTerm
 from .product import Product
@@ -27,10 +28,12 @@ from .simulation import FIELDS, Simulation, expected_intensity, simulate, simula
 __all__ = [
     "CLASSES",
     "FIELDS",
+    "Alternative",
     "Batch",
     "Dataset",
     "Detection",
     "Detector",
+    "Estimate",
     "Item",
     "Labels",
     "Object",
@@ -42,7 +45,9 @@ __all__ = [
     "Scene",
     "Simulation",
     "__version__",
+    "bound",
     "errors",
+    "estimate",
     "expected_intensity",
     "merge_shards",
     "simulate",

@@ -34,6 +34,16 @@ def simulate(
     scene: Scene, threads: int | None, direct: bool
 ) -> tuple[dict[str, _Floats], dict[str, Any]]: ...
 def expected_intensity(scene: Scene, threads: int | None) -> _Floats: ...
+def estimate(
+    image: _Floats,
+    known: Scene,
+    place: tuple[float, float] | None,
+    heading: float | None,
+    deviations: tuple[float, float],
+    calibrated: bool,
+    threads: int | None,
+) -> dict[str, Any]: ...
+def bound(scene: Scene, calibrated: bool, threads: int | None) -> dict[str, float]: ...
 def simulate_batch(
     base: Scene,
     keys: Sequence[str],

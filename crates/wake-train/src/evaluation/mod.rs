@@ -31,6 +31,7 @@ mod source;
 
 // Figures of images.
 mod judge;
+mod estimates;
 mod pixels;
 mod reading;
 mod shape;
@@ -54,6 +55,7 @@ pub use ablation::AblationRow;
 pub use baseline::Baseline;
 pub use controllability::ControllabilityRow;
 pub use domain::{DomainRow, Views};
+pub use estimates::{EstimateRow, EstimatedImage, ToEstimate};
 pub use figures::{ConditionRow, Evaluation, Figures, Speckle};
 pub use held_out::HeldOut;
 pub use measurements::MeasurementRow;

@@ -1,0 +1,222 @@
+//! Report of `wake evaluate estimate`.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+use wake_train::evaluation::{AbsoluteErrors, EstimateRow, EstimatedImage};
+
+use super::Line;
+use super::sets::Set;
+
+/// Guess of every speed, the middle of the paper's range \[m/s\]: the row that nothing may be worse than.
+const MIDDLE: f64 = 9.0;
+
+/// All sets.
+#[derive(Serialize)]
+pub(super) struct Report {
+    sets: Vec<Figures>,
+}
+
+/// Figures of one set.
+#[derive(Serialize)]
+struct Figures {
+    set: &'static str,
+    about: &'static str,
+    images: usize,
+    identifiable: usize,
+    /// Identifiable images whose speed is wrong by more than 10 %, or whose heading by more than 5 degrees.
+    wrong: usize,
+    /// Median seconds of an estimate.
+    seconds: f64,
+    /// Errors by value; of real tiles the heading alone has a truth.
+    rows: Vec<EstimateRow>,
+    /// Heading and speed as `measure` reads them on the same images.
+    measured: [AbsoluteErrors; 2],
+    /// Heading of the sighting, and the middle of the range of speeds.
+    guessed: [AbsoluteErrors; 2],
+    /// Images and identifiable ones by range of incidence \[deg\] and of speed \[m/s\].
+    by_incidence: Vec<Part>,
+    by_speed: Vec<Part>,
+}
+
+/// Images within a range.
+#[derive(Serialize)]
+struct Part {
+    from: f64,
+    to: f64,
+    images: usize,
+    identifiable: usize,
+}
+
+/// Limits of the ranges.
+const INCIDENCES: [f64; 5] = [0.0, 20.0, 22.0, 28.0, 90.0];
+const SPEEDS: [f64; 5] = [0.0, 6.6, 8.0, 10.0, 30.0];
+
+/// Largest relative error of a right speed, and largest error of a right heading \[deg\].
+const RIGHT: (f64, f64) = (0.1, 5.0);
+
+impl Report {
+    pub(super) fn of(sets: &[Set], lines: &[Line]) -> Self {
+        let figures = |set: &Set| {
+            let of_set = lines.iter().filter(|line| line.set == set.name);
+            let mut images: Vec<EstimatedImage> = of_set.map(|l| l.estimate.clone()).collect();
+            images.retain(|image| image.index < set.count);
+            Figures::of(set, &images)
+        };
+        Self {
+            sets: sets.iter().map(figures).collect(),
+        }
+    }
+
+    pub(super) fn markdown(&self) -> String {
+        let mut text = "# Estimates of ship and wind, evaluated\n".to_owned();
+        for figures in &self.sets {
+            figures.write(&mut text);
+        }
+        text
+    }
+}
+
+impl Figures {
+    fn of(set: &Set, images: &[EstimatedImage]) -> Self {
+        let identifiable: Vec<&EstimatedImage> = images.iter().filter(|i| i.identifiable).collect();
+        let is_wrong = |image: &&&EstimatedImage| {
+            let off = |n: usize| {
+                image
+                    .values
+                    .get(n)
+                    .and_then(|v| v[0])
+                    .unwrap_or(f64::INFINITY)
+            };
+            let wrong_speed = off(0).abs() > RIGHT.0 * image.speed && !set.is_real();
+            set.is_empty() || wrong_speed || off(1).abs() > RIGHT.1
+        };
+        let mut seconds: Vec<f64> = images.iter().map(|image| image.seconds).collect();
+        seconds.sort_by(f64::total_cmp);
+        let mut rows = EstimateRow::of_all(images);
+        rows.retain(|row| !set.is_real() || row.quantity == "heading");
+        let of = |error: &dyn Fn(&EstimatedImage) -> Option<f64>| {
+            AbsoluteErrors::of(&images.iter().map(error).collect::<Vec<_>>())
+        };
+        Self {
+            set: set.name,
+            about: set.about,
+            images: images.len(),
+            identifiable: identifiable.len(),
+            wrong: identifiable.iter().filter(is_wrong).count(),
+            seconds: seconds.get(seconds.len() / 2).copied().unwrap_or(0.0),
+            rows: match set.is_empty() {
+                true => Vec::new(),
+                false => rows,
+            },
+            measured: [0, 1].map(|n| of(&|image| image.measured[n])),
+            guessed: [
+                of(&|image| Some(image.sighted.abs())),
+                of(&|image| Some((image.speed - MIDDLE).abs())),
+            ],
+            by_incidence: parts(images, &INCIDENCES, |image| image.incidence),
+            by_speed: parts(images, &SPEEDS, |image| image.speed),
+        }
+    }
+
+    fn write(&self, text: &mut String) {
+        // Writing into a string cannot fail.
+        let _ = writeln!(
+            text,
+            "\n## {}\n\n{}: {} images, {} identifiable, {} of them wrong (speed by more than 10 %, heading by more than 5 degrees, or no ship); \
+             {:.1} s an image.\n",
+            self.set, self.about, self.images, self.identifiable, self.wrong, self.seconds
+        );
+        if !self.rows.is_empty() {
+            text.push_str(
+                "| value | median error | 90th percentile | within 1, 2, 3 deviations | squared error over bound | deviation over bound | ranks |\n\
+                 | --- | --- | --- | --- | --- | --- | --- |\n",
+            );
+        }
+        for row in &self.rows {
+            let within = row.within.map_or("–".to_owned(), |within| {
+                within
+                    .map(|share| format!("{:.0} %", 100.0 * share))
+                    .join(", ")
+            });
+            let ranks: Vec<String> = row.ranks.iter().map(usize::to_string).collect();
+            let _ = writeln!(
+                text,
+                "| {} | {} {} | {} | {within} | {} | {} | {} |",
+                row.quantity.replace('_', " "),
+                shown(row.median),
+                row.unit,
+                shown(row.percentile_90),
+                shown(row.over_bound),
+                shown(row.deviation_over_bound),
+                ranks.join(" ")
+            );
+        }
+        if self.rows.len() > 1 {
+            text.push_str("\n| beside | given | median error | 90th percentile |\n| --- | --- | --- | --- |\n");
+            let beside = [
+                ("heading, `measure`", &self.measured[0], "deg"),
+                ("speed, `measure`", &self.measured[1], "m/s"),
+                ("heading of the sighting", &self.guessed[0], "deg"),
+                ("speed always 9 m/s", &self.guessed[1], "m/s"),
+            ];
+            for (name, errors, unit) in beside {
+                let _ = writeln!(
+                    text,
+                    "| {name} | {:.0} % | {} {unit} | {} |",
+                    100.0 * errors.measurable,
+                    shown(errors.median),
+                    shown(errors.percentile_90)
+                );
+            }
+            let list = |parts: &[Part], unit: &str| {
+                let each = parts.iter().filter(|part| part.images > 0).map(|part| {
+                    let Part {
+                        from,
+                        to,
+                        images,
+                        identifiable,
+                    } = part;
+                    format!("{from} to {to} {unit} {identifiable} of {images}")
+                });
+                each.collect::<Vec<_>>().join(", ")
+            };
+            let _ = writeln!(
+                text,
+                "\nIdentifiable by incidence: {}; by speed: {}.",
+                list(&self.by_incidence, "deg"),
+                list(&self.by_speed, "m/s")
+            );
+        }
+    }
+}
+
+fn parts(
+    images: &[EstimatedImage],
+    limits: &[f64],
+    of: impl Fn(&EstimatedImage) -> f64,
+) -> Vec<Part> {
+    let part = |pair: &[f64]| {
+        let [from, to] = [pair[0], pair[1]];
+        let inside = || {
+            images
+                .iter()
+                .filter(|image| (from..to).contains(&of(image)))
+        };
+        Part {
+            from,
+            to,
+            images: inside().count(),
+            identifiable: inside().filter(|image| image.identifiable).count(),
+        }
+    };
+    limits.windows(2).map(part).collect()
+}
+
+/// Three significant digits, or a dash.
+fn shown(value: Option<f64>) -> String {
+    value.map_or("–".to_owned(), |value| {
+        let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0);
+        format!("{value:.*}", digits as usize)
+    })
+}

@@ -1,0 +1,107 @@
+//! Ship and wind of a wake in a product.
+
+use std::ops::Range;
+
+use wake_geo::{Product, Sentinel1};
+use wake_physics::estimate::{Estimate, Parameter, Priors, Sighting, Value, estimate};
+use wake_physics::scene::Ship;
+use wake_physics::{Field, Scene};
+
+use crate::error::{Error, Result};
+use crate::scenes::{Scenes, Wind, in_part, in_scene, on_map, sentinel};
+
+/// Largest rows and columns of the estimated part.
+const SIDE: usize = 256;
+
+/// Part of the side that the middle of the estimated part lies astern of the wake's tip.
+const ASTERN: f64 = 0.25;
+
+/// Estimate of ship and wind, with the directions of the map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MappedEstimate {
+    /// The estimate: its scene has the directions of the image.
+    pub estimate: Estimate,
+    /// Heading of the ship, clockwise from true north \[degrees\].
+    pub heading: f64,
+    /// Where the wind blows to, clockwise from true north \[degrees\].
+    pub wind_toward: f64,
+}
+
+/// Estimates ship and wind around a wake of a Sentinel-1 product.
+///
+/// σ⁰ of at most 256 × 256 pixels around the wake is read with its thermal noise; pixels darker than the noise count as noise. The radar is that of the
+/// annotation, the water deep, the hull form that of the default scene.
+///
+/// - `tip`: line and pixel where the wake begins
+/// - `heading` of the ship, clockwise from true north \[degrees\], within some 7 degrees
+///
+/// # Errors
+///
+/// [`Error::Template`] for a product whose radar is not known or a part without data (land, border), [`Error::Product`] for pixels that cannot be
+/// read, [`Error::Scene`] as [`estimate`].
+pub fn estimate_wake(product: &Product, tip: [f64; 2], heading: f64) -> Result<MappedEstimate> {
+    let sentinel = sentinel(product)?;
+    // The wind is estimated; its direction does not count.
+    let wind = Wind {
+        speed: Scene::default().sea.wind_speed,
+        toward: 0.0,
+    };
+    let scenes = Scenes::new(product, &[], wind, &[])?;
+    let axes = product.axes(tip[0], tip[1])?;
+    let turned = in_scene(&axes, heading);
+    let (sin, cos) = turned.to_radians().sin_cos();
+    let (lines, pixels) = product.size();
+    let part = |tip: f64, forward: f64, count: usize| -> Range<usize> {
+        let side = SIDE.min(count);
+        let first = tip - ASTERN * side as f64 * forward - 0.5 * side as f64;
+        let first = (first.round().max(0.0) as usize).min(count - side);
+        first..first + side
+    };
+    let (lines, pixels) = (part(tip[0], cos, lines), part(tip[1], sin, pixels));
+    let mut known = scenes.scene(&lines, &pixels, 0)?;
+    let (image, noise) = with_noise(product, sentinel, &lines, &pixels)?;
+    known.radar.nesz = Some(10.0 * noise.log10());
+    known.ships = vec![Ship::default()];
+    let place = in_part(known.grid.spacing, (&lines, &pixels), tip);
+    let sighting = Sighting::new(place, turned);
+    let found = estimate(&image, &known, &sighting, &Priors::default())?;
+    let of = |value: Value| found.of(Parameter::Value(value))[0];
+    Ok(MappedEstimate {
+        heading: on_map(&axes, of(Value::Heading)),
+        wind_toward: on_map(&axes, of(Value::WindToward)),
+        estimate: found,
+    })
+}
+
+/// Intensity of a part with its thermal noise, rows from the farthest line, and the mean noise, both in the unit of σ⁰.
+fn with_noise(
+    product: &Product,
+    sentinel: &Sentinel1,
+    lines: &Range<usize>,
+    pixels: &Range<usize>,
+) -> Result<(Field, f64)> {
+    let window = product.read_window(lines.clone(), pixels.clone())?;
+    if window.no_data > 0 || !window.values.iter().all(|v| v.is_finite()) {
+        return Err(Error::Template {
+            path: product.path().to_owned(),
+            why: format!("lines {lines:?} and pixels {pixels:?} have no data everywhere"),
+        });
+    }
+    let mut values = Vec::with_capacity(window.values.len());
+    let mut sum = 0.0;
+    for (n, line) in lines.clone().enumerate().rev() {
+        for (pixel, sigma0) in pixels.clone().zip(window.line(n)) {
+            let calibration = sentinel.calibration(line as f64, pixel as f64);
+            let noise = calibration.noise / calibration.sigma_nought_lut.powi(2);
+            sum += noise;
+            values.push(sigma0 + noise as f32);
+        }
+    }
+    let noise = sum / values.len() as f64;
+    let field = Field {
+        rows: lines.len(),
+        columns: pixels.len(),
+        values,
+    };
+    Ok((field, noise))
+}

@@ -1,0 +1,258 @@
+//! Errors and error bars of estimates of ship and wind.
+
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+use wake_physics::estimate::{Estimate, Parameter, Priors, Sighting, Value, bound, estimate};
+use wake_physics::measure::{angle_between, axis_between};
+use wake_physics::{Field, Scene};
+
+use super::reading::{Quantity, Reading};
+use super::statistics::{mean, quantile};
+use crate::error::Result;
+
+/// The estimate of one image, against its scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EstimatedImage {
+    /// Number of the image in its set.
+    pub index: u64,
+    /// True speed of the ship \[m/s\], and incidence \[deg\].
+    pub speed: f64,
+    /// Incidence \[deg\].
+    pub incidence: f64,
+    /// Whether the estimate passed its own tests.
+    pub identifiable: bool,
+    /// Largest misfit of the residual spectrum, as a factor.
+    pub misfit: f64,
+    /// Log-likelihood ratio to the open sea.
+    pub over_open_sea: f64,
+    /// Seconds of the estimate.
+    pub seconds: f64,
+    /// Error, standard deviation and Cramér–Rao bound of each of [`Parameter::OF_WAKE`]; `None` where the image does not tell the value.
+    pub values: Vec<[Option<f64>; 3]>,
+    /// Errors of `wake_physics::measure` on the same image: heading \[deg\] and speed \[m/s\].
+    pub measured: [Option<f64>; 2],
+    /// Error of the heading of the sighting \[deg\].
+    pub sighted: f64,
+}
+
+/// An image to estimate, and what is known of it.
+#[derive(Debug, Clone)]
+pub struct ToEstimate {
+    /// Number in its set.
+    pub index: u64,
+    /// The scene that made the image, with one ship.
+    pub truth: Scene,
+    /// Intensity with speckle.
+    pub image: Field,
+    /// The scene as the estimator knows it.
+    pub known: Scene,
+    /// Place and heading of the wake before the estimate.
+    pub sighting: Sighting,
+    /// Calibration and knowledge of the texture.
+    pub priors: Priors,
+}
+
+impl ToEstimate {
+    /// Estimates the image, and compares the result with the truth.
+    ///
+    /// # Errors
+    ///
+    /// As [`estimate`] and [`bound`].
+    pub fn estimated(&self) -> Result<EstimatedImage> {
+        let begin = Instant::now();
+        let found = estimate(&self.image, &self.known, &self.sighting, &self.priors)?;
+        let seconds = begin.elapsed().as_secs_f64();
+        let limit = bound(&self.truth, &Parameter::OF_WAKE, &self.priors)?;
+        let told = |value: f64| value.is_finite().then_some(value);
+        let values = Parameter::OF_WAKE.map(|parameter| {
+            let [_, deviation] = found.of(parameter);
+            [
+                told(error(&found, &self.truth, parameter)),
+                told(deviation),
+                told(limit.of(parameter)),
+            ]
+        });
+        let reading = Reading::of_speckled(&self.image, &self.truth)?;
+        let read = |quantity| reading.error(quantity, &self.truth);
+        let ship = self.truth.ships.first();
+        Ok(EstimatedImage {
+            index: self.index,
+            speed: ship.map_or(0.0, |ship| ship.speed),
+            incidence: self.truth.radar.incidence,
+            identifiable: found.identifiable,
+            misfit: found.misfit(),
+            over_open_sea: found.over_open_sea,
+            seconds,
+            values: values.to_vec(),
+            measured: [read(Quantity::Heading), read(Quantity::Speed)],
+            sighted: ship.map_or(0.0, |ship| {
+                angle_between(self.sighting.heading, ship.heading)
+            }),
+        })
+    }
+}
+
+/// Estimated less true value; of the wind's direction the error of its axis, of factors the logarithm.
+fn error(found: &Estimate, truth: &Scene, parameter: Parameter) -> f64 {
+    let [value, _] = found.of(parameter);
+    match parameter {
+        Parameter::Gain | Parameter::Texture => value,
+        Parameter::Size => value - Value::Size.of(truth),
+        Parameter::Value(Value::Heading) => angle_between(value, Value::Heading.of(truth)),
+        Parameter::Value(Value::WindToward) => axis_between(value, Value::WindToward.of(truth)),
+        Parameter::Value(of) => value - of.of(truth),
+    }
+}
+
+/// Errors of one value over the identifiable images of a set.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EstimateRow {
+    /// Name of the value.
+    pub quantity: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Median and 90th percentile of the absolute error.
+    pub median: Option<f64>,
+    /// 90th percentile of the absolute error.
+    pub percentile_90: Option<f64>,
+    /// Share of the errors within 1, 2 and 3 standard deviations; of a Gaussian 0.683, 0.954 and 0.997.
+    pub within: Option<[f64; 3]>,
+    /// Mean over the images of squared error over squared Cramér–Rao bound; 1 for an efficient estimate.
+    pub over_bound: Option<f64>,
+    /// Median of the standard deviation over the bound.
+    pub deviation_over_bound: Option<f64>,
+    /// Images by Φ(error/deviation) in tenths: even for exact error bars.
+    pub ranks: [usize; 10],
+}
+
+impl EstimateRow {
+    /// The rows of all values.
+    #[must_use]
+    pub fn of_all(images: &[EstimatedImage]) -> Vec<Self> {
+        let parameters = Parameter::OF_WAKE.into_iter().enumerate();
+        parameters
+            .map(|(n, parameter)| {
+                let of = images.iter().filter(|image| image.identifiable);
+                Self::of(parameter, of.filter_map(|image| image.values.get(n)))
+            })
+            .collect()
+    }
+
+    fn of<'a>(parameter: Parameter, values: impl Iterator<Item = &'a [Option<f64>; 3]>) -> Self {
+        let values: Vec<&[Option<f64>; 3]> = values.collect();
+        let errors: Vec<f64> = values.iter().filter_map(|v| Some(v[0]?.abs())).collect();
+        let pairs = values.iter().filter_map(|v| Some(v[0]? / v[1]?));
+        let pulls: Vec<f64> = pairs.filter(|pull| pull.is_finite()).collect();
+        let of_bound = |n: usize| -> Vec<f64> {
+            let ratios = values.iter().filter_map(|v| Some(v[n]? / v[2]?));
+            ratios.filter(|ratio| ratio.is_finite()).collect()
+        };
+        let squares: Vec<f64> = of_bound(0).iter().map(|ratio| ratio * ratio).collect();
+        let mut ranks = [0; 10];
+        for pull in &pulls {
+            ranks[((10.0 * gaussian(*pull)) as usize).min(9)] += 1;
+        }
+        let within = |limit: f64| {
+            let inside = pulls.iter().filter(|pull| pull.abs() < limit);
+            inside.count() as f64 / pulls.len() as f64
+        };
+        Self {
+            quantity: parameter.name(),
+            unit: parameter.unit(),
+            median: quantile(&errors, 0.5),
+            percentile_90: quantile(&errors, 0.9),
+            within: (!pulls.is_empty()).then(|| [1.0, 2.0, 3.0].map(within)),
+            over_bound: mean(&squares),
+            deviation_over_bound: quantile(&of_bound(1), 0.5),
+            ranks,
+        }
+    }
+}
+
+/// Distribution function Φ of the standard Gaussian, by Simpson's rule from 0: exact to 1e-6.
+fn gaussian(z: f64) -> f64 {
+    let end = z.clamp(-6.0, 6.0);
+    let step = end / 64.0;
+    let density = |n: usize| {
+        let x = step * n as f64;
+        let weight = match n {
+            0 | 64 => 1.0,
+            _ if n % 2 == 1 => 4.0,
+            _ => 2.0,
+        };
+        weight * (-0.5 * x * x).exp()
+    };
+    let sum: f64 = (0..=64).map(density).sum();
+    0.5 + sum * step / (3.0 * std::f64::consts::TAU.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(identifiable: bool, error: f64) -> EstimatedImage {
+        EstimatedImage {
+            index: 0,
+            speed: 9.0,
+            incidence: 30.0,
+            identifiable,
+            misfit: 1.0,
+            over_open_sea: 100.0,
+            seconds: 1.0,
+            values: vec![[Some(error), Some(2.0), Some(1.0)]; 9],
+            measured: [None; 2],
+            sighted: 0.0,
+        }
+    }
+
+    /// Table of Abramowitz & Stegun (1964), 26.1.
+    #[test]
+    fn the_distribution_is_that_of_the_tables() {
+        for (z, expected) in [
+            (0.0, 0.5),
+            (1.0, 0.841_344_7),
+            (-2.0, 0.022_750_1),
+            (3.0, 0.998_650_1),
+        ] {
+            assert!(
+                (gaussian(z) - expected).abs() < 1e-6,
+                "{z}: {}",
+                gaussian(z)
+            );
+        }
+    }
+
+    /// Errors of 1, −3 and 5 with deviations of 2 and bounds of 1; an image that is not identifiable does not count.
+    #[test]
+    fn rows_count_identifiable_images() {
+        let images = [
+            image(true, 1.0),
+            image(true, -3.0),
+            image(true, 5.0),
+            image(false, 90.0),
+        ];
+        let rows = EstimateRow::of_all(&images);
+        assert_eq!((rows.len(), rows[0].quantity), (9, "speed"));
+        let row = &rows[0];
+        assert_eq!(
+            (row.median, row.deviation_over_bound),
+            (Some(3.0), Some(2.0))
+        );
+        let within = row.within.unwrap_or_default();
+        for (found, expected) in within.into_iter().zip([1.0 / 3.0, 2.0 / 3.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-12);
+        }
+        assert!(
+            row.over_bound
+                .is_some_and(|v| (v - 35.0 / 3.0).abs() < 1e-12)
+        );
+        // Φ(0.5) = 0.69, Φ(−1.5) = 0.07, Φ(2.5) = 0.99.
+        assert_eq!(row.ranks, [1, 0, 0, 0, 0, 0, 1, 0, 0, 1]);
+    }
+
+    #[test]
+    fn nothing_identifiable_has_no_figures() {
+        let row = EstimateRow::of_all(&[image(false, 1.0)]).swap_remove(0);
+        assert_eq!((row.median, row.within, row.over_bound), (None, None, None));
+    }
+}
