@@ -96,7 +96,9 @@ impl Ascent<'_> {
         last: bool,
     ) -> Result<Point> {
         let expected = path.image.at(&scene)?;
-        path.spectra = self.observed.spectra(self.parameters, &expected);
+        path.spectra = self
+            .observed
+            .spectra(self.parameters, factors.gain, &expected);
         self.point_by(path, (scene, factors, &expected.intensity), last)
     }
 

@@ -67,18 +67,21 @@ pub fn estimate(
     let winds = winds(&beside, known, bright)?;
     let observed = Observed::new(image.clone(), known, |i, j| echo.shown(i, j));
     let with_wind = |wind| WithWind::new(&observed, known, wind, sighting);
-    let searches: Vec<WithWind<'_>> = likely(&winds).into_iter().map(with_wind).collect();
+    let searches: Vec<WithWind<'_>> = likely(&winds, 45.0).into_iter().map(with_wind).collect();
     let near = searches.iter().enumerate().map(|(n, one)| one.near_ship(n));
     let near = near.collect::<Result<Vec<_>>>()?.concat();
     // Once from the answers near the ship, then from the best of all.
     let whole = with_whole_wake(&searches, &apart(near, WHOLE))?;
     let whole = with_whole_wake(&searches, &apart(whole, CANDIDATES))?;
     let best = apart(whole, CANDIDATES);
-    // The likeliest course with each wind, and the other courses with theirs.
-    let likeliest = best.first().map(|answer| &answer.found);
-    let with_each_wind = searches
-        .iter()
-        .filter_map(|one| Some(one.start(likeliest?)));
+    // The likeliest course with each likely wind, and the other courses with theirs.
+    let likeliest = best.first().map(|answer| answer.found);
+    let with_each_wind = likely(&winds, 25.0).into_iter().filter_map(|wind| {
+        let Found { course, place, .. } = likeliest?;
+        let mut scene = known.clone();
+        scene.sea = wind.open.sea.clone();
+        Some(course.on(&scene, place))
+    });
     let others = best.iter().skip(1);
     let others = others.map(|answer| searches[answer.search].start(&answer.found));
     let starts: Vec<Scene> = with_each_wind.chain(others).collect();

@@ -105,7 +105,7 @@ fn correlations(scene: &Scene, size: usize) -> [Vec<f64>; 2] {
 }
 
 /// A window over the image, with what its shape does to spectra.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Taper {
     pub(super) weights: Field,
     /// Σ w².

@@ -17,6 +17,8 @@ pub(super) struct Observed {
     pub(super) image: Field,
     pub(super) torus: Torus,
     pub(super) taper: Taper,
+    /// Brightness that residuals are relative to; `None`: the mean image.
+    level: Option<f32>,
 }
 
 /// The likelihood near a scene.
@@ -103,6 +105,21 @@ impl Observed {
             taper: Taper::new(&torus, [image.rows, image.columns], shown),
             torus,
             image,
+            level: None,
+        }
+    }
+
+    /// The same image with residuals relative to its mean brightness: far from the maximum the likelihood has fewer other maxima, and it is no longer larger for brighter scenes.
+    pub(super) fn levelled(&self) -> Self {
+        let flat = Field {
+            values: vec![1.0; self.image.values.len()],
+            ..self.image
+        };
+        Self {
+            image: self.image.clone(),
+            torus: Torus::new(self.torus.size),
+            taper: self.taper.clone(),
+            level: Some(self.gain(&flat) as f32),
         }
     }
 
@@ -147,7 +164,7 @@ impl Observed {
         texture: &Texture,
         with_variance: bool,
     ) -> Near {
-        let spectra = self.spectra(parameters, expected);
+        let spectra = self.spectra(parameters, factors.gain, expected);
         let mean = &expected.intensity;
         self.near_by(
             parameters,
@@ -175,7 +192,11 @@ impl Observed {
         let gain = factors.gain as f32;
         let mean = &mean.values;
         let pairs = self.image.values.iter().zip(mean);
-        let left = torus.spectrum(&taper.of(pairs.map(|(i, m)| i / (gain * m) - 1.0)));
+        let residual = |i: f32, m: f32| match self.level {
+            Some(level) => (i - gain * m) / level,
+            None => i / (gain * m) - 1.0,
+        };
+        let left = torus.spectrum(&taper.of(pairs.map(|(i, m)| residual(*i, *m))));
         let slopes = texture.slopes(parameters, factor);
         let slopes: Vec<Option<Vec<f32>>> = slopes
             .par_iter()
@@ -200,8 +221,20 @@ impl Observed {
     }
 
     /// F[w ∂ln μ] by each parameter.
-    pub(super) fn spectra(&self, parameters: &[Parameter], expected: &Expected) -> Vec<Spectrum> {
-        let directions = self.directions(parameters, expected);
+    pub(super) fn spectra(
+        &self,
+        parameters: &[Parameter],
+        gain: f64,
+        expected: &Expected,
+    ) -> Vec<Spectrum> {
+        let mut directions = self.directions(parameters, expected);
+        if let Some(level) = self.level {
+            let factor = gain as f32 / level;
+            for direction in &mut directions {
+                let pixels = direction.values.iter_mut().zip(&expected.intensity.values);
+                pixels.for_each(|(d, m)| *d *= factor * m);
+            }
+        }
         let mut spectra = Vec::new();
         for pair in directions.chunks(2) {
             let [first, last] = [&pair[0], &pair[pair.len() - 1]];
@@ -223,6 +256,7 @@ impl Observed {
             taper: Taper::flat(&torus, size),
             torus,
             image: self.image.clone(),
+            level: self.level,
         }
     }
 
@@ -266,11 +300,13 @@ impl Observed {
                 * (f64::from(left[n].norm_sqr()) / power + (power / self.taper.energy).ln())
         };
         let spectrum: f64 = (0..left.len()).map(term).sum();
-        let jacobian: f64 = mean
-            .iter()
-            .zip(&self.taper.weights.values)
-            .map(|(m, w)| f64::from(w * w) * f64::from(gain * m).ln())
-            .sum();
+        let weighed = mean.iter().zip(&self.taper.weights.values);
+        let jacobian: f64 = match self.level {
+            Some(_) => 0.0,
+            None => weighed
+                .map(|(m, w)| f64::from(w * w) * f64::from(gain * m).ln())
+                .sum(),
+        };
         -0.5 * scale * spectrum - jacobian
     }
 

@@ -138,7 +138,7 @@ pub fn refine(image: &Field, guess: &Scene, priors: &Priors) -> Result<Estimate>
 
 /// Highest maximum that is reached from the starts, with its alternatives.
 pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) -> Result<Estimate> {
-    let Some((first_start, ship)) = starts.first().and_then(|s| Some((s, s.ships.first()?))) else {
+    let Some(ship) = starts.first().and_then(|start| start.ships.first()) else {
         return Err(no_start());
     };
     let ascent = Ascent {
@@ -149,24 +149,17 @@ pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) ->
     };
     let of_ship = Parameter::OF_WAKE.into_iter().filter(|p| p.is_of_ship());
     let of_ship: Vec<Parameter> = of_ship.collect();
+    let levelled = observed.levelled();
     let with_wind = Ascent {
+        observed: &levelled,
         parameters: &of_ship,
         ..ascent
     };
-    // A wrong brightness would be explained as texture.
-    let mean = ExpectedImage::new(first_start, &[])?.intensity(first_start)?;
-    let factors = Factors {
-        gain: observed.gain(&mean),
-        ..Factors::default()
-    };
-    // The ship first, with the wind of the start: a wind that varies before the ship is found explains its residual as texture.
-    let both = |scene: Scene, factors: Factors| -> Result<Point> {
-        let ship = with_wind.climb(scene, factors, SHIP_STEPS)?;
-        ascent.climb(ship.scene, ship.factors, FIRST_STEPS)
-    };
+    // The ship first, with the brightness of the image and the wind of the start: what they explain wrongly would be explained as texture.
     let mut points = Vec::new();
     for start in starts {
-        points.push(both(start.clone(), factors)?);
+        let ship = with_wind.climb(start.clone(), as_bright(observed, start)?, SHIP_STEPS)?;
+        points.push(ascent.climb(ship.scene, ship.factors, FIRST_STEPS)?);
     }
     points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
     let first = points.swap_remove(0);
@@ -178,6 +171,15 @@ pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) ->
     points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
     let open = without_ship(observed, &points[0], priors)?;
     concluded(&ascent, points, open)
+}
+
+/// Factors that give a scene the brightness of the image.
+fn as_bright(observed: &Observed, scene: &Scene) -> Result<Factors> {
+    let mean = ExpectedImage::new(scene, &[])?.intensity(scene)?;
+    Ok(Factors {
+        gain: observed.gain(&mean),
+        ..Factors::default()
+    })
 }
 
 fn no_start() -> Error {

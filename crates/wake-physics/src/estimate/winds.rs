@@ -13,9 +13,9 @@ use rayon::prelude::*;
 /// Number of directions, evenly around the circle.
 const DIRECTIONS: usize = 12;
 
-/// Range of the wind speed [m/s], and bisections of it.
-const SPEEDS: [f64; 2] = [2.0, 16.0];
-const BISECTIONS: usize = 12;
+/// Wind speeds [m/s] between which the brightness is bisected: below some 3 m/s it falls with the wind.
+const SPEEDS: [f64; 8] = [2.0, 2.5, 3.0, 4.0, 6.0, 9.0, 12.0, 16.0];
+const BISECTIONS: usize = 9;
 
 /// A wind, with the mean image and the noise of its open sea.
 pub(super) struct Wind {
@@ -27,16 +27,16 @@ pub(super) struct Wind {
 }
 
 /// Log-likelihood below that of the likeliest wind from which a wind is not followed, and number of followed winds (chosen).
-const HOPELESS: f64 = 50.0;
+const HOPELESS: f64 = 100.0;
 const FOLLOWED: usize = 3;
 
-/// The likeliest winds of different axes: opposite winds draw almost the same wake.
-pub(super) fn likely(winds: &[Wind]) -> Vec<&Wind> {
+/// The likeliest winds whose axes are at least `apart` degrees apart: opposite winds draw almost the same wake.
+pub(super) fn likely(winds: &[Wind], apart: f64) -> Vec<&Wind> {
     let mut kept: Vec<&Wind> = Vec::new();
     for wind in winds {
         let hopeless = wind.log_likelihood < winds[0].log_likelihood - HOPELESS;
         let toward = wind.open.sea.wind_toward;
-        let near = |w: &&Wind| axis_between(w.open.sea.wind_toward, toward).abs() < 45.0;
+        let near = |w: &&Wind| axis_between(w.open.sea.wind_toward, toward).abs() < apart;
         if kept.len() < FOLLOWED && !hopeless && !kept.iter().any(near) {
             kept.push(wind);
         }
@@ -70,7 +70,7 @@ pub(super) fn winds(observed: &Observed, scene: &Scene, bright: Option<f64>) -> 
     Ok(winds)
 }
 
-/// Wind speed that gives the brightness, or the nearest end of the range.
+/// Largest wind speed that gives the brightness, or that of the range that comes nearest.
 fn as_bright(scene: &Scene, bright: f64) -> Result<f64> {
     scene.validate()?;
     let over = |speed: f64| {
@@ -78,8 +78,13 @@ fn as_bright(scene: &Scene, bright: f64) -> Result<f64> {
         scene.sea.wind_speed = speed;
         mean_sigma0(&scene).map_or(f64::NAN, |sigma0| sigma0 - bright)
     };
-    Ok(match over(SPEEDS[0]) > 0.0 {
-        true => SPEEDS[0],
-        false => root(over, SPEEDS, BISECTIONS),
-    })
+    let off = SPEEDS.map(over);
+    let crossed = (1..SPEEDS.len())
+        .rev()
+        .find(|&n| off[n - 1] <= 0.0 && off[n] > 0.0);
+    if let Some(n) = crossed {
+        return Ok(root(over, [SPEEDS[n - 1], SPEEDS[n]], BISECTIONS));
+    }
+    let nearest = (0..SPEEDS.len()).min_by(|&a, &b| off[a].abs().total_cmp(&off[b].abs()));
+    Ok(nearest.map_or(SPEEDS[0], |n| SPEEDS[n]))
 }

@@ -10,4 +10,3 @@ mod bounds;
 mod derivatives;
 mod refined;
 mod report;
-mod probe;
