@@ -122,6 +122,14 @@ fn in_json(found: &Estimate) -> Value {
         ("over_open_sea".to_owned(), json!(found.over_open_sea)),
         ("goodness_of_fit".to_owned(), json!(found.power)),
         ("identifiable".to_owned(), json!(found.identifiable)),
+        (
+            "radial_velocity_by_echo".to_owned(),
+            json!(found.by_echo.map(|echo| echo[0])),
+        ),
+        (
+            "radial_velocity_by_echo_sd".to_owned(),
+            json!(found.by_echo.map(|echo| echo[1])),
+        ),
     ]);
     json!({ "wakes": [wake] })
 }
@@ -148,6 +156,11 @@ fn in_words(found: &Estimate) -> String {
         lines.push(format!(
             "or {speed:.2} m/s with wind toward {toward:.0} deg: probability {:.2}",
             other.weight
+        ));
+    }
+    if let Some([velocity, deviation]) = found.by_echo {
+        lines.push(format!(
+            "velocity toward the radar by the echo alone: {velocity:.2} ± {deviation:.2} m/s"
         ));
     }
     lines.push(format!(

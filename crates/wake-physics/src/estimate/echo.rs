@@ -1,7 +1,8 @@
-//! Pixels that a ship's echo covers, which the mean image does not describe.
+//! Pixels that a ship's echo covers, which the mean image does not describe, and the echo's displacement.
 
-use crate::raster::Field;
+use crate::raster::{Field, Raster};
 use crate::scene::Scene;
+use crate::track::Track;
 
 /// Brightness over the median from which a pixel belongs to an echo: far above speckle of one look and the brightest waves (chosen).
 const BRIGHT: f32 = 40.0;
@@ -9,10 +10,19 @@ const BRIGHT: f32 = 40.0;
 /// Distance from such a pixel that is left out \[m\], beside twice the resolution (chosen).
 const AROUND: f64 = 20.0;
 
+/// Part of the ship's length by which the middle of its echo is off midship: standard deviation (chosen).
+const OFF_MIDSHIP: f64 = 0.15;
+
+/// Fastest ship whose echo is looked for [m/s].
+const FASTEST: f64 = 17.0;
+
 /// Echoes of an image.
 pub(super) struct Echo {
     columns: usize,
     covered: Vec<bool>,
+    /// (x, y) and brightness of bright pixels.
+    bright: Vec<([f64; 2], f64)>,
+    resolution: f64,
 }
 
 impl Echo {
@@ -28,8 +38,11 @@ impl Echo {
         let around = AROUND + 2.0 * resolution.max(scene.radar.azimuth_resolution);
         let reach = (around / scene.grid.spacing).ceil() as usize;
         let mut covered = vec![false; image.values.len()];
-        for (n, _) in image.values.iter().enumerate().filter(|(_, v)| **v > limit) {
+        let raster = Raster::image(image.rows, image.columns, scene.grid.spacing);
+        let mut bright = Vec::new();
+        for (n, value) in image.values.iter().enumerate().filter(|(_, v)| **v > limit) {
             let (i, j) = (n / image.columns, n % image.columns);
+            bright.push(([raster.x(j), raster.y(i)], f64::from(*value)));
             for row in i.saturating_sub(reach)..(i + reach + 1).min(image.rows) {
                 let start = row * image.columns;
                 let [from, to] = [j.saturating_sub(reach), (j + reach + 1).min(image.columns)];
@@ -39,7 +52,40 @@ impl Echo {
         Self {
             columns: image.columns,
             covered,
+            bright,
+            resolution: resolution.max(scene.radar.azimuth_resolution),
         }
+    }
+
+    /// Velocity of a scene's ship toward the radar by the azimuth displacement of its echo, (y of the echo − y of midship)/(R/V), and its standard deviation [m/s]; `None` without an echo at
+    /// the ship's range.
+    ///
+    /// - `deviation` of the ship's y \[m\]
+    pub(super) fn radial_velocity(&self, scene: &Scene, deviation: f64) -> Option<[f64; 2]> {
+        let ship = scene.ships.first()?;
+        let ratio = scene.radar.range_to_velocity;
+        let track = Track::new(ship.position, ship.heading, ship.speed * scene.sea.time);
+        let [x, y] = track.position;
+        let size = 0.5 * ship.length + 2.0 * self.resolution;
+        let reach = ratio * FASTEST * scene.radar.incidence.to_radians().sin() + size;
+        let near = |place: &[f64; 2], [x, y]: [f64; 2], [across, along]: [f64; 2]| {
+            (place[0] - x).abs() < across && (place[1] - y).abs() < along
+        };
+        let of_ship = self
+            .bright
+            .iter()
+            .filter(|(place, _)| near(place, [x, y], [size, reach]));
+        let (brightest, _) = of_ship.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let body = self
+            .bright
+            .iter()
+            .filter(|(place, _)| near(place, *brightest, [size; 2]));
+        let (sum, total) = body.fold((0.0, 0.0), |(sum, total), (place, value)| {
+            (sum + value * place[1], total + value)
+        });
+        let along = OFF_MIDSHIP * ship.length * ship.heading.to_radians().cos();
+        let off = along.hypot(deviation).hypot(0.25 * self.resolution);
+        (ratio > 0.0).then(|| [(sum / total - y) / ratio, off / ratio])
     }
 
     /// Weight of a pixel: 0 under an echo.

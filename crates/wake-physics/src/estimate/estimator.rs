@@ -88,7 +88,12 @@ pub fn estimate(
     let mut found = settled(&observed, &starts, priors)?;
     let [speed, _] = found.of(Parameter::Value(Value::Speed));
     found.identifiable &= TAU * speed * speed / GRAVITY > SHORTEST;
-    Ok(found)
+    let [_, deviation] = found.of(Parameter::Value(Value::Y));
+    found.by_echo = echo.radial_velocity(&found.scene, deviation);
+    Ok(match found.by_echo {
+        Some([velocity, deviation]) => found.with_radial_velocity(velocity, deviation),
+        None => found,
+    })
 }
 
 /// Search with one wind.

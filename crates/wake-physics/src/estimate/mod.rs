@@ -19,6 +19,7 @@ mod noise;
 mod observed;
 mod parameter;
 mod priors;
+mod radial;
 mod refined;
 mod sea;
 mod search;

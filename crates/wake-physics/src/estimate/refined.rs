@@ -7,13 +7,16 @@ use super::observed::Observed;
 use super::parameter::{Factors, Parameter};
 use super::priors::Priors;
 use super::value::Value;
+use crate::constants::GRAVITY;
 use crate::error::{Error, Result};
 use crate::linear::OpenSea;
 use crate::measure::angle_between;
 use crate::models::Models;
 use crate::raster::Field;
 use crate::scene::Scene;
+use crate::track::Track;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// Estimate of one value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -56,6 +59,8 @@ pub struct Estimate {
     pub over_open_sea: f64,
     /// Power of the residual over its expectation in rings of wavenumbers, longest waves first; 1 for a perfect model.
     pub power: Vec<f64>,
+    /// Velocity of the ship toward the radar by the displacement of its echo alone, and its standard deviation [m/s]; [`estimate`](super::estimate) uses it.
+    pub by_echo: Option<[f64; 2]>,
     /// Whether the estimate passes the tests of [`refine`].
     pub identifiable: bool,
 }
@@ -93,7 +98,7 @@ const AROUND: [[f64; 2]; 5] = [
 /// Smallest log-likelihood ratio of a certain wake: fitting ten values to noise gains about 10 (chosen).
 const CERTAIN: f64 = 20.0;
 
-/// Largest acceptable misfit, and largest factors on brightness and texture in standard deviations of their priors (chosen).
+/// Largest acceptable misfit, and largest factors on brightness and texture in standard deviations of prior and estimate together (chosen).
 const EXPLAINED: f64 = 1.25;
 const USUAL: [f64; 2] = [3.0, 2.0];
 
@@ -107,7 +112,7 @@ const DOUBT: f64 = 0.05;
 /// information times a factor for the error of the mean image (1.5 to 5, measured on simulated scenes).
 ///
 /// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
-/// standard deviations), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.
+/// standard deviations of prior and estimate together), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.
 ///
 /// - `image`: intensity with speckle, in the unit of σ⁰, `[rows, columns]` of the scene's grid
 /// - `guess`: known radar, grid and water, and a guess of ship and wind
@@ -156,14 +161,24 @@ pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) ->
         ..ascent
     };
     // The ship first, with the brightness of the image and the wind of the start: what they explain wrongly would be explained as texture.
+    let both = |scene: Scene, factors: Factors| -> Result<Point> {
+        let ship = with_wind.climb(scene, factors, SHIP_STEPS)?;
+        ascent.climb(ship.scene, ship.factors, FIRST_STEPS)
+    };
     let mut points = Vec::new();
     for start in starts {
-        let ship = with_wind.climb(start.clone(), as_bright(observed, start)?, SHIP_STEPS)?;
-        points.push(ascent.climb(ship.scene, ship.factors, FIRST_STEPS)?);
+        points.push(both(start.clone(), as_bright(observed, start)?)?);
     }
     points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
     let first = points.swap_remove(0);
-    let first = ascent.climb(first.scene, first.factors, STEPS)?;
+    let mut first = ascent.climb(first.scene, first.factors, STEPS)?;
+    // Crests look alike: the ship may be one transverse wave ahead or astern.
+    for waves in [-1.0, 1.0] {
+        let there = both(along(&first.scene, waves), first.factors)?;
+        if there.log_posterior > first.log_posterior {
+            first = ascent.climb(there.scene, there.factors, STEPS)?;
+        }
+    }
     let mut opposite = first.scene.clone();
     opposite.sea.wind_toward = (opposite.sea.wind_toward + 180.0).rem_euclid(360.0);
     points.push(ascent.climb(opposite, first.factors, STEPS)?);
@@ -171,6 +186,16 @@ pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) ->
     points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
     let open = without_ship(observed, &points[0], priors)?;
     concluded(&ascent, points, open)
+}
+
+/// A scene with its ship some transverse waves ahead.
+fn along(scene: &Scene, waves: f64) -> Scene {
+    let mut scene = scene.clone();
+    if let Some(ship) = scene.ships.first_mut() {
+        let ahead = waves * TAU * ship.speed * ship.speed / GRAVITY;
+        ship.position = Track::new(ship.position, ship.heading, ahead).position;
+    }
+    scene
 }
 
 /// Factors that give a scene the brightness of the image.
@@ -311,6 +336,7 @@ fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estim
         log_likelihood: best.near.log_likelihood,
         over_open_sea,
         power: best.near.rings.iter().map(|ring| ring[0]).collect(),
+        by_echo: None,
         identifiable: false,
         values,
     };
@@ -320,9 +346,13 @@ fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estim
 
 /// Tests of [`refine`].
 fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
-    let off = |parameter: Parameter| found.of(parameter)[0].abs();
-    let usual = off(Parameter::Gain) < USUAL[0] * priors.gain
-        && off(Parameter::Texture) < USUAL[1] * priors.texture;
+    // Of a factor in standard deviations of its prior and of its estimate together.
+    let is_usual = |parameter: Parameter, prior: f64, limit: f64| {
+        let [value, deviation] = found.of(parameter);
+        value.abs() < limit * prior.hypot(deviation)
+    };
+    let usual = is_usual(Parameter::Gain, priors.gain, USUAL[0])
+        && is_usual(Parameter::Texture, priors.texture, USUAL[1]);
     // Largest acceptable misfit, and three standard deviations of the mean over a ring.
     let explained =
         best.near.rings.iter().all(|&[power, count]| {

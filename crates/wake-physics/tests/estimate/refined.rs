@@ -54,14 +54,19 @@ fn a_ship_is_found_from_a_guess_and_only_where_there_is_one() {
 fn a_ship_is_found_from_a_sighting_at_any_speed() {
     let scene = small(&["grid.rows=128", "grid.columns=128", "ship.speed=7.5"]);
     let mut image = simulate(&scene).unwrap().speckled;
-    // An echo, where the ship shifts it to.
+    // An echo, where the ship's velocity toward the radar shifts it to.
+    let [x, y] = scene.ships[0].position;
+    let incidence = scene.radar.incidence.to_radians();
+    let toward_radar = -7.5 * 60f64.to_radians().sin() * incidence.sin();
+    let shift = scene.radar.range_to_velocity * toward_radar;
+    let column = (64.0 + x / 4.0).round() as usize;
+    let row = (64.0 - (y + shift) / 4.0).round() as usize;
     for n in [0, 1, 128, 129] {
-        image.values[40 * 128 + 80 + n] = 300.0;
+        image.values[row * 128 + column + n] = 300.0;
     }
     let mut known = scene.clone();
     (known.ships[0].speed, known.ships[0].heading) = (12.0, 200.0);
     known.sea.wind_toward += 140.0;
-    let [x, y] = scene.ships[0].position;
     let sighting = Sighting::new([x + 40.0, y - 30.0], scene.ships[0].heading + 3.0);
     let found = estimate(&image, &known, &sighting, &Priors::default()).unwrap();
     let ship = [
@@ -79,6 +84,12 @@ fn a_ship_is_found_from_a_sighting_at_any_speed() {
         );
     }
     assert!(found.identifiable, "{found:?}");
+    let [velocity, deviation] = found.by_echo.unwrap();
+    let off_velocity = velocity - toward_radar;
+    assert!(
+        off_velocity.abs() < 3.0 * deviation && deviation < 0.5,
+        "{velocity} ± {deviation}"
+    );
     let raw = image.values.iter().map(|v| 7.0 * v).collect();
     let raw = wake_physics::Field {
         values: raw,
