@@ -35,7 +35,9 @@ fn estimate<'py>(
         place.or(of_ship.map(|s| s.place)),
         heading.or(of_ship.map(|s| s.heading)),
     ) else {
-        return Err(Fault::option("known has no ship: add one with the assumed hull".to_owned()).into());
+        return Err(
+            Fault::option("known has no ship: add one with the assumed hull".to_owned()).into(),
+        );
     };
     let sighting = Sighting {
         place,
@@ -45,7 +47,9 @@ fn estimate<'py>(
     };
     let priors = priors(calibrated);
     let found = run(py, threads, || {
-        Ok(wake_physics::estimate::estimate(&image, &known.0, &sighting, &priors)?)
+        Ok(wake_physics::estimate::estimate(
+            &image, &known.0, &sighting, &priors,
+        )?)
     })?;
     let [values, sds] = [PyDict::new(py), PyDict::new(py)];
     for one in &found.values {
@@ -90,7 +94,11 @@ fn bound<'py>(
         .collect();
     let priors = priors(calibrated);
     let found = run(py, threads, || {
-        Ok(wake_physics::estimate::bound(&scene.0, &parameters, &priors)?)
+        Ok(wake_physics::estimate::bound(
+            &scene.0,
+            &parameters,
+            &priors,
+        )?)
     })?;
     let out = PyDict::new(py);
     for (parameter, deviation) in found.deviations {

@@ -3,6 +3,8 @@
 use super::line::line;
 use crate::exit::Outcome;
 use crate::sheet::Picture;
+use image::{ImageDecoder, ImageReader};
+use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 use wake_geo::Product;
@@ -16,26 +18,115 @@ const OFF: ([f64; 2], f64) = ([40.0, -30.0], 2.0);
 /// Reads the pixels of a scene's grid.
 ///
 /// - `at`: row and column of the first in the image
-pub(super) fn read(path: &Path, at: Option<[usize; 2]>, scene: &Scene) -> Outcome<Field> {
+/// - `grey`: meaning of the levels of a picture
+pub(super) fn read(
+    path: &Path,
+    at: Option<[usize; 2]>,
+    grey: Option<&GreyScale>,
+    scene: &Scene,
+) -> Outcome<Field> {
+    let asked = (scene.grid.rows, scene.grid.columns);
+    if path.extension().is_some_and(|e| e == "safetensors") {
+        let field = speckled(path)?;
+        let [row, column] = first(at, (field.rows, field.columns), asked)?;
+        return part(&field, [row, column], asked);
+    }
     let product = Product::open(path)?;
-    let (rows, columns) = (scene.grid.rows, scene.grid.columns);
-    let [row, column] = match at {
-        Some(first) => first,
-        _ if product.size() == (rows, columns) => [0, 0],
-        _ => {
-            let (lines, pixels) = product.size();
-            return Err(format!(
-                "--image has {lines} x {pixels} pixels but the scene's grid {rows} x {columns}: name the first of them with --at"
-            )
-            .into());
-        }
-    };
+    let [row, column] = first(at, product.size(), asked)?;
     let end = |first: usize, count: usize| first..first.saturating_add(count);
-    let window = product.read_window(end(row, rows), end(column, columns))?;
+    let window = product.read_window(end(row, asked.0), end(column, asked.1))?;
+    let mut field = Field {
+        rows: asked.0,
+        columns: asked.1,
+        values: window.values,
+    };
+    if let Some(grey) = grey {
+        let white = white(path)?;
+        for value in &mut field.values {
+            *value = grey.sigma0(f64::from(*value) / white) as f32;
+        }
+    }
+    Ok(field)
+}
+
+/// Row and column of the grid's first pixel.
+fn first(
+    at: Option<[usize; 2]>,
+    (lines, pixels): (usize, usize),
+    (rows, columns): (usize, usize),
+) -> Outcome<[usize; 2]> {
+    match at {
+        Some(first) => Ok(first),
+        None if (lines, pixels) == (rows, columns) => Ok([0, 0]),
+        None => Err(format!(
+            "--image has {lines} x {pixels} pixels but the scene's grid {rows} x {columns}: name the first of them with --at"
+        )
+        .into()),
+    }
+}
+
+/// A part of a field.
+fn part(
+    field: &Field,
+    [row, column]: [usize; 2],
+    (rows, columns): (usize, usize),
+) -> Outcome<Field> {
+    let inside = |first: usize, count: usize, of: usize| {
+        first.checked_add(count).is_some_and(|end| end <= of)
+    };
+    if !inside(row, rows, field.rows) || !inside(column, columns, field.columns) {
+        return Err(format!(
+            "--at {row},{column}: {rows} x {columns} pixels from there leave the image of {} x {}",
+            field.rows, field.columns
+        )
+        .into());
+    }
+    let lines = field.values.chunks(field.columns).skip(row).take(rows);
     Ok(Field {
         rows,
         columns,
-        values: window.values,
+        values: lines
+            .flat_map(|line| line[column..column + columns].iter().copied())
+            .collect(),
+    })
+}
+
+/// The image with speckle that `wake simulate` wrote.
+fn speckled(path: &Path) -> Outcome<Field> {
+    let bytes = whole_files::read_bytes(path)?;
+    let refused = |why: &str| {
+        format!(
+            "{}: {why}; `wake simulate` writes such files",
+            path.display()
+        )
+    };
+    let tensors = SafeTensors::deserialize(&bytes).map_err(|error| refused(&error.to_string()))?;
+    let tensor = tensors
+        .tensor("speckled")
+        .map_err(|_| refused("no tensor `speckled`"))?;
+    let (&[rows, columns], Dtype::F32) = (tensor.shape(), tensor.dtype()) else {
+        return Err(refused("`speckled` is no image of 32-bit numbers").into());
+    };
+    let values = tensor.data().as_chunks().0.iter().copied();
+    Ok(Field {
+        rows,
+        columns,
+        values: values.map(f32::from_le_bytes).collect(),
+    })
+}
+
+/// Level of white: that of 8 or of 16 bits.
+fn white(path: &Path) -> Outcome<f64> {
+    let colour = ImageReader::open(path)?
+        .with_guessed_format()?
+        .into_decoder()?
+        .color_type();
+    Ok(match colour.bytes_per_pixel() / colour.channel_count() {
+        1 => 255.0,
+        2 => 65_535.0,
+        _ => {
+            return Err(format!("{}: --grey is for images of 8 or 16 bits", path.display()).into());
+        }
     })
 }
 
@@ -172,4 +263,60 @@ fn in_words(found: &Estimate) -> String {
         found.misfit()
     ));
     lines.join("\n")
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+    use wake_physics::grey::Mapping;
+    use wake_physics::output::{write_fields, write_png};
+
+    /// A window of fields and of a picture; what is no such file names what is.
+    #[test]
+    fn windows_are_those_of_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let levels: Vec<u8> = (0..30).map(|n| 8 * n).collect();
+        let grey = GreyScale {
+            darkest_db: -30.0,
+            brightest_db: -5.0,
+            mapping: Mapping::Decibel,
+        };
+        let sigma0 = levels.iter().map(|&l| grey.sigma0_of_level(l) as f32);
+        let field = Field {
+            rows: 5,
+            columns: 6,
+            values: sigma0.collect(),
+        };
+        write_fields(&at("a.safetensors"), &[("speckled", &field)], None).unwrap();
+        write_png(&at("a.png"), &levels, 5, 6).unwrap();
+        let mut scene = Scene::default();
+        (scene.grid.rows, scene.grid.columns) = (2, 3);
+        let expected: Vec<f32> = [8, 9, 10, 14, 15, 16].map(|n| field.values[n]).to_vec();
+        for (name, grey) in [("a.safetensors", None), ("a.png", Some(&grey))] {
+            let found = read(&at(name), Some([1, 2]), grey, &scene).unwrap();
+            let pairs = found.values.iter().zip(&expected);
+            // Grey of 8 bits has the values of its levels.
+            assert!(
+                pairs.clone().all(|(a, b)| (a / b - 1.0).abs() < 1e-5),
+                "{name}"
+            );
+            assert_eq!((found.rows, found.columns, found.values.len()), (2, 3, 6));
+            let all = read(&at(name), None, grey, &scene).unwrap_err().to_string();
+            assert!(all.contains("--at") && all.contains("5 x 6"), "{all}");
+            assert!(read(&at(name), Some([4, 0]), grey, &scene).is_err());
+        }
+        write_fields(&at("b.safetensors"), &[("sigma0", &field)], None).unwrap();
+        std::fs::write(at("c.safetensors"), b"no tensors").unwrap();
+        for name in ["b.safetensors", "c.safetensors"] {
+            let error = read(&at(name), Some([0, 0]), None, &scene)
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.contains(name) && error.contains("wake simulate"),
+                "{error}"
+            );
+        }
+    }
 }

@@ -10,6 +10,7 @@ use crate::exit::{self, Outcome};
 use clap::Args;
 use std::path::PathBuf;
 use wake_physics::estimate::{Priors, Sighting, estimate};
+use wake_physics::grey::{GreyScale, Mapping};
 use wake_physics::{Scene, simulate};
 
 /// Estimate ship and wind from an image of a wake, with error bars.
@@ -23,12 +24,15 @@ use wake_physics::{Scene, simulate};
                         Meaning and limits: docs/estimate.md"
 )]
 pub(crate) struct Arguments {
-    /// Image of σ⁰ with speckle: TIFF of floats (as `wake simulate --export tiff` writes), or a Sentinel-1 product with --at
+    /// Image of σ⁰ with speckle: fields.safetensors of `wake simulate`, TIFF of floats, grey PNG or TIFF with --grey, or a Sentinel-1 product with --at
     #[arg(long, value_name = "FILE", conflicts_with = "bound")]
     image: Option<PathBuf>,
     /// First row and column of the scene's grid in the image
     #[arg(long, value_name = "ROW,COLUMN", value_parser = row_and_column, requires = "image")]
     at: Option<[usize; 2]>,
+    /// Levels of the image are linear in amplitude from black to white, the decibels of σ⁰ given here; with a third word `decibel` linear in decibels
+    #[arg(long, value_name = "BLACK,WHITE", value_parser = grey, requires = "image", allow_hyphen_values = true)]
+    grey: Option<GreyScale>,
     /// Write a PNG of the image, the mean image of the estimate, and their ratio
     #[arg(long, value_name = "FILE", conflicts_with = "bound")]
     picture: Option<PathBuf>,
@@ -73,7 +77,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
             let sighting = Sighting::of_ship(&scene);
             let sighting = sighting.ok_or("the scene has no ship: name its place and heading")?;
             let (field, sighting) = match &arguments.image {
-                Some(path) => (image::read(path, arguments.at, &scene)?, sighting),
+                Some(path) => {
+                    let field = image::read(path, arguments.at, arguments.grey.as_ref(), &scene)?;
+                    (field, sighting)
+                }
                 None => (simulate(&scene)?.speckled, image::mistaken(&sighting)),
             };
             let found = estimate(&field, &scene, &sighting, &priors)?;
@@ -91,6 +98,28 @@ fn example() -> Scene {
     let mut scene = Scene::default();
     (scene.grid.rows, scene.grid.columns, scene.grid.spacing) = (256, 256, 4.0);
     scene
+}
+
+/// Two levels in decibels, and perhaps the mapping between them.
+fn grey(text: &str) -> Result<GreyScale, String> {
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let mapping = match parts.get(2) {
+        None | Some(&"amplitude") => Mapping::Amplitude,
+        Some(&"decibel") => Mapping::Decibel,
+        Some(other) => return Err(format!("the mapping {other} is not amplitude or decibel")),
+    };
+    let number = |n: usize| parts.get(n).and_then(|part| part.parse().ok());
+    let (Some(darkest_db), Some(brightest_db), true) = (number(0), number(1), parts.len() < 4)
+    else {
+        return Err("it is two numbers of decibels such as -25,-3".to_owned());
+    };
+    let grey = GreyScale {
+        darkest_db,
+        brightest_db,
+        mapping,
+    };
+    grey.validate().map_err(|error| error.to_string())?;
+    Ok(grey)
 }
 
 /// Two numbers with a comma between them.
