@@ -56,12 +56,18 @@ fn estimate<'py>(
         values.set_item(one.parameter.name(), one.value)?;
         sds.set_item(one.parameter.name(), one.deviation)?;
     }
+    let about = PyDict::new(py);
+    about.set_item("misfit", found.misfit())?;
+    about.set_item(
+        "by_echo",
+        found
+            .by_echo
+            .map(|[velocity, deviation]| (velocity, deviation)),
+    )?;
     let others = PyList::empty(py);
     for other in found.alternatives {
         others.append((PyScene(other.scene), other.weight))?;
     }
-    let about = PyDict::new(py);
-    about.set_item("misfit", found.misfit())?;
     about.set_item("scene", Py::new(py, PyScene(found.scene))?)?;
     about.set_item("values", values)?;
     about.set_item("deviations", sds)?;

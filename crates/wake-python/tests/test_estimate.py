@@ -15,7 +15,7 @@ def test_a_ship_is_found_from_a_wrong_place() -> None:
     image = simulate(scene).speckled
     found = estimate(image, scene, place=(150, 40), heading=61.5)
     assert found.identifiable and found.mean.shape == image.shape
-    truth = {"speed": 9.0, "heading": 60.0, "x": 120.0, "y": 60.0}
+    truth = {"speed": 9.0, "heading": 60.0, "x": 120.0, "y": 60.0, "length": 195.0}
     for name, value in truth.items():
         assert abs(found.values[name] - value) < 4 * found.deviations[name], name
     # No estimate is better than the bound.

@@ -109,7 +109,8 @@ const DOUBT: f64 = 0.05;
 /// Maximum-likelihood estimate of ship and wind near a guess.
 ///
 /// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind. Standard deviations are those of the
-/// information times a factor for the error of the mean image (1.5 to 5, measured on simulated scenes).
+/// information times a factor for the error of the mean image (1.5 to 5, measured on simulated scenes). That of y also contains the shift by bright waves, which has another sign
+/// if the wind is reversed.
 ///
 /// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
 /// standard deviations of prior and estimate together), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.
@@ -301,6 +302,11 @@ fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estim
         let count = factors.len();
         for (n, value) in covariance.values.iter_mut().enumerate() {
             *value *= factors[n / count] * factors[n % count];
+        }
+        // The wind may be reversed, so the correction of the position is as uncertain as it is large.
+        let y = Parameter::Value(Value::Y);
+        if let Some(n) = ascent.parameters.iter().position(|p| *p == y) {
+            covariance.add(n, n, drift(&best.scene).powi(2));
         }
     }
     let deviation = |n: usize| {

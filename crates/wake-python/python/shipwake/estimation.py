@@ -55,6 +55,8 @@ class Estimate:
     """Power of the residual over its expectation in rings of wavenumbers, longest waves first: 1 for a perfect model."""
     misfit: float
     """Largest deviation of ``power`` from 1, as a factor."""
+    by_echo: tuple[float, float] | None
+    """Velocity toward the radar by the displacement of the ship's echo alone, and its standard deviation [m/s]."""
 
 
 def estimate(
