@@ -2,9 +2,10 @@
 
 use super::expected::ExpectedImage;
 use super::matrix::Matrix;
-use super::observed::{Near, Observed, Texture};
+use super::observed::{Near, Observed};
 use super::parameter::{Factors, Parameter};
 use super::priors::{Priors, values_of};
+use super::texture::Texture;
 use super::torus::Spectrum;
 use super::value::Value;
 use crate::error::Result;

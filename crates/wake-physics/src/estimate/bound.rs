@@ -2,9 +2,10 @@
 
 use super::expected::ExpectedImage;
 use super::matrix::Matrix;
-use super::observed::{Observed, Texture};
+use super::observed::Observed;
 use super::parameter::{Factors, Parameter};
 use super::priors::{Priors, values_of};
+use super::texture::Texture;
 use super::torus::Torus;
 use crate::error::Result;
 use crate::raster::Field;

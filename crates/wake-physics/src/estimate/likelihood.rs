@@ -19,9 +19,10 @@
 //! Whittle (1953), Ark. Mat. 2, 423; Godambe (1960), Ann. Math. Stat. 31, 1208.
 
 use super::expected::{Expected, ExpectedImage};
-use super::observed::{Observed, Texture};
+use super::observed::Observed;
 use super::parameter::{Factors, Parameter};
 use super::priors::values_of;
+use super::texture::Texture;
 use crate::error::{Error, Result};
 use crate::raster::Field;
 use crate::scene::Scene;

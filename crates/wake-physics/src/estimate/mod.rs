@@ -25,6 +25,7 @@ mod sea;
 mod search;
 mod sighting;
 mod similar;
+mod texture;
 mod torus;
 mod value;
 mod winds;

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 use wake_train::evaluation::{AbsoluteErrors, EstimateRow, EstimatedImage};
 
-use super::Line;
+use super::lines::Line;
 use super::sets::Set;
 
 /// Guess of every speed, the middle of the paper's range \[m/s\]: the row that nothing may be worse than.

@@ -15,7 +15,7 @@ use wake_train::detector::judging::Tile;
 use wake_train::evaluation::{HeldOut, ImageSource, ToEstimate, Told, View};
 
 use super::super::detector::real;
-use super::Options;
+use super::options::Options;
 use crate::exit::Outcome;
 
 /// Seed of the scenes of the recipe detector; no training has it.
