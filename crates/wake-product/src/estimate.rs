@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::scenes::{Scenes, Wind, in_part, in_scene, on_map, sentinel};
 
 /// Largest rows and columns of the estimated part.
-const SIDE: usize = 256;
+const SIDE: usize = 128;
 
 /// Part of the side that the middle of the estimated part lies astern of the wake's tip.
 const ASTERN: f64 = 0.25;
@@ -29,7 +29,7 @@ pub struct MappedEstimate {
 
 /// Estimates ship and wind around a wake of a Sentinel-1 product.
 ///
-/// σ⁰ of at most 256 × 256 pixels around the wake is read with its thermal noise; pixels darker than the noise count as noise. The radar is that of the
+/// σ⁰ of at most 128 × 128 pixels around the wake is read with its thermal noise; pixels darker than the noise count as noise. The radar is that of the
 /// annotation, the water deep, the hull form that of the default scene.
 ///
 /// - `tip`: line and pixel where the wake begins

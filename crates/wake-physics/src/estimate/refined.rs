@@ -365,7 +365,7 @@ fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
             power.max(power.recip()) < EXPLAINED + 3.0 / count.max(1.0).sqrt()
         });
     let [speed, deviation] = found.of(Parameter::Value(Value::Speed));
-    let is_other = |a: &&Alternative| (Value::Speed.of(&a.scene) / speed).ln().abs() > SAME_SPEED;
+    let is_other = |a: &&Alternative| (Value::Speed.of(&a.scene) / speed).ln().abs() > OTHER_SPEED;
     let others = found.alternatives.iter().filter(is_other);
     let doubt: f64 = others.map(|a| a.weight).sum();
     usual
@@ -405,8 +405,9 @@ fn drift(scene: &Scene) -> f64 {
     models.range_to_velocity * waves.sum::<f64>()
 }
 
-/// Relative difference below which two speeds are the same.
+/// Relative difference below which two speeds are the same, and above which they are fringes apart: a fringe is a transverse wavelength over twice the wake's length, some 4 %.
 const SAME_SPEED: f64 = 0.005;
+const OTHER_SPEED: f64 = 0.02;
 
 /// Whether two scenes belong to the same maximum.
 fn same(a: &Scene, b: &Scene) -> bool {
