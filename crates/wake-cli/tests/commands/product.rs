@@ -78,18 +78,14 @@ fn a_ship_on_the_map_is_found_on_the_map() {
     assert!(best["sure"] == true, "{best}");
     let turn = best["heading"].as_f64().expect("a heading") - 120.0;
     assert!(turn.abs() < 5.0, "{best}");
-    // A wrong estimate says that it is one.
+    // Lines and pixels of a product are not equally far apart: 1 % of the speed beside its error bar.
     let ship = &best["ship"];
     let number = |name: &str| ship[name].as_f64().expect("a number");
-    if ship["identifiable"] == true {
-        assert!(
-            (number("speed") - 8.0).abs() < 3.0 * number("speed_deviation"),
-            "{ship}"
-        );
-        let turn = number("heading") - 120.0;
-        assert!(turn.abs() < 3.0 * number("heading_deviation"), "{ship}");
-    }
-    println!("{ship}");
+    assert!(ship["identifiable"] == true, "{ship}");
+    let off = (number("speed") - 8.0).abs();
+    assert!(off < 3.0 * number("speed_deviation") + 0.08, "{ship}");
+    let turn = (number("heading") - 120.0).abs();
+    assert!(turn < 3.0 * number("heading_deviation"), "{ship}");
     for name in [
         "report.html",
         "wakes.csv",
