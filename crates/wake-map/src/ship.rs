@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Ship and wind estimated from the image of a wake, in directions of the map; the estimator is the caller's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EstimatedShip {
-    /// Whether the image determines the values; the others mean nothing if it does not.
+    /// True if the estimate passed its tests; otherwise do not use the other values.
     pub identifiable: bool,
     /// Speed through the water \[m/s\], and its standard deviation.
     pub speed: f64,

@@ -61,7 +61,7 @@ pub(crate) struct ProductArguments {
     /// Sea closer to land than this is left out [m]
     #[arg(long, value_name = "N", default_value_t = 1000.0)]
     pub(super) coast: f64,
-    /// Estimate speed, heading and wind of each sure wake of a Sentinel-1 product, with standard deviations; up to a minute a wake
+    /// Estimate speed, heading and wind of each sure wake of a Sentinel-1 product, with standard deviations; a minute or two a wake
     #[cfg(feature = "simulate")]
     #[arg(long)]
     pub(super) estimate: bool,

@@ -151,7 +151,7 @@ fn share(bound: f64) -> f64 {
     ((bound / low).ln() / (high / low).ln()).clamp(0.0, 1.0)
 }
 
-/// Dark blue for a speed that is told well, to pale yellow.
+/// Colour of a bound: dark blue for the smallest, pale yellow for the largest.
 fn colour(bound: f64) -> RGBColor {
     const STOPS: [[f64; 3]; 5] = [
         [8.0, 29.0, 88.0],

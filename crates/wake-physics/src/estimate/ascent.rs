@@ -21,10 +21,10 @@ pub(super) struct Point {
     pub(super) log_posterior: f64,
 }
 
-/// Smallest part of a step that is tried.
+/// Smallest part of a step that is tried (chosen).
 const SHORTEST: f64 = 0.05;
 
-/// Smallest gain relative to its prediction with which derivatives are kept.
+/// Smallest gain relative to its prediction with which derivatives are kept (chosen).
 const TRUSTED: f64 = 0.6;
 
 /// Length of the last step, in standard deviations of the information: errors of the mean image are larger.

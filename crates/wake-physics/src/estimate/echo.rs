@@ -1,5 +1,6 @@
 //! Pixels that a ship's echo covers, which the mean image does not describe, and the echo's displacement.
 
+use super::search::SPEEDS;
 use crate::raster::{Field, Raster};
 use crate::scene::Scene;
 use crate::track::Track;
@@ -12,9 +13,6 @@ const AROUND: f64 = 20.0;
 
 /// Part of the ship's length by which the middle of its echo is off midship: standard deviation (chosen).
 const OFF_MIDSHIP: f64 = 0.15;
-
-/// Fastest ship whose echo is looked for [m/s].
-const FASTEST: f64 = 17.0;
 
 /// Echoes of an image.
 pub(super) struct Echo {
@@ -67,7 +65,7 @@ impl Echo {
         let track = Track::new(ship.position, ship.heading, ship.speed * scene.sea.time);
         let [x, y] = track.position;
         let size = 0.5 * ship.length + 2.0 * self.resolution;
-        let reach = ratio * FASTEST * scene.radar.incidence.to_radians().sin() + size;
+        let reach = ratio * SPEEDS[1] * scene.radar.incidence.to_radians().sin() + size;
         let near = |place: &[f64; 2], [x, y]: [f64; 2], [across, along]: [f64; 2]| {
             (place[0] - x).abs() < across && (place[1] - y).abs() < along
         };

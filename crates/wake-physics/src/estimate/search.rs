@@ -33,7 +33,7 @@ pub(super) struct Found {
 }
 
 /// Range of the speeds [m/s], and the largest relative step.
-const SPEEDS: [f64; 2] = [3.5, 17.0];
+pub(super) const SPEEDS: [f64; 2] = [3.5, 17.0];
 const STEP: f64 = 0.03;
 
 /// Relative step of the speeds at which a wake is drawn; those between follow by similarity.
@@ -295,7 +295,7 @@ fn step(speed: f64, length: f64) -> f64 {
     TAU * speed * speed / (2.5 * GRAVITY * length)
 }
 
-/// Whether two answers differ by less than 1.5 steps of the speed and half a transverse wave.
+/// True for two answers closer than 1.5 steps of the speed and half a transverse wave.
 pub(super) fn are_neighbours(a: &Found, b: &Found) -> bool {
     let speed = a.course.speed;
     let apart = (b.place[0] - a.place[0]).hypot(b.place[1] - a.place[1]);

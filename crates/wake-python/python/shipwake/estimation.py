@@ -72,7 +72,7 @@ def estimate(
 ) -> Estimate:
     """Estimates ship and wind from an image of a wake, at any speed from 3.5 to 17 m/s.
 
-    Searches within 2.5 standard deviations of place and heading. Takes some 20 seconds for 256 x 256 pixels on two cores.
+    Searches within 2.5 standard deviations of place and heading. Takes a minute or so for 256 x 256 pixels on two cores.
 
     Args:
         image: Intensity with speckle, ``[rows, columns]`` of the scene's grid, in the unit of the normalized radar cross-section.

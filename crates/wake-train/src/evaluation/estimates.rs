@@ -15,11 +15,11 @@ use crate::error::Result;
 pub struct EstimatedImage {
     /// Number of the image in its set.
     pub index: u64,
-    /// True speed of the ship \[m/s\], and incidence \[deg\].
+    /// True speed of the ship \[m/s\].
     pub speed: f64,
     /// Incidence \[deg\].
     pub incidence: f64,
-    /// Whether the estimate passed its own tests.
+    /// True if the estimate passed the tests of [`estimate`].
     pub identifiable: bool,
     /// Largest misfit of the residual spectrum, as a factor.
     pub misfit: f64,
@@ -111,7 +111,7 @@ pub struct EstimateRow {
     pub quantity: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Median and 90th percentile of the absolute error.
+    /// Median absolute error.
     pub median: Option<f64>,
     /// 90th percentile of the absolute error.
     pub percentile_90: Option<f64>,

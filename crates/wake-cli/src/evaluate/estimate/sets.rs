@@ -22,7 +22,7 @@ use crate::exit::Outcome;
 const SEED: u64 = 900_301;
 /// Rows and columns of its images.
 const SIDE: usize = 256;
-/// What is assumed of real tiles, whose radar nobody states: pixel \[m\], incidence \[deg\] and looks.
+/// Assumptions about real tiles, whose radar is not known: pixel \[m\], incidence \[deg\] and looks.
 const ASSUMED: (f64, f64, u32) = (10.0, 35.0, 4);
 
 /// A set of images.
@@ -134,12 +134,12 @@ impl Set {
         Ok(sets)
     }
 
-    /// Whether only headings have a truth.
+    /// True for real tiles: their speeds are not known.
     pub(super) fn is_real(&self) -> bool {
         matches!(self.kind, Kind::Real(_))
     }
 
-    /// Whether images have no ship.
+    /// True for the sea without ships.
     pub(super) fn is_empty(&self) -> bool {
         matches!(self.kind, Kind::Empty)
     }
@@ -197,7 +197,7 @@ impl Set {
     }
 }
 
-/// What an estimator is told of a scene: radar, grid, hull and water, and nothing of the wind, swell, gusts and slicks.
+/// Input of the estimator: radar, grid, hull and water of a scene, with default wind, without swell, gusts and slicks.
 fn known(truth: &Scene) -> Scene {
     let mut known = truth.clone();
     let Sea {
@@ -264,8 +264,8 @@ fn detected(detector: &Detector, image: &Field, scene: &Scene) -> Outcome<Option
 fn of_wake(wake: &Wake, scene: &Scene) -> Sighting {
     let grid = &scene.grid;
     let [column, row] = wake.tip.map(f64::from);
-    let x = (column - 0.5 * (grid.columns as f64 - 1.0)) * grid.spacing;
-    let y = (0.5 * (grid.rows as f64 - 1.0) - row) * grid.spacing;
+    let x = (column - (grid.columns / 2) as f64) * grid.spacing;
+    let y = ((grid.rows / 2) as f64 - row) * grid.spacing;
     Sighting::new([x, y], f64::from(wake.axis_deg) + 180.0)
 }
 
