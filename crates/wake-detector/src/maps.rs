@@ -114,7 +114,7 @@ impl Maps {
         }
         let centre = 0.5 * (STRIDE as f32 - 1.0);
         let length = LENGTH_UNIT * self.map(Map::Length)[at].clamp(-3.0, 2.5).exp();
-        let axis_deg = (first + pull / total).rem_euclid(360.0);
+        let axis_deg = (first + pull / total).rem_euclid(360.0) % 360.0;
         let wake = Wake {
             tip: cell.map(|x| STRIDE as f32 * x + centre),
             axis_deg,

@@ -114,7 +114,7 @@ pub fn direction(degrees: f32) -> [f32; 2] {
 
 /// The angle of a vector (right, down), clockwise from the image's up, 0 to 360.
 pub fn angle_of([right, down]: [f32; 2]) -> f32 {
-    right.atan2(-down).to_degrees().rem_euclid(360.0)
+    right.atan2(-down).to_degrees().rem_euclid(360.0) % 360.0
 }
 
 #[cfg(test)]

@@ -161,7 +161,7 @@ pub(crate) fn in_scene(axes: &PixelAxes, toward: f64) -> f64 {
     let sine = |degrees: f64| degrees.to_radians().sin();
     let lines = sine(axes.pixel_azimuth - toward) / axes.line_spacing;
     let pixels = sine(toward - axes.line_azimuth) / axes.pixel_spacing;
-    pixels.atan2(lines).to_degrees().rem_euclid(360.0)
+    pixels.atan2(lines).to_degrees().rem_euclid(360.0) % 360.0
 }
 
 /// The inverse of [`in_scene`].
@@ -171,7 +171,7 @@ pub(crate) fn on_map(axes: &PixelAxes, in_scene: f64) -> f64 {
     let (lines, pixels) = (cos * axes.line_spacing, sin * axes.pixel_spacing);
     let east = lines * line.sin() + pixels * pixel.sin();
     let north = lines * line.cos() + pixels * pixel.cos();
-    east.atan2(north).to_degrees().rem_euclid(360.0)
+    east.atan2(north).to_degrees().rem_euclid(360.0) % 360.0
 }
 
 /// The Sentinel-1 product.
@@ -238,7 +238,9 @@ mod tests {
         assert!((in_scene(&square, 30.0) - 197.0).abs() < 1e-9);
         for toward in [0.0, 30.0, 170.0, 305.0] {
             let back = on_map(&skew, in_scene(&skew, toward));
-            assert!((back - toward).abs() < 1e-9, "{toward}: {back}");
+            let turn = (back - toward + 180.0).rem_euclid(360.0) - 180.0;
+            assert!(turn.abs() < 1e-9, "{toward}: {back}");
+            assert!((0.0..360.0).contains(&back), "{toward}: {back}");
         }
     }
 }

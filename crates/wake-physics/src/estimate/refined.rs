@@ -379,10 +379,10 @@ fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
 fn corrected(scene: &Scene) -> Scene {
     let shift = drift(scene);
     let mut scene = scene.clone();
-    scene.sea.wind_toward = scene.sea.wind_toward.rem_euclid(360.0);
+    scene.sea.wind_toward = scene.sea.wind_toward.rem_euclid(360.0) % 360.0;
     if let Some(ship) = scene.ships.first_mut() {
         ship.position[1] -= shift;
-        ship.heading = ship.heading.rem_euclid(360.0);
+        ship.heading = ship.heading.rem_euclid(360.0) % 360.0;
     }
     scene
 }
