@@ -27,8 +27,14 @@ const SHORTEST: f64 = 0.05;
 /// Smallest gain relative to its prediction with which derivatives are kept (chosen).
 const TRUSTED: f64 = 0.6;
 
-/// Length of the last step, in standard deviations of the information: errors of the mean image are larger.
-const SMALL: f64 = 0.4;
+/// Where an ascent ends.
+#[derive(Clone, Copy)]
+pub(super) struct Until {
+    /// Largest number of steps.
+    pub(super) steps: usize,
+    /// Length of the last step, in standard deviations of the information.
+    pub(super) small: f64,
+}
 
 /// Limits of the wind speed [m/s], and of the ship's length relative to the guess.
 const WINDS: [f64; 2] = [1.5, 20.0];
@@ -40,8 +46,8 @@ struct Known {
     texture: Texture,
 }
 
-/// Changes of wind speed (relative) and direction \[deg\] that need a new texture.
-const OTHER: [f64; 2] = [0.01, 1.0];
+/// Changes of wind speed (relative) and direction \[deg\] that need a new texture, over the length of the last step.
+const OTHER: [f64; 2] = [0.025, 2.5];
 
 /// Image, parameters and priors of an ascent.
 #[derive(Clone, Copy)]
@@ -66,6 +72,8 @@ struct Step {
 /// Frozen plan of an ascent, with what its last points needed.
 struct Path {
     image: ExpectedImage,
+    /// Length of its last step in standard deviations.
+    small: f64,
     texture: Option<Known>,
     /// Derivatives of the mean image at a point before.
     spectra: Vec<Spectrum>,
@@ -74,14 +82,15 @@ struct Path {
 impl Ascent<'_> {
     /// Likelihood at a scene, with the variance of the score.
     pub(super) fn point(&self, scene: Scene, factors: Factors) -> Result<Point> {
-        let mut path = self.path(&scene)?;
+        let mut path = self.path(&scene, 0.0)?;
         self.linearised(&mut path, (scene, factors), true)
     }
 
     /// A path that begins at a scene.
-    fn path(&self, start: &Scene) -> Result<Path> {
+    fn path(&self, start: &Scene, small: f64) -> Result<Path> {
         Ok(Path {
             image: ExpectedImage::new(start, &values_of(self.parameters))?,
+            small,
             texture: None,
             spectra: Vec::new(),
         })
@@ -97,9 +106,7 @@ impl Ascent<'_> {
         last: bool,
     ) -> Result<Point> {
         let expected = path.image.at(&scene)?;
-        path.spectra = self
-            .observed
-            .spectra(self.parameters, factors.gain, &expected);
+        path.spectra = self.observed.spectra(self.parameters, &expected);
         self.point_by(path, (scene, factors, &expected.intensity), last)
     }
 
@@ -117,8 +124,8 @@ impl Ascent<'_> {
     ) -> Result<Point> {
         let wind = [scene.sea.wind_speed, scene.sea.wind_toward];
         let is_near = |known: &Known| {
-            (wind[0] / known.wind[0] - 1.0).abs() < OTHER[0]
-                && (wind[1] - known.wind[1]).abs() < OTHER[1]
+            (wind[0] / known.wind[0] - 1.0).abs() < path.small * OTHER[0]
+                && (wind[1] - known.wind[1]).abs() < path.small * OTHER[1]
         };
         let texture = match path.texture.take().filter(is_near) {
             Some(known) => known,
@@ -149,8 +156,13 @@ impl Ascent<'_> {
     /// Ascent from a start, of at most `steps` steps.
     ///
     /// Derivatives cost several images, so they are kept as long as they predict what a step gains.
-    pub(super) fn climb(&self, start: Scene, factors: Factors, steps: usize) -> Result<Point> {
-        let mut path = self.path(&start)?;
+    pub(super) fn climb(
+        &self,
+        start: Scene,
+        factors: Factors,
+        Until { steps, small }: Until,
+    ) -> Result<Point> {
+        let mut path = self.path(&start, small)?;
         let mut here = self.linearised(&mut path, (start, factors), false)?;
         let (mut fresh, mut part) = (true, 1.0);
         for _ in 0..steps {
@@ -161,7 +173,7 @@ impl Ascent<'_> {
             if gain > 0.0 {
                 here = there;
             }
-            if part * size < SMALL {
+            if part * size < small {
                 break;
             }
             if gain <= 0.0 && fresh {

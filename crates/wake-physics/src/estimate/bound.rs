@@ -63,7 +63,7 @@ pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result
     let mut open = scene.clone();
     open.ships.clear();
     let without = ExpectedImage::new(&open, &[])?.intensity(&open)?;
-    let wake = observed.residual(&without);
+    let wake = observed.residual(1.0, &without);
     let spectrum = observed.torus.spectrum(&wake);
     let power = observed.power(&texture.noise);
     let area = (observed.torus.size * observed.torus.size) as f64;

@@ -5,7 +5,7 @@ use super::observed::Observed;
 use super::parameter::Parameter;
 use super::priors::Priors;
 use super::refined::{Estimate, check, settled};
-use super::search::{Found, Search, are_neighbours};
+use super::search::{DRAWN, Found, Search, are_neighbours};
 use super::sighting::Sighting;
 use super::value::Value;
 use super::winds::{Wind, likely, winds};
@@ -13,20 +13,25 @@ use crate::constants::GRAVITY;
 use crate::error::Result;
 use crate::kelvin::KELVIN_ANGLE;
 use crate::raster::{Field, Raster};
-use crate::scene::Scene;
+use crate::scene::{Scene, Sea};
 use crate::track::Track;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Answers of the part near the ship that the whole wake is compared with, and answers from which the likelihood is maximised.
-const WHOLE: usize = 8;
+/// Answers from which the likelihood is maximised.
 const CANDIDATES: usize = 4;
 
-/// Part of the best answer's gain by which an answer may be worse and is still followed (chosen).
-const WORSE: f64 = 0.5;
+/// Part of the best answer's gain by which an answer may be worse and is still followed, by the part of the wake near the ship and by the whole wake,
+/// and the difference of log-likelihood that is not enough to leave it (chosen).
+const NEAR_WORSE: f64 = 0.5;
+const WORSE: f64 = 0.25;
+const SURE: f64 = 20.0;
 
 /// Transverse wavelength below which several speeds are about equally likely \[m\] (of ships up to 6.6 m/s; measured on simulated scenes).
 const SHORTEST: f64 = 28.0;
+
+/// Relative error of the mean brightness beside the wake, besides that of the calibration (chosen).
+const BRIGHTNESS: f64 = 0.03;
 
 /// Width of the edge of the wedge that the wind is not estimated in \[deg\].
 const SOFT: f64 = 20.0;
@@ -63,29 +68,24 @@ pub fn estimate(
     let beside = |i, j| echo.shown(i, j) * (1.0 - wedge(&raster, sighting, [i, j]));
     let beside = Observed::new(image.clone(), known, beside);
     let flat = Field::constant(&raster, 1.0);
-    let bright = priors.gain.is_finite().then(|| beside.gain(&flat));
+    let known_gain = priors.gain.is_finite();
+    let bright = known_gain.then(|| [beside.gain(&flat), priors.gain.hypot(BRIGHTNESS)]);
     let winds = winds(&beside, known, bright)?;
     let observed = Observed::new(image.clone(), known, |i, j| echo.shown(i, j));
-    let with_wind = |wind| WithWind::new(&observed, known, wind, sighting);
+    let logarithmic = observed.logarithmic();
+    let with_wind = |wind| WithWind::new(&logarithmic, known, wind, sighting);
     let searches: Vec<WithWind<'_>> = likely(&winds, 45.0).into_iter().map(with_wind).collect();
     let near = searches.iter().enumerate().map(|(n, one)| one.near_ship(n));
     let near = near.collect::<Result<Vec<_>>>()?.concat();
     // Once from the answers near the ship, then from the best of all.
-    let whole = with_whole_wake(&searches, &apart(near, WHOLE))?;
-    let whole = with_whole_wake(&searches, &apart(whole, CANDIDATES))?;
-    let best = apart(whole, CANDIDATES);
-    // The likeliest course with each likely wind, and the other courses with theirs.
-    let likeliest = best.first().map(|answer| answer.found);
-    let with_each_wind = likely(&winds, 25.0).into_iter().filter_map(|wind| {
-        let Found { course, place, .. } = likeliest?;
-        let mut scene = known.clone();
-        scene.sea = wind.open.sea.clone();
-        Some(course.on(&scene, place))
-    });
-    let others = best.iter().skip(1);
-    let others = others.map(|answer| searches[answer.search].start(&answer.found));
-    let starts: Vec<Scene> = with_each_wind.chain(others).collect();
-    let mut found = settled(&observed, &starts, priors)?;
+    let whole = with_whole_wake(&searches, &of_each_speed(near), true)?;
+    let whole = with_whole_wake(&searches, &apart(whole), false)?;
+    let best = apart(whole);
+    let start = |answer: &Answer| searches[answer.search].start(&answer.found);
+    let starts: Vec<Scene> = best.iter().map(start).collect();
+    let likely = likely(&winds, 25.0).into_iter();
+    let others: Vec<Sea> = likely.map(|wind| wind.open.sea.clone()).collect();
+    let mut found = settled(&observed, &starts, &others, priors)?;
     let [speed, _] = found.of(Parameter::Value(Value::Speed));
     found.identifiable &= TAU * speed * speed / GRAVITY > SHORTEST;
     let [_, deviation] = found.of(Parameter::Value(Value::Y));
@@ -136,10 +136,14 @@ impl<'a> WithWind<'a> {
 }
 
 /// Better answers near others, by the whole wake.
-fn with_whole_wake(searches: &[WithWind<'_>], answers: &[Answer]) -> Result<Vec<Answer>> {
+fn with_whole_wake(
+    searches: &[WithWind<'_>],
+    answers: &[Answer],
+    anywhere: bool,
+) -> Result<Vec<Answer>> {
     let better = |answer: &Answer| {
         let one = &searches[answer.search];
-        Ok(one.answer(one.search.whole(&answer.found)?, answer.search))
+        Ok(one.answer(one.search.whole(&answer.found, anywhere)?, answer.search))
     };
     answers.par_iter().map(better).collect()
 }
@@ -154,20 +158,46 @@ struct Answer {
     log_likelihood: f64,
 }
 
-/// The best answers that are no neighbours, without those that gain much less than the best.
-fn apart(mut answers: Vec<Answer>, count: usize) -> Vec<Answer> {
-    answers.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
+/// The best answer of each range of speeds, without those that gain much less than the best of all.
+fn of_each_speed(mut answers: Vec<Answer>) -> Vec<Answer> {
+    let range = |answer: &Answer| (answer.found.course.speed.ln() / DRAWN) as i32;
+    sort(&mut answers);
     let mut kept: Vec<Answer> = Vec::new();
     for one in answers {
-        let worse = |best: &Answer| {
-            one.log_likelihood < best.log_likelihood - WORSE * best.found.gain.abs()
-        };
-        let near = |other: &Answer| are_neighbours(&other.found, &one.found);
-        if kept.len() < count && !kept.first().is_some_and(worse) && !kept.iter().any(near) {
+        let known = |other: &Answer| range(other) == range(&one);
+        if !one.is_worse(kept.first(), NEAR_WORSE) && !kept.iter().any(known) {
             kept.push(one);
         }
     }
     kept
+}
+
+/// The best answers that are no neighbours, without those that gain less than the best.
+fn apart(mut answers: Vec<Answer>) -> Vec<Answer> {
+    sort(&mut answers);
+    let mut kept: Vec<Answer> = Vec::new();
+    for one in answers {
+        let near = |other: &Answer| are_neighbours(&other.found, &one.found);
+        let is_worse = one.is_worse(kept.first(), WORSE);
+        if kept.len() < CANDIDATES && !is_worse && !kept.iter().any(near) {
+            kept.push(one);
+        }
+    }
+    kept
+}
+
+/// The likeliest first.
+fn sort(answers: &mut [Answer]) {
+    answers.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
+}
+
+impl Answer {
+    /// Whether the answer gains less than the best one by more than a part of that one's gain.
+    fn is_worse(&self, best: Option<&Self>, part: f64) -> bool {
+        best.is_some_and(|best| {
+            self.log_likelihood < best.log_likelihood - (part * best.found.gain).max(SURE)
+        })
+    }
 }
 
 /// 1 in the wedge astern of a sighting and around it, 0 beyond its soft edge.

@@ -17,8 +17,8 @@ pub(super) struct Observed {
     pub(super) image: Field,
     pub(super) torus: Torus,
     pub(super) taper: Taper,
-    /// Brightness that residuals are relative to; `None`: the mean image.
-    level: Option<f32>,
+    /// Whether residuals are logarithms ln I/μ less their mean; else they are I/μ − 1.
+    logarithmic: bool,
 }
 
 /// The likelihood near a scene.
@@ -41,6 +41,9 @@ pub(super) struct Information {
     pub(super) variance: Matrix,
 }
 
+/// Relative intensity whose logarithm stands for all darker pixels (chosen): of four looks, 8 pixels of a million are darker.
+const DARKEST: f32 = 0.03;
+
 /// Rings of wavenumbers that the fit is looked at in.
 pub(super) const RINGS: usize = 8;
 
@@ -52,28 +55,40 @@ impl Observed {
             taper: Taper::new(&torus, [image.rows, image.columns], shown),
             torus,
             image,
-            level: None,
+            logarithmic: false,
         }
     }
 
-    /// The same image with residuals relative to its mean brightness: far from the maximum the likelihood has fewer other maxima, and it is no longer larger for brighter scenes.
-    pub(super) fn levelled(&self) -> Self {
-        let flat = Field {
-            values: vec![1.0; self.image.values.len()],
-            ..self.image
-        };
+    /// The same image with logarithms as residuals: their noise does not depend on the mean image, so that the likelihood has fewer maxima far from the best.
+    pub(super) fn logarithmic(&self) -> Self {
         Self {
             image: self.image.clone(),
             torus: Torus::new(self.torus.size),
             taper: self.taper.clone(),
-            level: Some(self.gain(&flat) as f32),
+            logarithmic: true,
         }
     }
 
-    /// Relative intensity in the window.
-    pub(super) fn residual(&self, mean: &Field) -> Field {
+    /// Residual of a mean image in the window.
+    pub(super) fn residual(&self, gain: f32, mean: &Field) -> Field {
         let pairs = self.image.values.iter().zip(&mean.values);
-        self.taper.of(pairs.map(|(i, m)| i / m - 1.0))
+        if self.logarithmic {
+            let logarithms = pairs.map(|(i, m)| (i / (gain * m)).max(DARKEST).ln());
+            return self.without_mean(logarithms.collect());
+        }
+        self.taper.of(pairs.map(|(i, m)| i / (gain * m) - 1.0))
+    }
+
+    /// Values less their mean in the window, seen through it.
+    fn without_mean(&self, values: Vec<f32>) -> Field {
+        let weights = &self.taper.weights.values;
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (value, weight) in values.iter().zip(weights) {
+            sum += f64::from(weight * value);
+            total += f64::from(*weight);
+        }
+        let mean = (sum / total) as f32;
+        self.taper.of(values.into_iter().map(|v| v - mean))
     }
 
     /// Mean of the image over that of a mean image, in the window.
@@ -89,11 +104,9 @@ impl Observed {
     /// ln L of a noise around a mean image with the brightness of the image.
     pub(super) fn log_likelihood_of(&self, noise: &Noise, mean: &Field) -> f64 {
         let gain = self.gain(mean) as f32;
-        let mut scaled = mean.clone();
-        scaled.values.iter_mut().for_each(|v| *v *= gain);
-        let left = self.torus.spectrum(&self.residual(&scaled));
+        let left = self.torus.spectrum(&self.residual(gain, mean));
         let scale = self.taper.energy / (self.torus.size * self.torus.size) as f64;
-        self.log_likelihood(scale, (&left, &self.power(noise)), 1.0, &scaled.values)
+        self.log_likelihood(scale, (&left, &self.power(noise)), gain, &mean.values)
     }
 
     /// Power of a noise.
@@ -111,7 +124,7 @@ impl Observed {
         texture: &Texture,
         with_variance: bool,
     ) -> Near {
-        let spectra = self.spectra(parameters, factors.gain, expected);
+        let spectra = self.spectra(parameters, expected);
         let mean = &expected.intensity;
         self.near_by(
             parameters,
@@ -137,13 +150,8 @@ impl Observed {
         let floor = 1e-6 * power.iter().copied().fold(0.0, f32::max);
         let power: Vec<f32> = power.into_iter().map(|p| p.max(floor)).collect();
         let gain = factors.gain as f32;
+        let left = torus.spectrum(&self.residual(gain, mean));
         let mean = &mean.values;
-        let pairs = self.image.values.iter().zip(mean);
-        let residual = |i: f32, m: f32| match self.level {
-            Some(level) => (i - gain * m) / level,
-            None => i / (gain * m) - 1.0,
-        };
-        let left = torus.spectrum(&taper.of(pairs.map(|(i, m)| residual(*i, *m))));
         let slopes = texture.slopes(parameters, factor);
         let slopes: Vec<Option<Vec<f32>>> = slopes
             .par_iter()
@@ -168,20 +176,8 @@ impl Observed {
     }
 
     /// F[w ∂ln μ] by each parameter.
-    pub(super) fn spectra(
-        &self,
-        parameters: &[Parameter],
-        gain: f64,
-        expected: &Expected,
-    ) -> Vec<Spectrum> {
-        let mut directions = self.directions(parameters, expected);
-        if let Some(level) = self.level {
-            let factor = gain as f32 / level;
-            for direction in &mut directions {
-                let pixels = direction.values.iter_mut().zip(&expected.intensity.values);
-                pixels.for_each(|(d, m)| *d *= factor * m);
-            }
-        }
+    pub(super) fn spectra(&self, parameters: &[Parameter], expected: &Expected) -> Vec<Spectrum> {
+        let directions = self.directions(parameters, expected);
         let mut spectra = Vec::new();
         for pair in directions.chunks(2) {
             let [first, last] = [&pair[0], &pair[pair.len() - 1]];
@@ -203,7 +199,7 @@ impl Observed {
             taper: Taper::flat(&torus, size),
             torus,
             image: self.image.clone(),
-            level: self.level,
+            logarithmic: self.logarithmic,
         }
     }
 
@@ -231,7 +227,10 @@ impl Observed {
                 }
             }
         }
-        self.taper.of(sum.values.into_iter())
+        match self.logarithmic {
+            true => self.without_mean(sum.values),
+            false => self.taper.of(sum.values.into_iter()),
+        }
     }
 
     fn log_likelihood(
@@ -248,9 +247,9 @@ impl Observed {
         };
         let spectrum: f64 = (0..left.len()).map(term).sum();
         let weighed = mean.iter().zip(&self.taper.weights.values);
-        let jacobian: f64 = match self.level {
-            Some(_) => 0.0,
-            None => weighed
+        let jacobian: f64 = match self.logarithmic {
+            true => 0.0,
+            false => weighed
                 .map(|(m, w)| f64::from(w * w) * f64::from(gain * m).ln())
                 .sum(),
         };

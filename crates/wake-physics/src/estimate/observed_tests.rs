@@ -154,7 +154,7 @@ fn power_of_simulated_seas_is_that_of_the_nonlinear_transform() {
             scene.seed = 1000 + (seed << 8);
             let image = simulator.simulate(&scene).unwrap().speckled;
             let observed = Observed::new(image, &scene, |_, _| 1.0);
-            let left = observed.torus.spectrum(&observed.residual(&mean));
+            let left = observed.torus.spectrum(&observed.residual(1.0, &mean));
             let power = observed.power(&noise);
             let scale = observed.taper.energy / (observed.torus.size.pow(2)) as f64;
             for (sum, ring) in rings.iter_mut().zip(observed.rings(scale, &left, &power)) {

@@ -1,22 +1,19 @@
 //! Maximum-likelihood estimate of ship and wind near a guess, with error bars.
 
-use super::ascent::{Ascent, Point};
+use super::ascent::{Ascent, Point, Until};
 use super::echo::Echo;
 use super::expected::ExpectedImage;
 use super::observed::Observed;
 use super::parameter::{Factors, Parameter};
 use super::priors::Priors;
 use super::value::Value;
-use crate::constants::GRAVITY;
 use crate::error::{Error, Result};
 use crate::linear::OpenSea;
-use crate::measure::angle_between;
+use crate::measure::{angle_between, axis_between};
 use crate::models::Models;
 use crate::raster::Field;
-use crate::scene::Scene;
-use crate::track::Track;
+use crate::scene::{Scene, Sea};
 use serde::Serialize;
-use std::f64::consts::TAU;
 
 /// Estimate of one value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -81,10 +78,22 @@ impl Estimate {
     }
 }
 
-/// Largest number of Fisher scoring steps of an ascent, and of each ascent from a start.
-const STEPS: usize = 20;
-const FIRST_STEPS: usize = 5;
-const SHIP_STEPS: usize = 8;
+/// Ends of an ascent, of the first ascent with a wind, and of the ship before it: errors of the mean image are larger than the last steps.
+const END: Until = Until {
+    steps: 20,
+    small: 0.4,
+};
+const FIRST: Until = Until {
+    steps: 5,
+    small: 2.0,
+};
+const SHIP: Until = Until {
+    steps: 8,
+    small: 2.0,
+};
+
+/// Ships that the wind is fitted to.
+const FOLLOWED: usize = 2;
 
 /// Starts around a guess: relative changes of the speed and changes of the heading \[deg\], about the width of a maximum.
 const AROUND: [[f64; 2]; 5] = [
@@ -139,11 +148,18 @@ pub fn refine(image: &Field, guess: &Scene, priors: &Priors) -> Result<Estimate>
         start.ships[0].heading += turned;
         start
     });
-    settled(&observed, &around, priors)
+    settled(&observed, &around, &[], priors)
 }
 
 /// Highest maximum that is reached from the starts, with its alternatives.
-pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) -> Result<Estimate> {
+///
+/// - `seas`: other seas that the likeliest ship is tried on
+pub(super) fn settled(
+    observed: &Observed,
+    starts: &[Scene],
+    seas: &[Sea],
+    priors: &Priors,
+) -> Result<Estimate> {
     let Some(ship) = starts.first().and_then(|start| start.ships.first()) else {
         return Err(no_start());
     };
@@ -155,48 +171,47 @@ pub(super) fn settled(observed: &Observed, starts: &[Scene], priors: &Priors) ->
     };
     let of_ship = Parameter::OF_WAKE.into_iter().filter(|p| p.is_of_ship());
     let of_ship: Vec<Parameter> = of_ship.collect();
-    let levelled = observed.levelled();
+    let logarithmic = observed.logarithmic();
     let with_wind = Ascent {
-        observed: &levelled,
+        observed: &logarithmic,
         parameters: &of_ship,
         ..ascent
     };
     // The ship first, with the brightness of the image and the wind of the start: what they explain wrongly would be explained as texture.
-    let both = |scene: Scene, factors: Factors| -> Result<Point> {
-        let ship = with_wind.climb(scene, factors, SHIP_STEPS)?;
-        ascent.climb(ship.scene, ship.factors, FIRST_STEPS)
-    };
-    let mut points = Vec::new();
+    let mut ships = Vec::new();
     for start in starts {
-        points.push(both(start.clone(), as_bright(observed, start)?)?);
+        ships.push(with_wind.climb(start.clone(), as_bright(observed, start)?, SHIP)?);
     }
-    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-    let first = points.swap_remove(0);
-    let mut first = ascent.climb(first.scene, first.factors, STEPS)?;
-    // Crests look alike: the ship may be one transverse wave ahead or astern.
-    for waves in [-1.0, 1.0] {
-        let there = both(along(&first.scene, waves), first.factors)?;
-        if there.log_posterior > first.log_posterior {
-            first = ascent.climb(there.scene, there.factors, STEPS)?;
+    sort(&mut ships);
+    let mut points = Vec::new();
+    if let Some(likeliest) = ships.first() {
+        let own = likeliest.scene.sea.wind_toward;
+        let other = |sea: &&Sea| axis_between(sea.wind_toward, own).abs() > 1.0;
+        for sea in seas.iter().filter(other) {
+            let mut scene = likeliest.scene.clone();
+            scene.sea = sea.clone();
+            let factors = as_bright(observed, &scene)?;
+            points.push(ascent.climb(scene, factors, FIRST)?);
         }
     }
+    for ship in ships.into_iter().take(FOLLOWED) {
+        points.push(ascent.climb(ship.scene, ship.factors, FIRST)?);
+    }
+    sort(&mut points);
+    let first = points.swap_remove(0);
+    let first = ascent.climb(first.scene, first.factors, END)?;
     let mut opposite = first.scene.clone();
     opposite.sea.wind_toward = (opposite.sea.wind_toward + 180.0).rem_euclid(360.0);
-    points.push(ascent.climb(opposite, first.factors, STEPS)?);
+    points.push(ascent.climb(opposite, first.factors, END)?);
     points.push(first);
-    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+    sort(&mut points);
     let open = without_ship(observed, &points[0], priors)?;
     concluded(&ascent, points, open)
 }
 
-/// A scene with its ship some transverse waves ahead.
-fn along(scene: &Scene, waves: f64) -> Scene {
-    let mut scene = scene.clone();
-    if let Some(ship) = scene.ships.first_mut() {
-        let ahead = waves * TAU * ship.speed * ship.speed / GRAVITY;
-        ship.position = Track::new(ship.position, ship.heading, ahead).position;
-    }
-    scene
+/// The likeliest first.
+fn sort(points: &mut [Point]) {
+    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
 }
 
 /// Factors that give a scene the brightness of the image.
@@ -254,7 +269,11 @@ fn without_ship(observed: &Observed, point: &Point, priors: &Priors) -> Result<f
         priors,
         length: 1.0,
     };
-    Ok(ascent.climb(scene, point.factors, STEPS)?.log_posterior)
+    let found = ascent.climb(scene, point.factors, FIRST)?;
+    if point.log_posterior - found.log_posterior > 10.0 * CERTAIN {
+        return Ok(found.log_posterior);
+    }
+    Ok(ascent.climb(found.scene, found.factors, END)?.log_posterior)
 }
 
 /// Root mean square ratio of error to standard deviation of the information, on 18 simulated scenes: the error of the mean image and the covariance.

@@ -44,6 +44,8 @@ struct Correlations {
     displacement: Vec<f64>,
     /// ⟨R(x + r) s(x)⟩ [pixels].
     both: Vec<f64>,
+    /// The same at the opposite column, of the columns up to half the period.
+    mirrored: Vec<f64>,
     /// Largest covariance of the displacement in each row [pixels²].
     largest: Vec<f64>,
 }
@@ -81,12 +83,16 @@ impl Correlations {
         let mut sums: Vec<Vec<f64>> = (0..3).into_par_iter().map(sum).collect();
         let both = sums.pop().unwrap_or_default();
         let displacement = sums.pop().unwrap_or_default();
+        let mirrored = both
+            .chunks_exact(period)
+            .flat_map(|row: &[f64]| (0..period / 2 + 1).map(move |j| row[(period - j) % period]));
         let most = |row: &[f64]| row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self {
             period,
             largest: displacement.chunks(period).map(most).collect(),
             modulation: sums.pop().unwrap_or_default(),
             displacement,
+            mirrored: mirrored.collect(),
             both,
         }
     }
@@ -108,17 +114,17 @@ impl Correlations {
                 for i in (0..period).filter(reaching) {
                     let (sin, cos) = (ky * i as f64).sin_cos();
                     let row = i * period..i * period + half;
-                    let mirror = (period - i) % period * period;
-                    let there = &self.both[mirror..mirror + period];
+                    let mirror = (period - i) % period * half;
+                    let back = &self.mirrored[mirror..mirror + half];
                     let displacement = &self.displacement[row.clone()];
                     let modulation = &self.modulation[row.clone()];
                     let here = &self.both[row];
+                    let (re, im) = (&mut re[..half], &mut im[..half]);
                     for j in 0..half {
-                        let back = if j == 0 { there[0] } else { there[period - j] };
                         let weight = exp(square * (displacement[j] - variance));
-                        let bent = square * (here[j] - off) * (back - off);
+                        let bent = square * (here[j] - off) * (back[j] - off);
                         let even = weight * (1.0 + modulation[j] + bent) - rest;
-                        let odd = weight * ky * (here[j] - back);
+                        let odd = weight * ky * (here[j] - back[j]);
                         re[j] += even * cos - odd * sin;
                         im[j] += even * sin + odd * cos;
                     }

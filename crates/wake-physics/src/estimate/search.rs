@@ -3,7 +3,7 @@
 //! The relative change t of the mean image by a wake is correlated with the whitened image v at all places at once,
 //!
 //! ```text
-//! v = w Σw² F⁻¹[R/S],     a(p) = Σ v(x) t(x − p),     E = c Σ |F[w t]|²/S,     gain = a²/(2E)
+//! v = w Σw² F⁻¹[R/S],     a(p) = Σ v(x) t(x − p),     E = c Σ |F[t]|²/S,     gain = a²/(2E)
 //! ```
 //!
 //! the log-likelihood that a wake of unknown strength adds. First only the part of the wake near the ship counts: there it has few wavelengths,
@@ -37,14 +37,15 @@ pub(super) const SPEEDS: [f64; 2] = [3.5, 17.0];
 const STEP: f64 = 0.03;
 
 /// Relative step of the speeds at which a wake is drawn; those between follow by similarity.
-const DRAWN: f64 = 0.08;
+pub(super) const DRAWN: f64 = 0.08;
 
-/// Part of the wake that counts first: diameter of a disc \[m\], and its middle astern of midship over the diameter.
-const NEAR: f64 = 450.0;
+/// Part of the wake that counts first: transverse waves across a disc, range of its diameter \[m\], and its middle astern of midship over the diameter.
+const WAVES: f64 = 18.0;
+const NEAR: [f64; 2] = [300.0, 700.0];
 const ASTERN: f64 = 0.38;
 
-/// Step of the headings for the part near the ship \[deg\].
-const TURN: f64 = 2.5;
+/// Step of the headings times the length of the wake [deg m].
+const TURN: f64 = 1125.0;
 
 /// Tolerance of drawn wakes.
 const TOLERANCE: f64 = 0.05;
@@ -73,13 +74,8 @@ impl<'a> Search<'a> {
         sighting: &'a Sighting,
     ) -> Self {
         let (torus, taper) = (&observed.torus, &observed.taper);
-        let gain = observed.gain(mean) as f32;
-        let scaled = Field {
-            values: mean.values.iter().map(|v| gain * v).collect(),
-            ..*mean
-        };
         let power = observed.power(noise);
-        let mut ratio = torus.spectrum(&observed.residual(&scaled));
+        let mut ratio = torus.spectrum(&observed.residual(observed.gain(mean) as f32, mean));
         for (value, power) in ratio.iter_mut().zip(&power) {
             *value *= taper.energy as f32 / power;
         }
@@ -98,7 +94,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Best answers of the part of the wake near the ship, one for each speed.
+    /// Answers of the part of the wake near the ship, one for each speed and heading.
     pub(super) fn near_ship(&self) -> Result<Vec<Found>> {
         let drawn = ((SPEEDS[1] / SPEEDS[0]).ln() / DRAWN).ceil() as i32;
         let step = (SPEEDS[1] / SPEEDS[0]).ln() / f64::from(drawn);
@@ -119,43 +115,46 @@ impl<'a> Search<'a> {
             place_sd,
         } = *self.sighting;
         let around = (place, Sighting::REACH * place_sd);
-        let turns = (Sighting::REACH * heading_sd / TURN).ceil().max(1.0);
-        let turn = Sighting::REACH * heading_sd / turns;
         let course = Course {
             speed: (speeds[0] * speeds[1]).sqrt(),
             heading,
         };
-        let step = step(course.speed, NEAR).min(STEP);
+        let disc = near(course.speed);
+        let turns = (Sighting::REACH * heading_sd * disc / TURN).ceil().max(1.0);
+        let turn = Sighting::REACH * heading_sd / turns;
+        let step = step(course.speed, disc).min(STEP);
         let count = ((speeds[1] / speeds[0]).ln() / step).ceil() as i32;
-        let side = (1.3 * NEAR / self.scene.grid.spacing).ceil() as usize;
+        let side = (1.3 * disc / self.scene.grid.spacing).ceil() as usize;
         let mut scene = self.scene.clone();
         (scene.grid.rows, scene.grid.columns) = (side, side);
-        let midship = direction(course.heading).map(|v| ASTERN * NEAR * v);
+        let midship = direction(course.heading).map(|v| ASTERN * disc * v);
         let drawn = Drawn::new(&scene, course, midship, self.open)?;
         let changes = |course: Course| {
-            let [dx, dy] = direction(course.heading).map(|v| ASTERN * NEAR * v);
-            let disc = move |[x, y]: [f64; 2]| {
-                let [x, y] = [x + dx, y + dy].map(|v| v / (0.5 * NEAR));
+            let [dx, dy] = direction(course.heading).map(|v| ASTERN * disc * v);
+            let weight = move |[x, y]: [f64; 2]| {
+                let [x, y] = [x + dx, y + dy].map(|v| v / (0.5 * disc));
                 let square = x * x + y * y;
                 if square >= 1.0 {
                     return 0.0;
                 }
                 ((1.0 - square) * (1.0 - square)) as f32
             };
-            drawn.moved(&self.image, (course, around.0), disc)
+            drawn.moved(&self.image, (course, around.0), weight)
         };
         let best = |n: i32| {
             let part = (f64::from(n) + 0.5) / f64::from(count);
             let speed = speeds[0] * (speeds[1] / speeds[0]).powf(part);
             let headings = (-turns as i32..=turns as i32).map(|m| heading + f64::from(m) * turn);
             let each: Vec<Course> = headings.map(|heading| Course { speed, heading }).collect();
-            self.best(&each, around, changes)
+            self.each(&each, around, changes)
         };
-        Ok((0..count).filter_map(best).collect())
+        Ok((0..count).flat_map(best).collect())
     }
 
     /// Best answer of the whole wake near an answer.
-    pub(super) fn whole(&self, found: &Found) -> Result<Found> {
+    ///
+    /// - `anywhere`: at all places of the sighting, not only around that of the answer
+    pub(super) fn whole(&self, found: &Found, anywhere: bool) -> Result<Found> {
         let Found { course, place, .. } = *found;
         let mut scene = self.scene.clone();
         scene.grid.rows += 2 * MARGIN;
@@ -169,11 +168,11 @@ impl<'a> Search<'a> {
             -(corner[0] * forward[0] + corner[1] * forward[1])
         };
         let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-        let length = corners.map(astern).into_iter().fold(NEAR, f64::max);
-        let finer = length / NEAR;
-        let speed_step = step(course.speed, length).min(STEP / finer);
-        let turn = TURN / finer;
-        let steps = finer.ceil() as i32;
+        let length = corners.map(astern).into_iter().fold(NEAR[0], f64::max);
+        let finer = length / near(course.speed);
+        let speed_step = step(course.speed, length).min(STEP / finer.max(1.0));
+        let turn = TURN / length;
+        let steps = (2.0 * finer).ceil().clamp(2.0, 4.0) as i32;
         let each: Vec<Course> = (-steps..=steps)
             .flat_map(|n| {
                 (-2..=2).map(move |m| Course {
@@ -183,10 +182,13 @@ impl<'a> Search<'a> {
             })
             .collect();
         let changes = |course| drawn.moved(&self.image, (course, place), |_| 1.0);
-        let reach = TAU * course.speed.powi(2) / GRAVITY;
+        let reach = match anywhere {
+            true => Sighting::REACH * self.sighting.place_sd,
+            false => 1.2 * TAU * course.speed.powi(2) / GRAVITY,
+        };
         let all = each
             .par_chunks(2)
-            .filter_map(|pair| self.best(pair, (place, 1.2 * reach), changes));
+            .filter_map(|pair| self.best(pair, (place, reach), changes));
         let best = all.max_by(|a, b| a.gain.total_cmp(&b.gain));
         Ok(best.unwrap_or(*found))
     }
@@ -198,11 +200,22 @@ impl<'a> Search<'a> {
         around: ([f64; 2], f64),
         change: impl Fn(Course) -> Field,
     ) -> Option<Found> {
+        let found = self.each(courses, around, change).into_iter();
+        found.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    /// Each of some courses at its best place.
+    fn each(
+        &self,
+        courses: &[Course],
+        around: ([f64; 2], f64),
+        change: impl Fn(Course) -> Field,
+    ) -> Vec<Found> {
         let found = courses.chunks(2).flat_map(|pair| {
             let changes: Vec<Field> = pair.iter().map(|course| change(*course)).collect();
             self.placed(pair, around, &changes)
         });
-        found.max_by(|a, b| a.gain.total_cmp(&b.gain))
+        found.collect()
     }
 
     /// Best places of the changes of one or two courses.
@@ -210,21 +223,18 @@ impl<'a> Search<'a> {
         let [Some(first), Some(last)] = [changes.first(), changes.last()] else {
             return Vec::new();
         };
-        let (torus, pair) = (&self.observed.torus, [first, last]);
-        let windowed = pair.map(|c| self.observed.taper.of(c.values.iter().copied()));
-        let windowed = torus.spectra([&windowed[0], &windowed[1]]);
-        let mut products = torus.spectra(pair);
+        let torus = &self.observed.torus;
+        let mut products = torus.spectra([first, last]);
+        let energies = [0, 1].map(|n| self.energy(&products[n]));
         for product in &mut products {
             for (value, white) in product.iter_mut().zip(&self.white) {
                 *value = white * value.conj();
             }
         }
         let maps = torus.fields([&products[0], &products[1]], [torus.size; 2]);
-        let each = courses.iter().zip(&maps).zip(&windowed);
-        each.map(|((course, map), spectrum)| {
-            self.peak(*course, around, (map, self.energy(spectrum)))
-        })
-        .collect()
+        let each = courses.iter().zip(&maps).zip(energies);
+        each.map(|((course, map), energy)| self.peak(*course, around, (map, energy)))
+            .collect()
     }
 
     /// Highest gain of the map of places.
@@ -279,15 +289,20 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// E of a change in the window.
-    fn energy(&self, windowed: &Spectrum) -> f64 {
+    /// E of a change.
+    fn energy(&self, spectrum: &Spectrum) -> f64 {
         let torus = &self.observed.torus;
-        let terms = windowed.iter().zip(&self.power).enumerate();
+        let terms = spectrum.iter().zip(&self.power).enumerate();
         let sum: f64 = terms
             .map(|(n, (value, power))| torus.weight(n) * f64::from(value.norm_sqr() / power))
             .sum();
         sum * self.observed.taper.energy / (torus.size * torus.size) as f64
     }
+}
+
+/// Diameter of the disc near the ship \[m\].
+fn near(speed: f64) -> f64 {
+    (WAVES * TAU * speed * speed / GRAVITY).clamp(NEAR[0], NEAR[1])
 }
 
 /// Relative step of the speed for a wake of a length: the phase at its ends is off by 2π/5 halfway between two steps.
@@ -299,6 +314,6 @@ fn step(speed: f64, length: f64) -> f64 {
 pub(super) fn are_neighbours(a: &Found, b: &Found) -> bool {
     let speed = a.course.speed;
     let apart = (b.place[0] - a.place[0]).hypot(b.place[1] - a.place[1]);
-    (b.course.speed / speed).ln().abs() < 1.5 * step(speed, NEAR).min(STEP)
+    (b.course.speed / speed).ln().abs() < 1.5 * step(speed, near(speed)).min(STEP)
         && apart < 0.5 * TAU * speed * speed / GRAVITY
 }

@@ -53,7 +53,7 @@ impl Drawn {
         let scene = course.on(scene, midship);
         let mut change = ExpectedImage::new(&scene, &[])?.intensity(&scene)?;
         for value in &mut change.values {
-            *value = *value / open - 1.0;
+            *value = (*value / open).ln();
         }
         let grid = &scene.grid;
         Ok(Self {

@@ -46,19 +46,25 @@ pub(super) fn likely(winds: &[Wind], apart: f64) -> Vec<&Wind> {
 
 /// Winds of all directions, each with the speed that gives the brightness of the image, the likeliest first.
 ///
-/// - `bright`: mean intensity of the sea; `None` for an uncalibrated image, whose wind speed is that of the scene
-pub(super) fn winds(observed: &Observed, scene: &Scene, bright: Option<f64>) -> Result<Vec<Wind>> {
+/// - `bright`: mean intensity of the sea and standard deviation of its logarithm; `None` for an uncalibrated image, whose wind speed is that of the scene
+pub(super) fn winds(
+    observed: &Observed,
+    scene: &Scene,
+    bright: Option<[f64; 2]>,
+) -> Result<Vec<Wind>> {
     let one = |n: usize| -> Result<Wind> {
         let mut open = scene.clone();
         open.ships.clear();
         open.sea.wind_toward += 360.0 * n as f64 / DIRECTIONS as f64;
-        if let Some(bright) = bright {
+        if let Some([bright, _]) = bright {
             open.sea.wind_speed = as_bright(&open, bright)?;
         }
         let mean = ExpectedImage::new(&open, &[])?.intensity(&open)?;
         let noise = Noise::new(&open)?;
+        // No wind of some directions is as bright as the image.
+        let off = bright.map_or(0.0, |[_, deviation]| observed.gain(&mean).ln() / deviation);
         Ok(Wind {
-            log_likelihood: observed.log_likelihood_of(&noise, &mean),
+            log_likelihood: observed.log_likelihood_of(&noise, &mean) - 0.5 * off * off,
             open,
             mean,
             noise,

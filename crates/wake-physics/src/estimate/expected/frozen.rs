@@ -19,9 +19,8 @@ pub(super) struct Frozen {
     pub(super) fields: Vec<Linear>,
     /// Waves of each ship that modulate.
     pub(super) modulating: Vec<Vec<bool>>,
-    /// Steepest slope that σ⁰ is fitted to, and nodes.
+    /// Steepest slope that σ⁰ is computed for.
     pub(super) reach: f64,
-    pub(super) nodes: usize,
     /// Of sums of waves.
     pub(super) tolerance: f64,
 }

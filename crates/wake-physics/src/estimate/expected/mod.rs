@@ -25,7 +25,6 @@ use crate::raster::{Field, Raster};
 use crate::sar::impulse::Reflectivity;
 use crate::sar::smooth::{Displacement, SmoothSum};
 use crate::scene::{Scene, Term};
-use cross_section::nodes_for;
 use drawn::Drawn;
 use frozen::{Frozen, averaged, imaging};
 use surface::Surface;
@@ -60,7 +59,7 @@ pub struct Expected {
 /// # What is rounded
 ///
 /// - The weights of range have rounded corners: at most 0.012 of a pixel's power moves to the next one.
-/// - σ⁰ is a polynomial of the slope, constant beyond 1.25 times the steepest slope of the frozen scene.
+/// - σ⁰ is a spline of the slope, constant beyond 1.25 times the steepest slope of the frozen scene.
 /// - Derivatives of effects (turbulent wake, edges, gusts) and of σ⁰ by wind and incidence are differences of small stages,
 ///   about 1e-5 of themselves off.
 /// - Waves cross no limit: those of the frozen band stay, and those that modulate.
@@ -127,13 +126,11 @@ impl ExpectedImage {
             fields,
             modulating,
             reach: 0.0,
-            nodes: 0,
             tolerance,
         };
         let surface = Surface::new(&frozen, scene, models, &[]);
         let largest = surface.largest(&frozen);
         frozen.reach = (STEEPER * largest.slope).clamp(0.1, 1.5);
-        frozen.nodes = nodes_for(&frozen.backscatter(models), frozen.reach);
         let square = STEEPER * largest.acceleration.powi(2);
         let narrowest = displacement.variance;
         let widest = 1.3 * narrowest + displacement.variance_per_square * square;

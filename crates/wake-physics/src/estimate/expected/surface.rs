@@ -170,7 +170,7 @@ impl<'a> Surface<'a> {
             let (pair, width) = outer[n].as_ref()?;
             Some((pair.each_ref(), *width))
         });
-        CrossSection::new(&of(self.models), &outer, frozen.reach, frozen.nodes)
+        CrossSection::new(&of(self.models), &outer, frozen.reach)
     }
 }
 
