@@ -39,7 +39,7 @@ const SOFT: f64 = 20.0;
 /// Maximum-likelihood estimate of ship and wind around a sighting, at any speed from 3.5 to 17 m/s.
 ///
 /// The wind follows from brightness and texture beside the wake. A matched filter of mean images searches for speed, heading and place within 2.5 standard deviations of the sighting, first
-/// with the part of the wake near the ship, then with all of it. Fisher scoring maximises the likelihood from the three best answers; error bars and tests are those of [`refine`](super::refine).
+/// with the part of the wake near the ship, then with all of it. Fisher scoring maximises the likelihood from the best answers; error bars and tests are those of [`refine`](super::refine).
 ///
 /// - `image`: intensity with speckle, in the unit of σ⁰, `[rows, columns]` of the scene's grid. Echoes of ships are left out
 /// - `known`: radar, grid and water, and one ship with the hull that is assumed; its speed, heading and position and the wind's direction do not count,
