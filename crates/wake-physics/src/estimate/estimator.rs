@@ -192,7 +192,7 @@ fn sort(answers: &mut [Answer]) {
 }
 
 impl Answer {
-    /// Whether the answer gains less than the best one by more than a part of that one's gain.
+    /// True if the log-likelihood is below that of the best answer by more than a part of its gain.
     fn is_worse(&self, best: Option<&Self>, part: f64) -> bool {
         best.is_some_and(|best| {
             self.log_likelihood < best.log_likelihood - (part * best.found.gain).max(SURE)

@@ -17,7 +17,7 @@ pub(super) struct Observed {
     pub(super) image: Field,
     pub(super) torus: Torus,
     pub(super) taper: Taper,
-    /// Whether residuals are logarithms ln I/μ less their mean; else they are I/μ − 1.
+    /// True for residuals ln I/μ less their mean, false for I/μ − 1.
     logarithmic: bool,
 }
 

@@ -1,6 +1,6 @@
 //! Coarse search for speed, heading and place around a sighting: a matched filter of mean images.
 //!
-//! The relative change t of the mean image by a wake is correlated with the whitened image v at all places at once,
+//! The logarithm t of the relative change of the mean image by a wake is correlated with the whitened image v at all places at once,
 //!
 //! ```text
 //! v = w Σw² F⁻¹[R/S],     a(p) = Σ v(x) t(x − p),     E = c Σ |F[t]|²/S,     gain = a²/(2E)
