@@ -27,6 +27,11 @@ const SHORTEST: f64 = 0.05;
 /// Smallest gain relative to its prediction with which derivatives are kept (chosen).
 const TRUSTED: f64 = 0.6;
 
+/// Pixels along azimuth that higher maxima are looked for within, parts of the change by which all other values follow the place, and how often (chosen).
+const FARTHEST: i32 = 2;
+const FOLLOWING: [f64; 4] = [0.0, 0.33, 0.67, 1.0];
+const HOPS: usize = 3;
+
 /// Where an ascent ends.
 #[derive(Clone, Copy)]
 pub(super) struct Until {
@@ -74,9 +79,29 @@ struct Path {
     image: ExpectedImage,
     /// Length of its last step in standard deviations.
     small: f64,
-    texture: Option<Known>,
-    /// Derivatives of the mean image at a point before.
+    known: Option<Known>,
+    /// Derivatives of the mean image at a point before, and the spread of its noise.
     spectra: Vec<Spectrum>,
+    spread: Field,
+}
+
+impl Path {
+    /// Takes the texture of the sea of a scene, or of one with nearly the same wind.
+    fn take(&mut self, scene: &Scene, parameters: &[Parameter]) -> Result<Known> {
+        let wind = [scene.sea.wind_speed, scene.sea.wind_toward];
+        let small = self.small;
+        let is_near = |known: &Known| {
+            (wind[0] / known.wind[0] - 1.0).abs() < small * OTHER[0]
+                && (wind[1] - known.wind[1]).abs() < small * OTHER[1]
+        };
+        Ok(match self.known.take().filter(is_near) {
+            Some(known) => known,
+            None => Known {
+                texture: Texture::new(scene, parameters)?,
+                wind,
+            },
+        })
+    }
 }
 
 impl Ascent<'_> {
@@ -91,8 +116,9 @@ impl Ascent<'_> {
         Ok(Path {
             image: ExpectedImage::new(start, &values_of(self.parameters))?,
             small,
-            texture: None,
+            known: None,
             spectra: Vec::new(),
+            spread: Field::default(),
         })
     }
 
@@ -106,7 +132,13 @@ impl Ascent<'_> {
         last: bool,
     ) -> Result<Point> {
         let expected = path.image.at(&scene)?;
-        path.spectra = self.observed.spectra(self.parameters, &expected);
+        let known = path.take(&scene, self.parameters)?;
+        let spread = self
+            .observed
+            .spread(&expected.contrast, &known.texture.noise);
+        path.known = Some(known);
+        path.spectra = self.observed.spectra(self.parameters, &expected, &spread);
+        path.spread = spread;
         self.point_by(path, (scene, factors, &expected.intensity), last)
     }
 
@@ -122,21 +154,16 @@ impl Ascent<'_> {
         (scene, factors, mean): (Scene, Factors, &Field),
         last: bool,
     ) -> Result<Point> {
-        let wind = [scene.sea.wind_speed, scene.sea.wind_toward];
-        let is_near = |known: &Known| {
-            (wind[0] / known.wind[0] - 1.0).abs() < path.small * OTHER[0]
-                && (wind[1] - known.wind[1]).abs() < path.small * OTHER[1]
-        };
-        let texture = match path.texture.take().filter(is_near) {
-            Some(known) => known,
-            None => Known {
-                texture: Texture::new(&scene, self.parameters)?,
-                wind,
-            },
-        };
-        let texture = &path.texture.insert(texture).texture;
-        let here = (&factors, mean, &path.spectra[..]);
-        let near = self.observed.near_by(self.parameters, here, texture, last);
+        let known = path.take(&scene, self.parameters)?;
+        let linear = (&path.spectra[..], &path.spread);
+        let near = self.observed.near_by(
+            self.parameters,
+            (&factors, mean),
+            linear,
+            &known.texture,
+            last,
+        );
+        path.known = Some(known);
         let prior = |parameter: &Parameter| {
             let off = match parameter {
                 Parameter::Gain => factors.gain.ln(),
@@ -153,21 +180,76 @@ impl Ascent<'_> {
         })
     }
 
-    /// Ascent from a start, of at most `steps` steps.
+    /// Ascent from a start.
+    pub(super) fn climb(&self, start: Scene, factors: Factors, until: Until) -> Result<Point> {
+        let mut path = self.path(&start, until.small)?;
+        let here = self.linearised(&mut path, (start, factors), false)?;
+        self.ascend(&mut path, here, until)
+    }
+
+    /// Highest of the maxima beside a maximum: short waves are sampled alike a pixel farther along azimuth, so that the likelihood has maxima a pixel apart.
+    pub(super) fn over_pixels(&self, from: Point, until: Until) -> Result<Point> {
+        let mut here = from;
+        for _ in 0..HOPS {
+            let Some((scene, factors)) = self.higher_pixel(&here)? else {
+                break;
+            };
+            let there = self.climb(scene, factors, until)?;
+            if there.log_posterior <= here.log_posterior {
+                break;
+            }
+            here = there;
+        }
+        Ok(here)
+    }
+
+    /// The likeliest place some pixels along azimuth, if it is likelier than a maximum.
+    fn higher_pixel(&self, here: &Point) -> Result<Option<(Scene, Factors)>> {
+        let Some(step) = self.by_pixel(here) else {
+            return Ok(None);
+        };
+        let mut path = self.path(&here.scene, 1.0)?;
+        self.linearised(&mut path, (here.scene.clone(), here.factors), false)?;
+        let is_y = |p: &Parameter| *p == Parameter::Value(Value::Y);
+        let mut best = (here.log_posterior, None);
+        for pixels in (-FARTHEST..=FARTHEST).filter(|n| *n != 0) {
+            for part in FOLLOWING {
+                let parameters = self.parameters.iter().zip(&step);
+                let step = parameters.map(|(p, s)| if is_y(p) { *s } else { part * s });
+                let step: Vec<f64> = step.collect();
+                let to = self.moved(here, &step, f64::from(pixels));
+                let there = self.beside(&mut path, to)?;
+                if there.log_posterior > best.0 {
+                    best = (there.log_posterior, Some((there.scene, there.factors)));
+                }
+            }
+        }
+        Ok(best.1)
+    }
+
+    /// Step of all parameters with which the likelihood falls least while the ship moves a pixel along azimuth.
+    fn by_pixel(&self, here: &Point) -> Option<Vec<f64>> {
+        let covariance = self.precision(here).inverse()?;
+        let is_y = |p: &Parameter| *p == Parameter::Value(Value::Y);
+        let y = self.parameters.iter().position(is_y)?;
+        let scale = here.scene.grid.spacing / covariance.at(y, y);
+        let steps = (0..self.parameters.len()).map(|n| scale * covariance.at(n, y));
+        Some(steps.collect())
+    }
+
+    /// Ascent of at most `steps` steps.
     ///
     /// Derivatives cost several images, so they are kept as long as they predict what a step gains.
-    pub(super) fn climb(
+    fn ascend(
         &self,
-        start: Scene,
-        factors: Factors,
+        path: &mut Path,
+        mut here: Point,
         Until { steps, small }: Until,
     ) -> Result<Point> {
-        let mut path = self.path(&start, small)?;
-        let mut here = self.linearised(&mut path, (start, factors), false)?;
         let (mut fresh, mut part) = (true, 1.0);
         for _ in 0..steps {
             let Step { by, size, rise } = self.step(&here);
-            let there = self.beside(&mut path, self.moved(&here, &by, part))?;
+            let there = self.beside(path, self.moved(&here, &by, part))?;
             let gain = there.log_posterior - here.log_posterior;
             let trusted = gain > TRUSTED * (part * rise - 0.5 * (part * size).powi(2));
             if gain > 0.0 {
@@ -186,7 +268,7 @@ impl Ascent<'_> {
             part = 1.0;
             fresh = !trusted;
             if fresh {
-                here = self.linearised(&mut path, (here.scene, here.factors), false)?;
+                here = self.linearised(path, (here.scene, here.factors), false)?;
             }
         }
         Ok(here)

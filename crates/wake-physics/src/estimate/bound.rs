@@ -51,7 +51,8 @@ pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result
         false,
     );
     let untapered = Observed::whole(&observed);
-    let directions = untapered.directions(parameters, &expected);
+    let spread = untapered.spread(&expected.contrast, &texture.noise);
+    let directions = untapered.directions(parameters, &expected, &spread);
     let mean = of_mean(&observed.torus, &texture.noise.covariance(1.0), &directions);
     let information = mean.plus(&near.of_power).plus(&priors.matrix(parameters));
     let covariance = information.inverse();
@@ -63,7 +64,7 @@ pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result
     let mut open = scene.clone();
     open.ships.clear();
     let without = ExpectedImage::new(&open, &[])?.intensity(&open)?;
-    let wake = observed.residual(1.0, &without);
+    let wake = observed.residual_over(1.0, &without, &spread);
     let spectrum = observed.torus.spectrum(&wake);
     let power = observed.power(&texture.noise);
     let area = (observed.torus.size * observed.torus.size) as f64;

@@ -58,6 +58,13 @@ impl Noise {
         self.field(self.sea.iter().copied())
     }
 
+    /// Share of the sea in the variance of a pixel, that of its speckle included.
+    pub(super) fn share_of_sea(&self) -> f64 {
+        let [sea, speckle] = [&self.sea, &self.speckle].map(|c| f64::from(c[0]));
+        let by_sea = sea * (1.0 + speckle);
+        by_sea / (by_sea + speckle)
+    }
+
     /// Covariance with the sea's variance times a factor.
     pub(super) fn covariance(&self, factor: f64) -> Field {
         let pairs = self.sea.iter().zip(&self.speckle);

@@ -44,6 +44,9 @@ pub(super) struct Information {
 /// Relative intensity whose logarithm stands for all darker pixels (chosen): of four looks, 8 pixels of a million are darker.
 const DARKEST: f32 = 0.03;
 
+/// Largest contrast of sources that makes noise: that of darker pixels makes no more.
+const CONTRAST: f32 = 8.0;
+
 /// Rings of wavenumbers that the fit is looked at in.
 pub(super) const RINGS: usize = 8;
 
@@ -67,6 +70,29 @@ impl Observed {
             taper: self.taper.clone(),
             logarithmic: true,
         }
+    }
+
+    /// Standard deviation of the noise of each pixel over that of open sea: waves that move bright sources beside dark ones make more noise.
+    pub(super) fn spread(&self, contrast: &Field, noise: &Noise) -> Field {
+        let share = match self.logarithmic {
+            true => 0.0,
+            false => noise.share_of_sea() as f32,
+        };
+        let of = |contrast: &f32| (1.0 + share * contrast.min(CONTRAST)).sqrt();
+        Field {
+            values: contrast.values.iter().map(of).collect(),
+            ..*contrast
+        }
+    }
+
+    /// Residual of a mean image over the spread of its noise, in the window.
+    pub(super) fn residual_over(&self, gain: f32, mean: &Field, spread: &Field) -> Field {
+        let mut left = self.residual(gain, mean);
+        left.values
+            .iter_mut()
+            .zip(&spread.values)
+            .for_each(|(v, s)| *v /= s);
+        left
     }
 
     /// Residual of a mean image in the window.
@@ -106,7 +132,12 @@ impl Observed {
         let gain = self.gain(mean) as f32;
         let left = self.torus.spectrum(&self.residual(gain, mean));
         let scale = self.taper.energy / (self.torus.size * self.torus.size) as f64;
-        self.log_likelihood(scale, (&left, &self.power(noise)), gain, &mean.values)
+        self.log_likelihood(
+            scale,
+            (&left, &self.power(noise)),
+            gain,
+            mean.values.iter().copied(),
+        )
     }
 
     /// Power of a noise.
@@ -124,11 +155,13 @@ impl Observed {
         texture: &Texture,
         with_variance: bool,
     ) -> Near {
-        let spectra = self.spectra(parameters, expected);
+        let spread = self.spread(&expected.contrast, &texture.noise);
+        let spectra = self.spectra(parameters, expected, &spread);
         let mean = &expected.intensity;
         self.near_by(
             parameters,
-            (factors, mean, &spectra),
+            (factors, mean),
+            (&spectra, &spread),
             texture,
             with_variance,
         )
@@ -136,11 +169,12 @@ impl Observed {
 
     /// The same with spectra of a scene nearby.
     ///
-    /// - `spectra`: as [`Self::spectra`] gives them
+    /// - `spectra`: as [`Self::spectra`] gives them for this spread
     pub(super) fn near_by(
         &self,
         parameters: &[Parameter],
-        (factors, mean, spectra): (&Factors, &Field, &[Spectrum]),
+        (factors, mean): (&Factors, &Field),
+        (spectra, spread): (&[Spectrum], &Field),
         texture: &Texture,
         with_variance: bool,
     ) -> Near {
@@ -150,8 +184,8 @@ impl Observed {
         let floor = 1e-6 * power.iter().copied().fold(0.0, f32::max);
         let power: Vec<f32> = power.into_iter().map(|p| p.max(floor)).collect();
         let gain = factors.gain as f32;
-        let left = torus.spectrum(&self.residual(gain, mean));
-        let mean = &mean.values;
+        let left = torus.spectrum(&self.residual_over(gain, mean, spread));
+        let scales = mean.values.iter().zip(&spread.values).map(|(m, s)| m * s);
         let slopes = texture.slopes(parameters, factor);
         let slopes: Vec<Option<Vec<f32>>> = slopes
             .par_iter()
@@ -162,7 +196,7 @@ impl Observed {
             self.information(scale, &power, (spectra, &slopes), taper.peakedness);
         let mut near = Near {
             score: score(torus, scale, (&left, &power), (spectra, &slopes)),
-            log_likelihood: self.log_likelihood(scale, (&left, &power), gain, mean),
+            log_likelihood: self.log_likelihood(scale, (&left, &power), gain, scales),
             information,
             of_power,
             rings: self.rings(scale, &left, &power),
@@ -175,9 +209,14 @@ impl Observed {
         near
     }
 
-    /// F[w ∂ln μ] by each parameter.
-    pub(super) fn spectra(&self, parameters: &[Parameter], expected: &Expected) -> Vec<Spectrum> {
-        let directions = self.directions(parameters, expected);
+    /// F[w ∂ln μ] over the spread by each parameter.
+    pub(super) fn spectra(
+        &self,
+        parameters: &[Parameter],
+        expected: &Expected,
+        spread: &Field,
+    ) -> Vec<Spectrum> {
+        let directions = self.directions(parameters, expected, spread);
         let mut spectra = Vec::new();
         for pair in directions.chunks(2) {
             let [first, last] = [&pair[0], &pair[pair.len() - 1]];
@@ -203,9 +242,19 @@ impl Observed {
         }
     }
 
-    /// w ∂ln μ by each parameter.
-    pub(super) fn directions(&self, parameters: &[Parameter], expected: &Expected) -> Vec<Field> {
-        let of = |p: &Parameter| self.direction(*p, expected);
+    /// w ∂ln μ over the spread by each parameter.
+    pub(super) fn directions(
+        &self,
+        parameters: &[Parameter],
+        expected: &Expected,
+        spread: &Field,
+    ) -> Vec<Field> {
+        let of = |p: &Parameter| {
+            let mut direction = self.direction(*p, expected);
+            let pixels = direction.values.iter_mut().zip(&spread.values);
+            pixels.for_each(|(value, spread)| *value /= spread);
+            direction
+        };
         parameters.iter().map(of).collect()
     }
 
@@ -238,7 +287,7 @@ impl Observed {
         scale: f64,
         (left, power): (&Spectrum, &[f32]),
         gain: f32,
-        mean: &[f32],
+        scales: impl Iterator<Item = f32>,
     ) -> f64 {
         let term = |n: usize| {
             let power = f64::from(power[n]);
@@ -246,7 +295,7 @@ impl Observed {
                 * (f64::from(left[n].norm_sqr()) / power + (power / self.taper.energy).ln())
         };
         let spectrum: f64 = (0..left.len()).map(term).sum();
-        let weighed = mean.iter().zip(&self.taper.weights.values);
+        let weighed = scales.zip(&self.taper.weights.values);
         let jacobian: f64 = match self.logarithmic {
             true => 0.0,
             false => weighed

@@ -1,18 +1,14 @@
-//! Maximum-likelihood estimate of ship and wind near a guess, with error bars.
+//! Maximum-likelihood estimate of ship and wind, with error bars.
 
-use super::ascent::{Ascent, Point, Until};
-use super::echo::Echo;
+use super::ascent::{Ascent, Point};
 use super::expected::ExpectedImage;
-use super::observed::Observed;
-use super::parameter::{Factors, Parameter};
+use super::parameter::Parameter;
 use super::priors::Priors;
 use super::value::Value;
 use crate::error::{Error, Result};
-use crate::linear::OpenSea;
-use crate::measure::{angle_between, axis_between};
-use crate::models::Models;
+use crate::measure::angle_between;
 use crate::raster::Field;
-use crate::scene::{Scene, Sea};
+use crate::scene::Scene;
 use serde::Serialize;
 
 /// Estimate of one value.
@@ -78,34 +74,8 @@ impl Estimate {
     }
 }
 
-/// Ends of an ascent, of the first ascent with a wind, and of the ship before it: errors of the mean image are larger than the last steps.
-const END: Until = Until {
-    steps: 20,
-    small: 0.4,
-};
-const FIRST: Until = Until {
-    steps: 5,
-    small: 2.0,
-};
-const SHIP: Until = Until {
-    steps: 8,
-    small: 2.0,
-};
-
-/// Ships that the wind is fitted to.
-const FOLLOWED: usize = 2;
-
-/// Starts around a guess: relative changes of the speed and changes of the heading \[deg\], about the width of a maximum.
-const AROUND: [[f64; 2]; 5] = [
-    [0.0, 0.0],
-    [0.007, 0.0],
-    [-0.007, 0.0],
-    [0.0, 0.7],
-    [0.0, -0.7],
-];
-
 /// Smallest log-likelihood ratio of a certain wake: fitting ten values to noise gains about 10 (chosen).
-const CERTAIN: f64 = 20.0;
+pub(super) const CERTAIN: f64 = 20.0;
 
 /// Largest acceptable misfit, and largest factors on brightness and texture in standard deviations of prior and estimate together (chosen).
 const EXPLAINED: f64 = 1.25;
@@ -115,115 +85,7 @@ const USUAL: [f64; 2] = [3.0, 2.0];
 const VAGUE: f64 = 0.15;
 const DOUBT: f64 = 0.05;
 
-/// Maximum-likelihood estimate of ship and wind near a guess.
-///
-/// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind. Standard deviations are those of the
-/// information times a factor for the error of the mean image (1.5 to 5, measured on simulated scenes). That of y also contains the shift by bright waves, which has another sign
-/// if the wind is reversed.
-///
-/// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
-/// standard deviations of prior and estimate together), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.
-///
-/// - `image`: intensity with speckle, in the unit of σ⁰, `[rows, columns]` of the scene's grid
-/// - `guess`: known radar, grid and water, and a guess of ship and wind
-/// - `priors`: calibration of the brightness and knowledge of the texture
-///
-/// # Errors
-///
-/// An image of another size than the grid or with a value that is negative or no number, a scene without exactly one ship, or as
-/// [`ExpectedImage::new`](super::ExpectedImage::new).
-///
-/// # Validity
-///
-/// Start within 1 % of the speed, 1 degree of the heading, and a tenth of the transverse wavelength (2πU²/g) of the position. Farther starts can converge to another
-/// maximum with similar standard deviations; [`estimate`](super::estimate) searches for the start. One ship on a straight track. The mean image has the limits of
-/// [`Likelihood`](super::Likelihood).
-pub fn refine(image: &Field, guess: &Scene, priors: &Priors) -> Result<Estimate> {
-    check(image, guess)?;
-    let echo = Echo::of(image, guess);
-    let observed = Observed::new(image.clone(), guess, |i, j| echo.shown(i, j));
-    let around = AROUND.map(|[faster, turned]| {
-        let mut start = guess.clone();
-        start.ships[0].speed *= 1.0 + faster;
-        start.ships[0].heading += turned;
-        start
-    });
-    settled(&observed, &around, &[], priors)
-}
-
-/// Highest maximum that is reached from the starts, with its alternatives.
-///
-/// - `seas`: other seas that the likeliest ship is tried on
-pub(super) fn settled(
-    observed: &Observed,
-    starts: &[Scene],
-    seas: &[Sea],
-    priors: &Priors,
-) -> Result<Estimate> {
-    let Some(ship) = starts.first().and_then(|start| start.ships.first()) else {
-        return Err(no_start());
-    };
-    let ascent = Ascent {
-        observed,
-        parameters: &Parameter::OF_WAKE,
-        priors,
-        length: ship.length,
-    };
-    let of_ship = Parameter::OF_WAKE.into_iter().filter(|p| p.is_of_ship());
-    let of_ship: Vec<Parameter> = of_ship.collect();
-    let logarithmic = observed.logarithmic();
-    let with_wind = Ascent {
-        observed: &logarithmic,
-        parameters: &of_ship,
-        ..ascent
-    };
-    // The ship first, with the brightness of the image and the wind of the start: what they explain wrongly would be explained as texture.
-    let mut ships = Vec::new();
-    for start in starts {
-        ships.push(with_wind.climb(start.clone(), as_bright(observed, start)?, SHIP)?);
-    }
-    sort(&mut ships);
-    let mut points = Vec::new();
-    if let Some(likeliest) = ships.first() {
-        let own = likeliest.scene.sea.wind_toward;
-        let other = |sea: &&Sea| axis_between(sea.wind_toward, own).abs() > 1.0;
-        for sea in seas.iter().filter(other) {
-            let mut scene = likeliest.scene.clone();
-            scene.sea = sea.clone();
-            let factors = as_bright(observed, &scene)?;
-            points.push(ascent.climb(scene, factors, FIRST)?);
-        }
-    }
-    for ship in ships.into_iter().take(FOLLOWED) {
-        points.push(ascent.climb(ship.scene, ship.factors, FIRST)?);
-    }
-    sort(&mut points);
-    let first = points.swap_remove(0);
-    let first = ascent.climb(first.scene, first.factors, END)?;
-    let mut opposite = first.scene.clone();
-    opposite.sea.wind_toward = (opposite.sea.wind_toward + 180.0).rem_euclid(360.0);
-    points.push(ascent.climb(opposite, first.factors, END)?);
-    points.push(first);
-    sort(&mut points);
-    let open = without_ship(observed, &points[0], priors)?;
-    concluded(&ascent, points, open)
-}
-
-/// The likeliest first.
-fn sort(points: &mut [Point]) {
-    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-}
-
-/// Factors that give a scene the brightness of the image.
-fn as_bright(observed: &Observed, scene: &Scene) -> Result<Factors> {
-    let mean = ExpectedImage::new(scene, &[])?.intensity(scene)?;
-    Ok(Factors {
-        gain: observed.gain(&mean),
-        ..Factors::default()
-    })
-}
-
-fn no_start() -> Error {
+pub(super) fn no_start() -> Error {
     Error::Conflict {
         name: "ship".to_owned(),
         value: "no start".to_owned(),
@@ -231,71 +93,16 @@ fn no_start() -> Error {
     }
 }
 
-/// Checks an image against the scene of its estimate.
-pub(super) fn check(image: &Field, guess: &Scene) -> Result<()> {
-    guess.validate()?;
-    let conflict = |name: &str, value: String, requirement: String| {
-        Err(Error::Conflict {
-            name: name.to_owned(),
-            value,
-            requirement,
-        })
-    };
-    let grid = &guess.grid;
-    if [image.rows, image.columns] != [grid.rows, grid.columns] {
-        let value = format!("{} x {} pixels", image.rows, image.columns);
-        let requirement = format!("but the grid has {} x {}", grid.rows, grid.columns);
-        return conflict("image", value, requirement);
-    }
-    if !image.values.iter().all(|v| v.is_finite() && *v >= 0.0) {
-        let requirement = "but intensities are finite and not negative".to_owned();
-        return conflict("image", "not an intensity".to_owned(), requirement);
-    }
-    if guess.ships.len() != 1 {
-        let requirement = "but the guess has one ship".to_owned();
-        return conflict("ship", format!("{} ships", guess.ships.len()), requirement);
-    }
-    Ok(())
-}
-
-/// Largest log-posterior of a sea without the ship.
-fn without_ship(observed: &Observed, point: &Point, priors: &Priors) -> Result<f64> {
-    let mut scene = point.scene.clone();
-    scene.ships.clear();
-    let of_sea = Parameter::OF_WAKE.into_iter().filter(|p| !p.is_of_ship());
-    let ascent = Ascent {
-        observed,
-        parameters: &of_sea.collect::<Vec<_>>(),
-        priors,
-        length: 1.0,
-    };
-    let found = ascent.climb(scene, point.factors, FIRST)?;
-    if point.log_posterior - found.log_posterior > 10.0 * CERTAIN {
-        return Ok(found.log_posterior);
-    }
-    Ok(ascent.climb(found.scene, found.factors, END)?.log_posterior)
-}
-
 /// Root mean square ratio of error to standard deviation of the information, on 18 simulated scenes: the error of the mean image and the covariance.
-fn model_error(parameter: Parameter) -> f64 {
-    match parameter {
-        Parameter::Value(Value::Speed) => 2.0,
-        Parameter::Value(Value::Heading) => 3.5,
-        Parameter::Value(Value::X) => 2.5,
-        Parameter::Value(Value::Y) => 5.0,
-        Parameter::Value(Value::WindSpeed) => 3.5,
-        Parameter::Value(Value::WindToward) => 4.5,
-        Parameter::Gain => 2.0,
-        Parameter::Texture => 3.0,
-        Parameter::Size | Parameter::Value(_) => 1.5,
-    }
+fn model_error(_: Parameter) -> f64 {
+    1.0
 }
 
 /// Factor on the difference of log-likelihood between opposite winds: about the inverse square of [`model_error`].
 const BELIEVED: f64 = 0.05;
 
 /// Estimate from maxima, the highest one first.
-fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estimate> {
+pub(super) fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estimate> {
     let mut points = points.into_iter();
     let first = points.next().ok_or_else(no_start)?;
     let top = first.log_posterior;
@@ -313,7 +120,7 @@ fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estim
     let total = 1.0 + others.iter().map(|a| a.weight).sum::<f64>();
     for other in &mut others {
         other.weight /= total;
-        other.scene = corrected(&other.scene);
+        other.scene = wrapped(&other.scene);
     }
     let mut covariance = ascent.covariance(&best);
     if let Some(covariance) = &mut covariance {
@@ -322,10 +129,13 @@ fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estim
         for (n, value) in covariance.values.iter_mut().enumerate() {
             *value *= factors[n / count] * factors[n % count];
         }
-        // The wind may be reversed, so the correction of the position is as uncertain as it is large.
-        let y = Parameter::Value(Value::Y);
-        if let Some(n) = ascent.parameters.iter().position(|p| *p == y) {
-            covariance.add(n, n, drift(&best.scene).powi(2));
+        // Another wind moves the ship.
+        for other in &others {
+            let away = ascent.parameters.iter().map(|p| away(*p, &best, other));
+            let away: Vec<f64> = away.collect();
+            for (n, value) in covariance.values.iter_mut().enumerate() {
+                *value += other.weight * away[n / count] * away[n % count];
+            }
         }
     }
     let deviation = |n: usize| {
@@ -335,7 +145,7 @@ fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estim
     let mut mean = ExpectedImage::new(&best.scene, &[])?.intensity(&best.scene)?;
     let factor = best.factors.gain as f32;
     mean.values.iter_mut().for_each(|v| *v *= factor);
-    let scene = corrected(&best.scene);
+    let scene = wrapped(&best.scene);
     let (gain, texture) = (best.factors.gain.ln(), best.factors.texture.ln());
     let value = |parameter: Parameter| match parameter {
         Parameter::Gain => gain,
@@ -369,7 +179,24 @@ fn concluded(ascent: &Ascent<'_>, points: Vec<Point>, open: f64) -> Result<Estim
     Ok(found)
 }
 
-/// Tests of [`refine`].
+/// Difference of a value of the ship at another maximum of the same speed; 0 for all others.
+fn away(parameter: Parameter, best: &Point, other: &Alternative) -> f64 {
+    let is_of_ship = parameter.is_of_ship() && !is_other_speed(&best.scene, &other.scene);
+    let value = match parameter {
+        Parameter::Size => Value::Size,
+        Parameter::Value(value) => value,
+        Parameter::Gain | Parameter::Texture => return 0.0,
+    };
+    match is_of_ship {
+        true if value == Value::Heading => {
+            angle_between(value.of(&other.scene), value.of(&best.scene))
+        }
+        true => value.of(&other.scene) - value.of(&best.scene),
+        false => 0.0,
+    }
+}
+
+/// Tests of [`refine`](super::refine).
 fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
     // Of a factor in standard deviations of its prior and of its estimate together.
     let is_usual = |parameter: Parameter, prior: f64, limit: f64| {
@@ -384,7 +211,7 @@ fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
             power.max(power.recip()) < EXPLAINED + 3.0 / count.max(1.0).sqrt()
         });
     let [speed, deviation] = found.of(Parameter::Value(Value::Speed));
-    let is_other = |a: &&Alternative| (Value::Speed.of(&a.scene) / speed).ln().abs() > OTHER_SPEED;
+    let is_other = |a: &&Alternative| is_other_speed(&found.scene, &a.scene);
     let others = found.alternatives.iter().filter(is_other);
     let doubt: f64 = others.map(|a| a.weight).sum();
     usual
@@ -394,39 +221,23 @@ fn is_identifiable(found: &Estimate, best: &Point, priors: &Priors) -> bool {
         && doubt < DOUBT
 }
 
-/// The scene with directions from 0 to 360 degrees, and its ship where bright waves of the sea do not shift it.
-fn corrected(scene: &Scene) -> Scene {
-    let shift = drift(scene);
+/// The scene with directions from 0 to 360 degrees.
+fn wrapped(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.sea.wind_toward = scene.sea.wind_toward.rem_euclid(360.0) % 360.0;
     if let Some(ship) = scene.ships.first_mut() {
-        ship.position[1] -= shift;
         ship.heading = ship.heading.rem_euclid(360.0) % 360.0;
     }
     scene
 }
 
-/// Azimuth shift of the mean image \[m\], to first order: brightness-weighted mean displacement by velocity bunching.
-///
-/// ```text
-/// ⟨R s⟩ = (R/V) Σ ⟨ζ²⟩ Re m T_v*,     m tilt, hydrodynamic modulation and range bunching
-/// ```
-fn drift(scene: &Scene) -> f64 {
-    let models = Models::new(scene);
-    let open = OpenSea::new(&models);
-    let transfer = open.modulation_of(&open.averaged(&models));
-    let waves = open.waves.iter().map(|wave| {
-        let m = transfer.at(wave.k, wave.omega);
-        let radial = models.transfer.radial(wave.k, wave.omega);
-        let brightness = m.tilt + m.hydrodynamic + m.range_bunching;
-        wave.variance * (brightness * radial.conj()).re
-    });
-    models.range_to_velocity * waves.sum::<f64>()
-}
-
 /// Relative difference below which two speeds are the same, and above which they are fringes apart: a fringe is a transverse wavelength over twice the wake's length, some 4 %.
 const SAME_SPEED: f64 = 0.005;
 const OTHER_SPEED: f64 = 0.02;
+
+fn is_other_speed(a: &Scene, b: &Scene) -> bool {
+    (Value::Speed.of(a) / Value::Speed.of(b)).ln().abs() > OTHER_SPEED
+}
 
 /// Whether two scenes belong to the same maximum.
 fn same(a: &Scene, b: &Scene) -> bool {

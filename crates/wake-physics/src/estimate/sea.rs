@@ -1,73 +1,99 @@
-//! Covariance of the imaged open sea by the nonlinear transform: velocity bunching in full, the rest of the modulation to
-//! first order.
+//! Covariance of the imaged open sea by the nonlinear transform: brightness and velocity bunching in full, range bunching to first order.
 //!
-//! Sources of relative strength 1 + R are displaced by s in azimuth. R and s are Gaussian, so in closed form
+//! Sources of relative strength e^m are displaced by s in azimuth and by d in range. m, s and d are Gaussian, so in closed form
 //!
 //! ```text
-//! P(k) = q² T²(k) Σ_r e^{−ik·r} [ e^{−ky²(σ² − ρ_ss(r))} {1 + ρ_RR(r) + i ky Δ(r) + ky² D(r) D(−r)} − e^{−ky²σ²} ]
-//! Δ(r) = ρ_Rs(r) − ρ_Rs(−r),     D(r) = ρ_Rs(r) − ρ_Rs(0),     ρ_ab(r) = ⟨a(x + r) b(x)⟩,     σ² = ρ_ss(0)
+//! P(k) = q² T²(k) Σ_r e^{−ik·r} [ W(r) {1 + i kx (Δ_d(r) + i ky Q(r))} − e^{−ky²σ²} ]
+//! W(r) = g(r) exp(ρ_mm(r) + i ky Δ_s(r) − ky² (σ² − ρ_ss(r)))
+//! Δ_a(r) = ρ_ma(r) − ρ_ma(−r),     Q(r) = 2ρ_ds(0) − ρ_ds(r) − ρ_ds(−r),     ρ_ab(r) = ⟨a(x + r) b(x)⟩,     σ² = ρ_ss(0)
+//! g(r) = (1 + ½ vᵀHv)(1 + ½ uᵀHu) + vᵀHCHu + ½ tr HCHC,     v = ⟨∇ζ(x + r) m(x)⟩,     u = v(−r),     C = ⟨∇ζ(x + r) ∇ζ(x)ᵀ⟩
 //! ```
 //!
-//! T: azimuth smear of unresolved waves and impulse response; q: share of the intensity that waves modulate. The terms of first
-//! order in ρ are the quasi-linear spectrum of [`LinearSea`](crate::simulate::LinearSea).
+//! m: tilt and hydrodynamic modulation to first order; H: second derivatives of ln σ⁰ by the slopes, those along x and y; T: azimuth smear of
+//! unresolved waves, the share of sources between two pixels, and impulse response; q²: square of the share of the intensity that waves modulate. The
+//! terms of first order in ρ are the quasi-linear spectrum of [`LinearSea`](crate::simulate::LinearSea).
 //!
 //! # References
 //!
-//! Hasselmann and Hasselmann (1991), J. Geophys. Res. 96(C6), 10713; Krogstad (1992), J. Geophys. Res. 97(C2), 2421.
+//! Hasselmann and Hasselmann (1991), J. Geophys. Res. 96(C6), 10713; Krogstad (1992), J. Geophys. Res. 97(C2), 2421 (velocity bunching in full, modulation
+//! to second order).
 
 use super::torus::Torus;
 use crate::dispersion::angular_frequency;
 use crate::error::Result;
 use crate::fft::{fast_length, lattice_sum, signed_index};
-use crate::linear::OpenSea;
-use crate::numeric::{vector::exp, vectorized};
+use crate::linear::curvature_of;
+use crate::numeric::vector::{cos_sin, exp};
+use crate::numeric::vectorized;
 use crate::prepared::Prepared;
 use crate::raster::Field;
+use crate::sar::smooth::SMALLEST_VARIANCE;
 use crate::scattering::modulation::smear;
 use crate::scene::Scene;
 use crate::simulate::linear_sea::{GUARD, add_swell};
 use crate::surface::wave_variances;
 use num_complex::{Complex32, Complex64};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Pixels of a period of the covariance of a grid.
 pub(super) fn period(scene: &Scene) -> usize {
     fast_length(scene.grid.rows.max(scene.grid.columns) + GUARD)
 }
 
-/// Covariances of modulation and displacement by distance, `[period, period]`.
+/// Number of the sums that they are made of.
+const SUMS: usize = 10;
+
+/// Covariances of brightness and displacement by distance, `[period, period]`, displacements in pixels.
+#[derive(Default)]
 struct Correlations {
     period: usize,
-    modulation: Vec<f64>,
-    /// In pixels².
+    /// Logarithm of the mean product of two brightnesses.
+    brightness: Vec<f64>,
+    /// Displacement in azimuth.
     displacement: Vec<f64>,
-    /// ⟨R(x + r) s(x)⟩ [pixels].
-    both: Vec<f64>,
-    /// The same at the opposite column, of the columns up to half the period.
-    mirrored: Vec<f64>,
-    /// Largest covariance of the displacement in each row [pixels²].
+    /// Largest one of each row.
     largest: Vec<f64>,
+    /// ρ(r) − ρ(−r) of brightness and displacement in azimuth, then in range.
+    moving: [Vec<f64>; 2],
+    /// 2ρ(0) − ρ(r) − ρ(−r) of displacements in range and azimuth.
+    apart: Vec<f64>,
 }
+
+/// Smallest factor on the mean product of brightnesses: a second-order sum has no lower bound.
+const SMALLEST_FACTOR: f64 = 1e-3;
 
 /// Exponents below which a pair of pixels counts as independent.
 const INDEPENDENT: f64 = -16.0;
 
 impl Correlations {
-    /// - `of`: modulation and displacement in pixels of each wave
-    fn new(variances: &[f32], period: usize, of: impl Fn(usize) -> [Complex64; 2] + Sync) -> Self {
-        let waves: Vec<[Complex32; 3]> = variances
+    /// - `of`: modulation, displacement in azimuth and in range and slopes along x and y of each wave
+    /// - `curvature`: second derivatives of ln σ⁰ by the slopes
+    fn new(
+        variances: &[f32],
+        period: usize,
+        curvature: [f64; 2],
+        of: impl Fn(usize) -> [Complex64; 5] + Sync,
+    ) -> Self {
+        let waves: Vec<[Complex32; SUMS]> = variances
             .par_iter()
             .enumerate()
             .map(|(n, &variance)| {
                 if variance <= 0.0 {
-                    return [Complex32::default(); 3];
+                    return [Complex32::default(); SUMS];
                 }
-                let [r, s] = of(n);
+                let [m, s, q, x, y] = of(n);
                 let products = [
-                    Complex64::from(r.norm_sqr()),
-                    s.norm_sqr().into(),
-                    r * s.conj(),
+                    m * m.conj(),
+                    s * s.conj(),
+                    m * s.conj(),
+                    m * q.conj(),
+                    q * s.conj(),
+                    x * m.conj(),
+                    y * m.conj(),
+                    x * x.conj(),
+                    x * y.conj(),
+                    y * y.conj(),
                 ];
                 products.map(|p| {
                     let p = p * f64::from(variance);
@@ -80,59 +106,88 @@ impl Correlations {
             let [re, _] = lattice_sum(&mut lines, [period; 2], [period; 2]);
             re.into_iter().map(f64::from).collect()
         };
-        let mut sums: Vec<Vec<f64>> = (0..3).into_par_iter().map(sum).collect();
-        let both = sums.pop().unwrap_or_default();
-        let displacement = sums.pop().unwrap_or_default();
-        let mirrored = both
-            .chunks_exact(period)
-            .flat_map(|row: &[f64]| (0..period / 2 + 1).map(move |j| row[(period - j) % period]));
+        let sums: Vec<Vec<f64>> = (0..SUMS).into_par_iter().map(sum).collect();
+        let Ok([m, displacement, ms, mq, qs, xm, ym, xx, xy, yy]) =
+            <[Vec<f64>; SUMS]>::try_from(sums)
+        else {
+            return Self::default();
+        };
+        let opposite =
+            |n: usize| (period - n / period) % period * period + (period - n % period) % period;
+        let odd = |of: &[f64]| (0..of.len()).map(|n| of[n] - of[opposite(n)]).collect();
+        let [hx, hy] = curvature;
+        let brightness = |n: usize| {
+            let [a, b] = [[xm[n], ym[n]], [xm[opposite(n)], ym[opposite(n)]]];
+            let bent = |[x, y]: [f64; 2]| 0.5 * (hx * x * x + hy * y * y);
+            let [ha, hb] = [a, b].map(|[x, y]| [hx * x, hy * y]);
+            let across =
+                ha[0] * (xx[n] * hb[0] + xy[n] * hb[1]) + ha[1] * (xy[n] * hb[0] + yy[n] * hb[1]);
+            let both = (hx * xx[n]).powi(2) + 2.0 * hx * hy * xy[n].powi(2) + (hy * yy[n]).powi(2);
+            let factor = (1.0 + bent(a)) * (1.0 + bent(b)) + across + 0.5 * both;
+            m[n] + factor.max(SMALLEST_FACTOR).ln()
+        };
         let most = |row: &[f64]| row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self {
             period,
+            brightness: (0..m.len()).map(brightness).collect(),
             largest: displacement.chunks(period).map(most).collect(),
-            modulation: sums.pop().unwrap_or_default(),
             displacement,
-            mirrored: mirrored.collect(),
-            both,
+            moving: [odd(&ms), odd(&mq)],
+            apart: (0..qs.len())
+                .map(|n| 2.0 * qs[0] - qs[n] - qs[opposite(n)])
+                .collect(),
         }
     }
 
-    /// Σ over rows of the brackets times e^{i ky i}, for each column of the half plane.
+    /// Σ over rows of the brackets times e^{i ky i}, for each column of the half plane: the real and imaginary part of the bracket without kx, and of
+    /// the factor of i kx.
     ///
     /// - `ky` [rad/pixel]
-    fn line(&self, ky: f64) -> [Vec<f64>; 2] {
+    fn line(&self, ky: f64) -> [Vec<f64>; 4] {
         let (period, half) = (self.period, self.period / 2 + 1);
         let square = ky * ky;
         let variance = self.displacement[0];
-        let (rest, off) = (exp(-square * variance), self.both[0]);
-        let mut sums = [vec![0.0; half], vec![0.0; half]];
+        let rest = exp(-square * variance);
+        let mut sums = [0; 4].map(|_| vec![0.0; half]);
         vectorized(
             #[inline(always)]
             || {
-                let [re, im] = &mut sums;
                 let reaching = |i: &usize| square * (self.largest[*i] - variance) > INDEPENDENT;
                 for i in (0..period).filter(reaching) {
                     let (sin, cos) = (ky * i as f64).sin_cos();
                     let row = i * period..i * period + half;
-                    let mirror = (period - i) % period * half;
-                    let back = &self.mirrored[mirror..mirror + half];
                     let displacement = &self.displacement[row.clone()];
-                    let modulation = &self.modulation[row.clone()];
-                    let here = &self.both[row];
+                    let brightness = &self.brightness[row.clone()];
+                    let azimuth = &self.moving[0][row.clone()];
+                    let range = &self.moving[1][row.clone()];
+                    let apart = &self.apart[row];
+                    let [re, im, along, across] = &mut sums;
                     let (re, im) = (&mut re[..half], &mut im[..half]);
+                    let (along, across) = (&mut along[..half], &mut across[..half]);
                     for j in 0..half {
-                        let weight = exp(square * (displacement[j] - variance));
-                        let bent = square * (here[j] - off) * (back[j] - off);
-                        let even = weight * (1.0 + modulation[j] + bent) - rest;
-                        let odd = weight * ky * (here[j] - back[j]);
-                        re[j] += even * cos - odd * sin;
-                        im[j] += even * sin + odd * cos;
+                        let weight = exp(square * (displacement[j] - variance) + brightness[j]);
+                        let [even, odd] = cos_sin(turns(ky * azimuth[j]));
+                        let [even, odd] = [even, odd].map(|v| weight * f64::from(v));
+                        // The phase of the row.
+                        let [a, b] = [even * cos - odd * sin, even * sin + odd * cos];
+                        re[j] += a - rest * cos;
+                        im[j] += b - rest * sin;
+                        along[j] += a * range[j] - b * ky * apart[j];
+                        across[j] += b * range[j] + a * ky * apart[j];
                     }
                 }
             },
         );
         sums
     }
+}
+
+/// An angle [rad] in units of 2⁻³² turns.
+#[inline(always)]
+fn turns(angle: f64) -> u32 {
+    let turns = angle * (1.0 / TAU);
+    let part = turns - turns.round_ties_even();
+    (part * 4_294_967_296.0) as i32 as u32
 }
 
 /// Covariance \[1\] of the relative intensity of the open sea of a scene before speckle by distance in rows and columns,
@@ -158,20 +213,30 @@ pub(super) fn covariance(scene: &Scene) -> Result<Field> {
     let step = TAU / (period as f64 * spacing);
     let mut variances = wave_variances(&models.sea, period, spacing);
     add_swell(models.swell.as_ref(), &mut variances, period, step);
-    let transfer = OpenSea::modulation_of(&open, &open.averaged(&models));
+    let averaged = open.averaged(&models);
+    let transfer = open.modulation_of(&averaged);
     let wavenumber = |n: usize| signed_index(n, period) as f64 * step;
-    let correlations = Correlations::new(&variances, period, |n| {
+    // Toward column 0 is toward the radar, toward row 0 toward larger y.
+    let lean = -1.0 / (models.incidence.tan() * spacing);
+    let elevation: f64 = variances.iter().map(|v| f64::from(*v)).sum();
+    let correlations = Correlations::new(&variances, period, curvature_of(&averaged), |n| {
         let k = [wavenumber(n / period), wavenumber(n % period)];
         let omega = angular_frequency(k[0].hypot(k[1]), models.sea.depth());
         let m = transfer.at(k, omega);
         let radial = models.transfer.radial(k, omega);
-        let modulation = m.tilt + m.hydrodynamic + m.range_bunching;
-        // Toward row 0 a displacement is one toward larger y.
-        [modulation, radial * (models.range_to_velocity / spacing)]
+        let slopes = k.map(|k| Complex64::i() * k);
+        [
+            m.tilt + m.hydrodynamic,
+            radial * (models.range_to_velocity / spacing),
+            lean.into(),
+            slopes[0],
+            slopes[1],
+        ]
     });
     let half = period / 2 + 1;
-    let resolution = models.resolution().at(0.0);
-    let lines: Vec<[Vec<f64>; 2]> = (0..half)
+    let narrowest = PI * (2.0 * SMALLEST_VARIANCE).sqrt() * spacing;
+    let resolution = models.resolution().at(0.0).max(narrowest);
+    let lines: Vec<[Vec<f64>; 4]> = (0..half)
         .into_par_iter()
         .map(|a| {
             let ky = a as f64 * step;
@@ -184,42 +249,70 @@ pub(super) fn covariance(scene: &Scene) -> Result<Field> {
         })
         .collect();
     let share = open.modulated_share(&effects.added()).powi(2);
-    let rows: Vec<Vec<f64>> = (0..period)
-        .into_par_iter()
-        .map(|i| {
-            let mut row = vec![0.0; half];
-            for (a, [re, im]) in lines.iter().enumerate() {
-                let (sin, cos) = (a as f64 * step * spacing * i as f64).sin_cos();
+    let row = |i: usize| {
+        let mut row = [vec![0.0; half], vec![0.0; half]];
+        for (a, [re, im, along, across]) in lines.iter().enumerate() {
+            let (sin, cos) = (a as f64 * step * spacing * i as f64).sin_cos();
+            for (row, [re, im]) in row.iter_mut().zip([[re, im], [along, across]]) {
                 for (sum, (re, im)) in row.iter_mut().zip(re.iter().zip(im)) {
                     *sum += re * cos + im * sin;
                 }
             }
-            row
-        })
-        .collect();
-    let value = |n: usize| {
-        let (i, j) = (n / period, n % period);
-        let value = match j < half {
-            true => rows[i][j],
-            false => rows[(period - i) % period][period - j],
+        }
+        row
+    };
+    let rows: Vec<[Vec<f64>; 2]> = (0..period).into_par_iter().map(row).collect();
+    // The bracket is even, the factor of i kx odd.
+    let field = |order: usize| {
+        let value = |n: usize| {
+            let (i, j) = (n / period, n % period);
+            let value = match j < half {
+                true => rows[i][order][j],
+                false => [1.0, -1.0][order] * rows[(period - i) % period][order][period - j],
+            };
+            (share * value) as f32
         };
-        (share * value) as f32
-    };
-    let field = Field {
-        rows: period,
-        columns: period,
-        values: (0..period * period).map(value).collect(),
-    };
-    let Some(response) = &models.response else {
-        return Ok(field);
+        Field {
+            rows: period,
+            columns: period,
+            values: (0..period * period).map(value).collect(),
+        }
     };
     let torus = Torus::new(period);
-    let mut spectrum = torus.spectrum(&field);
-    for (n, value) in spectrum.iter_mut().enumerate() {
-        let left = response.azimuth.intensity_transfer(wavenumber(n / period))
-            * response.range.intensity_transfer(wavenumber(n % period));
-        *value *= (left * left) as f32;
+    let [mut spectrum, slope] = torus
+        .spectra([&field(0), &field(1)])
+        .try_into()
+        .unwrap_or_default();
+    let between = between_pixels(lean * lean * elevation);
+    for (n, (value, slope)) in spectrum.iter_mut().zip(&slope).enumerate() {
+        let [ky, kx] = [wavenumber(n / period), wavenumber(n % period)];
+        // Waves at half the sampling rate have no odd part.
+        // The torus has e^{+i kx x}.
+        let odd = if 2 * (n % period) == period {
+            0.0
+        } else {
+            kx * spacing
+        };
+        *value -= slope * Complex32::new(0.0, odd as f32);
+        let mut left = 1.0 - 2.0 * between * (1.0 - (kx * spacing).cos());
+        if let Some(response) = &models.response {
+            let both =
+                response.azimuth.intensity_transfer(ky) * response.range.intensity_transfer(kx);
+            left *= both * both;
+        }
+        *value *= left as f32;
     }
     let [field, _] = torus.fields([&spectrum, &spectrum], [period; 2]);
     Ok(field)
+}
+
+/// Mean of d(1 − d), d the part of a Gaussian displacement that lies between two pixels: a source there is shared by both.
+///
+/// - `variance` of the displacement [pixel²]
+fn between_pixels(variance: f64) -> f64 {
+    let term = |n: i32| {
+        let square = (PI * f64::from(n)).powi(2);
+        (-2.0 * square * variance).exp() / square
+    };
+    1.0 / 6.0 - (1..=50).map(term).sum::<f64>()
 }

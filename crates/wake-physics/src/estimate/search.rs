@@ -47,6 +47,9 @@ const ASTERN: f64 = 0.38;
 /// Step of the headings times the length of the wake [deg m].
 const TURN: f64 = 1125.0;
 
+/// Distance that a wake is searched within around an answer, in transverse waves.
+const WAVES_AWAY: f64 = 1.2;
+
 /// Tolerance of drawn wakes.
 const TOLERANCE: f64 = 0.05;
 
@@ -155,37 +158,49 @@ impl<'a> Search<'a> {
     ///
     /// - `anywhere`: at all places of the sighting, not only around that of the answer
     pub(super) fn whole(&self, found: &Found, anywhere: bool) -> Result<Found> {
+        let course = found.course;
+        let length = self.length(found);
+        let finer = length / near(course.speed);
+        let by_speed = step(course.speed, length).min(STEP / finer.max(1.0));
+        let steps = (2.0 * finer).ceil().clamp(2.0, 4.0) as i32;
+        let reach = match anywhere {
+            true => Sighting::REACH * self.sighting.place_sd,
+            false => WAVES_AWAY * TAU * course.speed.powi(2) / GRAVITY,
+        };
+        let each = course.around([steps, 2], [by_speed, 0.5 * TURN / length]);
+        self.best_around(found, &each, reach)
+    }
+
+    /// Best answer of the whole wake next to an answer with another wind.
+    pub(super) fn beside(&self, found: &Found) -> Result<Found> {
+        let course = found.course;
+        let length = self.length(found);
+        let steps = [0.25 * step(course.speed, length), 0.2 * TURN / length];
+        let reach = WAVES_AWAY * TAU * course.speed.powi(2) / GRAVITY;
+        self.best_around(found, &course.around([1, 5], steps), reach)
+    }
+
+    /// Length of the wake in the image \[m\].
+    fn length(&self, found: &Found) -> f64 {
+        let forward = direction(found.course.heading);
+        let [height, across] =
+            [self.image.rows, self.image.columns].map(|n| 0.5 * n as f64 * self.image.spacing);
+        let astern = |[sx, sy]: [f64; 2]| {
+            let corner = [sx * across - found.place[0], sy * height - found.place[1]];
+            -(corner[0] * forward[0] + corner[1] * forward[1])
+        };
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+        corners.map(astern).into_iter().fold(NEAR[0], f64::max)
+    }
+
+    /// Best of some courses near an answer by the whole wake.
+    fn best_around(&self, found: &Found, each: &[Course], reach: f64) -> Result<Found> {
         let Found { course, place, .. } = *found;
         let mut scene = self.scene.clone();
         scene.grid.rows += 2 * MARGIN;
         scene.grid.columns += 2 * MARGIN;
         let drawn = Drawn::new(&scene, course, place, self.open)?;
-        let forward = direction(course.heading);
-        let [height, across] =
-            [self.image.rows, self.image.columns].map(|n| 0.5 * n as f64 * self.image.spacing);
-        let astern = |[sx, sy]: [f64; 2]| {
-            let corner = [sx * across - place[0], sy * height - place[1]];
-            -(corner[0] * forward[0] + corner[1] * forward[1])
-        };
-        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-        let length = corners.map(astern).into_iter().fold(NEAR[0], f64::max);
-        let finer = length / near(course.speed);
-        let speed_step = step(course.speed, length).min(STEP / finer.max(1.0));
-        let turn = TURN / length;
-        let steps = (2.0 * finer).ceil().clamp(2.0, 4.0) as i32;
-        let each: Vec<Course> = (-steps..=steps)
-            .flat_map(|n| {
-                (-2..=2).map(move |m| Course {
-                    speed: course.speed * (f64::from(n) * speed_step).exp(),
-                    heading: course.heading + 0.5 * f64::from(m) * turn,
-                })
-            })
-            .collect();
         let changes = |course| drawn.moved(&self.image, (course, place), |_| 1.0);
-        let reach = match anywhere {
-            true => Sighting::REACH * self.sighting.place_sd,
-            false => 1.2 * TAU * course.speed.powi(2) / GRAVITY,
-        };
         let all = each
             .par_chunks(2)
             .filter_map(|pair| self.best(pair, (place, reach), changes));

@@ -20,6 +20,20 @@ pub(super) struct Course {
 }
 
 impl Course {
+    /// Courses around it.
+    ///
+    /// - `count` on either side, `step`: of the logarithm of the speed and of the heading \[deg\]
+    pub(super) fn around(self, count: [i32; 2], step: [f64; 2]) -> Vec<Self> {
+        let speeds = -count[0]..=count[0];
+        let of_speed = |n: i32| {
+            (-count[1]..=count[1]).map(move |m| Self {
+                speed: self.speed * (f64::from(n) * step[0]).exp(),
+                heading: self.heading + f64::from(m) * step[1],
+            })
+        };
+        speeds.flat_map(of_speed).collect()
+    }
+
     /// The scene with its ship on the course.
     ///
     /// - `midship` (x, y) at the time of the image \[m\]

@@ -11,7 +11,7 @@ mod wake;
 mod waves;
 
 pub(crate) use amplitudes::Amplitudes;
-pub(crate) use open_sea::{OpenSea, over_mean};
+pub(crate) use open_sea::{OpenSea, curvature_of, over_mean};
 pub(crate) use waves::WaveSample;
 
 use crate::models::Models;

@@ -58,7 +58,7 @@ impl OpenSea {
             tilt,
             range_to_velocity: models.range_to_velocity,
             backscatter,
-            curvature,
+            curvature: curvature.map(f64::abs),
         }
     }
 
@@ -123,6 +123,13 @@ impl OpenSea {
     }
 }
 
+/// Second derivatives of ln σ⁰ by the slopes along x and y.
+pub(crate) fn curvature_of(models: &Models) -> [f64; 2] {
+    slope_of_ln_sigma(&models.backscatter(true, true))
+        .1
+        .map(|half| 2.0 * half)
+}
+
 /// Share of the Bragg return in a mean σ⁰, Bragg and specular \[1\].
 fn bragg_share(mean: [f64; 2]) -> f64 {
     let total = mean[0] + mean[1];
@@ -165,7 +172,7 @@ fn slope_of_ln_sigma(backscatter: &Backscatter) -> ([f64; 2], [f64; 2]) {
         let (up, down) = (ln_sigma(step), ln_sigma([-step[0], -step[1]]));
         if (up + down + calm).is_finite() {
             first[axis] = (up - down) / (2.0 * SLOPE_STEP);
-            second[axis] = (0.5 * (up + down - 2.0 * calm) / SLOPE_STEP.powi(2)).abs();
+            second[axis] = 0.5 * (up + down - 2.0 * calm) / SLOPE_STEP.powi(2);
         }
     }
     (first, second)

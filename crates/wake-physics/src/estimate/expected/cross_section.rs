@@ -7,6 +7,7 @@
 //! The Bragg return of plane facets is computed on a lattice of slopes and convolved with p by its Fourier transform, so that the knots of the
 //! spline are points of the lattice; derivatives by the slope are those of the spline, derivatives by wind and incidence are central differences of all values.
 
+use super::bright::BrightWaves;
 use crate::fft::{fast_length, signed_index};
 use crate::scattering::Backscatter;
 use num_complex::Complex64;
@@ -18,14 +19,20 @@ use std::sync::Arc;
 /// Largest spacing of plane facets \[1\]: that of the first try of the table.
 const SPACING: f64 = 0.02;
 
+/// Step of the derivatives of the specular return by slope, in units of the covariance of slope and velocity.
+const STEP: f64 = 0.03;
+
 /// Standard deviations that an average looks at.
 const REACH: f64 = 5.5;
 
 /// Values by which tables are differenced: wind speed, wind direction, incidence.
 pub(super) const OUTER: usize = 3;
 
-/// Bragg return, specular return, and the derivatives of both by the outer values.
-const CHANNELS: usize = 2 * (1 + OUTER);
+/// Bragg return, specular return, both times the velocity of the waves, and both times what its square has beyond its variance.
+const PARTS: usize = 6;
+
+/// The parts and their derivatives by the outer values.
+const CHANNELS: usize = PARTS * (1 + OUTER);
 
 /// Cells of the spline across the square of slopes, and beyond it on each side, where the conditions at its ends fade.
 const CELLS: usize = 64;
@@ -42,38 +49,42 @@ pub(super) struct CrossSection {
 /// Coefficients along each axis.
 const SIDE: usize = CELLS + 2 * BEYOND + 1;
 
-/// σ⁰ at one slope: Bragg and specular.
+/// σ⁰ at one slope: Bragg and specular, the means of both times the velocity u toward the radar of the waves of the sea \[m/s\], and of both times u² − ⟨u²⟩.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct At {
-    pub(super) value: [f64; 2],
+    pub(super) value: [f64; PARTS],
     /// By the slopes along x and y.
-    pub(super) slope: [[f64; 2]; 2],
+    pub(super) slope: [[f64; 2]; PARTS],
     /// By wind speed, wind direction and incidence.
-    pub(super) outer: [[f64; OUTER]; 2],
+    pub(super) outer: [[f64; OUTER]; PARTS],
 }
+
+/// Plane facets and the sea that they are on.
+pub(super) type Facets = (Backscatter, BrightWaves);
 
 impl CrossSection {
     /// σ⁰ over the square of slopes up to `reach`.
     ///
     /// - `outer`: for each outer value σ⁰ at a step below and above, and twice the step; `None` for no derivative
     pub(super) fn new(
-        here: &Backscatter,
-        outer: &[Option<([&Backscatter; 2], f64)>; OUTER],
+        here: &Facets,
+        outer: &[Option<([&Facets; 2], f64)>; OUTER],
         reach: f64,
     ) -> Self {
-        let lattice = Lattice::new(reach, here.tilt.principal_axes().variance[0].sqrt());
+        let lattice = Lattice::new(reach, here.0.tilt.principal_axes().variance[0].sqrt());
         let moved = outer.iter().flatten().flat_map(|(pair, _)| *pair);
-        let all: Vec<&Backscatter> = std::iter::once(here).chain(moved).collect();
+        let all: Vec<&Facets> = std::iter::once(here).chain(moved).collect();
         let mut tables = all
             .par_iter()
-            .map(|backscatter| lattice.averages(backscatter))
+            .map(|facets| lattice.averages(facets))
             .collect::<Vec<_>>()
             .into_iter();
         let mut channels = vec![[0.0; CHANNELS]; SIDE * SIDE];
-        let mut put = |channel: usize, values: &mut dyn Iterator<Item = [f64; 2]>| {
+        let mut put = |channel: usize, values: &mut dyn Iterator<Item = [f64; PARTS]>| {
             for (to, from) in channels.iter_mut().zip(values) {
-                to[channel] = from[0];
-                to[channel + 1 + OUTER] = from[1];
+                for (n, from) in from.into_iter().enumerate() {
+                    to[channel + n * (1 + OUTER)] = from;
+                }
             }
         };
         put(0, &mut tables.next().unwrap_or_default().into_iter());
@@ -84,7 +95,7 @@ impl CrossSection {
                 pair.and_then(|_| tables.next()),
             ) {
                 let pairs = below.iter().zip(&above);
-                let mut slopes = pairs.map(|(a, b)| [(b[0] - a[0]) / width, (b[1] - a[1]) / width]);
+                let mut slopes = pairs.map(|(a, b)| std::array::from_fn(|n| (b[n] - a[n]) / width));
                 put(1 + n, &mut slopes);
             }
         }
@@ -110,35 +121,35 @@ impl CrossSection {
         }
         let [[u, du], [v, dv]] = weights;
         let mut value = [0.0; CHANNELS];
-        let mut first = [[0.0; 2]; 2];
+        let mut first = [[0.0; 2]; PARTS];
         for j in 0..4 {
             let start = (first_cell[1] + j) * SIDE + first_cell[0];
             let Some(line) = self.coefficients[start..].first_chunk::<4>() else {
                 continue;
             };
             let mut sum = [0.0; CHANNELS];
-            let mut slope = [0.0; 2];
+            let mut slope = [0.0; PARTS];
             for (i, c) in line.iter().enumerate() {
                 for (sum, c) in sum.iter_mut().zip(c) {
                     *sum += u[i] * c;
                 }
-                for (n, c) in [c[0], c[1 + OUTER]].into_iter().enumerate() {
-                    slope[n] += du[i] * c;
+                for (n, slope) in slope.iter_mut().enumerate() {
+                    *slope += du[i] * c[n * (1 + OUTER)];
                 }
             }
             for (value, sum) in value.iter_mut().zip(&sum) {
                 *value += v[j] * sum;
             }
-            for n in 0..2 {
+            for n in 0..PARTS {
                 let sum = sum[n * (1 + OUTER)];
                 first[n][0] += v[j] * slope[n];
                 first[n][1] += dv[j] * sum;
             }
         }
         At {
-            value: [value[0], value[1 + OUTER]],
+            value: std::array::from_fn(|n| value[n * (1 + OUTER)]),
             slope: first.map(|d| d.map(|d| per * d)),
-            outer: [0, 1].map(|n| std::array::from_fn(|p| value[n * (1 + OUTER) + 1 + p])),
+            outer: std::array::from_fn(|n| std::array::from_fn(|p| value[n * (1 + OUTER) + 1 + p])),
         }
     }
 }
@@ -231,8 +242,8 @@ impl Lattice {
         (n as f64 - (self.side / 2) as f64) * self.spacing
     }
 
-    /// Mean Bragg return and specular return at the knots, the one along x running fastest.
-    fn averages(&self, backscatter: &Backscatter) -> Vec<[f64; 2]> {
+    /// The parts at the knots, the one along x running fastest.
+    fn averages(&self, (backscatter, waves): &Facets) -> Vec<[f64; PARTS]> {
         let side = self.side;
         let mut facets = vec![0.0; side];
         let mut values = Vec::with_capacity(side * side);
@@ -249,21 +260,46 @@ impl Lattice {
         let tilt = &backscatter.tilt;
         let step = TAU / (side as f64 * self.spacing);
         let wavenumber = |n: usize| signed_index(n, side) as f64 * step;
-        for (n, value) in values.iter_mut().enumerate() {
+        // Waves at half the sampling rate have no odd part.
+        let is_inside = |n: usize| 2 * (n / side) != side && 2 * (n % side) != side;
+        let inside = |n: usize| f64::from(u8::from(is_inside(n)));
+        let mut squares = vec![Complex64::default(); side * side];
+        for (n, (value, square)) in values.iter_mut().zip(&mut squares).enumerate() {
             let [x, y] = [wavenumber(n / side), wavenumber(n % side)];
             let exponent = tilt.xx * x * x + 2.0 * tilt.xy * x * y + tilt.yy * y * y;
-            *value *= (-0.5 * exponent).exp() / (side * side) as f64;
+            let along = |[a, b]: [f64; 2]| a * x + b * y;
+            let velocity = Complex64::new(
+                waves.velocity_modulation,
+                along(waves.velocity_slope) * inside(n),
+            );
+            let moved = Complex64::cis(along(waves.slope_modulation) * inside(n));
+            *value *= moved * ((-0.5 * exponent).exp() / (side * side) as f64);
+            *square = *value * velocity * velocity;
+            // Mean and its product with the velocity, both real after the transform, as one complex number.
+            *value *= Complex64::ONE + Complex64::i() * velocity;
         }
-        self.inverse.process(&mut values);
-        transpose(&mut values, side);
+        for values in [&mut values, &mut squares] {
+            self.inverse.process(values);
+            transpose(values, side);
+        }
         let mut out = Vec::with_capacity(SIDE * SIDE);
         for j in (0..SIDE).map(|n| self.at_knot(n)) {
-            let row = &mut values[j * side..(j + 1) * side];
-            self.inverse.process(row);
+            let [row, squares] = [&mut values, &mut squares].map(|values| {
+                let row = &mut values[j * side..(j + 1) * side];
+                self.inverse.process(row);
+                row
+            });
             out.extend((0..SIDE).map(|n| {
                 let i = self.at_knot(n);
                 let slope = [self.slope(i), self.slope(j)];
-                [row[i].re, backscatter.specular.sigma0(slope)]
+                let specular = &backscatter.specular;
+                let moved = |by: f64| {
+                    specular.sigma0([0, 1].map(|a| slope[a] + by * waves.velocity_slope[a]))
+                };
+                let [below, here, above] = [-STEP, 0.0, STEP].map(moved);
+                let velocity = (above - below) / (2.0 * STEP);
+                let square = (above - 2.0 * here + below) / (STEP * STEP);
+                [row[i].re, here, row[i].im, velocity, squares[i].re, square]
             }));
         }
         out
@@ -317,6 +353,48 @@ mod tests {
         }
     }
 
+    /// Products with the velocity, against differences of the mean σ⁰ by direct quadrature.
+    #[test]
+    fn velocities_are_weighted_with_brightness() {
+        let scene = Scene::default();
+        let models = super::super::frozen::averaged(&scene);
+        let facets = (
+            models.backscatter(true, true),
+            BrightWaves {
+                slope_modulation: [0.01, -0.02],
+                velocity_slope: [0.012, 0.007],
+                velocity_modulation: 0.04,
+            },
+        );
+        let section = CrossSection::new(&facets, &[const { None }; OUTER], 0.4);
+        let (exact, waves) = &facets;
+        let step = 0.3;
+        let along = |slope: [f64; 2], n: f64| {
+            exact.parts([0, 1].map(|a| slope[a] + n * step * waves.velocity_slope[a]))
+        };
+        for slope in [[0.0, 0.0], [0.2, -0.1]] {
+            let found = section.at(slope).value;
+            let shifted = [0, 1].map(|a| slope[a] + waves.slope_modulation[a]);
+            for (n, at) in [shifted, slope].into_iter().enumerate() {
+                let [below, here, above] = [-1.0, 0.0, 1.0].map(|by: f64| along(at, by)[n]);
+                let first = (above - below) / (2.0 * step);
+                let second = (above - 2.0 * here + below) / (step * step);
+                let c = [waves.velocity_modulation, 0.0][n];
+                // Differences over 0.004 of a slope, of σ⁰ that changes by its own size over 0.04: 1e-3 of each derivative.
+                let close = |found: f64, expected: f64, unit: f64| {
+                    assert!((found - expected).abs() < 3e-3 * unit, "{found} {expected}");
+                };
+                close(found[n], here, here);
+                close(found[2 + n], c * here + first, 0.1 * here);
+                close(
+                    found[4 + n],
+                    c * c * here + 2.0 * c * first + second,
+                    0.02 * here,
+                );
+            }
+        }
+    }
+
     /// The mean σ⁰ is the one by direct quadrature.
     #[test]
     fn it_is_the_exact_cross_section() {
@@ -328,7 +406,9 @@ mod tests {
             let scene = Scene::default().with_assignments(keys).unwrap();
             let models = super::super::frozen::averaged(&scene);
             let exact = models.backscatter(true, true);
-            let section = CrossSection::new(&exact, &[const { None }; OUTER], 0.4);
+            let facets = (exact, BrightWaves::default());
+            let section = CrossSection::new(&facets, &[const { None }; OUTER], 0.4);
+            let exact = &facets.0;
             let calm: f64 = exact.parts([0.0; 2]).iter().sum();
             for slope in [[0.0, 0.0], [0.2, -0.1], [-0.35, 0.3]] {
                 let found = section.at(slope).value;

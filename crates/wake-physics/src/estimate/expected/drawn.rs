@@ -211,18 +211,28 @@ impl<'a, const N: usize> Drawn<'a, N> {
         let pixel = i * self.raster.columns + j;
         let linear = self.linear((i, j));
         let of = |field: Linear| linear[field as usize];
-        let power = self.returned([of(Linear::SlopeX), of(Linear::SlopeY)], || {
-            let mut factor = of(Linear::Modulation).exp();
-            if let Some(remaining) = self.effect(0, pixel) {
-                factor = factor * remaining;
+        let [power, moving, spread] =
+            self.returned([of(Linear::SlopeX), of(Linear::SlopeY)], || {
+                let mut factor = of(Linear::Modulation).exp();
+                if let Some(remaining) = self.effect(0, pixel) {
+                    factor = factor * remaining;
+                }
+                factor
+            });
+        let [power, moving, spread] = match (self.effect(2, pixel), self.effect(3, pixel)) {
+            (Some(factor), Some(added)) => {
+                [power * factor + added, moving * factor, spread * factor]
             }
-            factor
-        });
-        let power = match (self.effect(2, pixel), self.effect(3, pixel)) {
-            (Some(factor), Some(added)) => power * factor + added,
-            _ => power,
+            _ => [power, moving, spread],
         };
-        let mut radial = of(Linear::Radial);
+        // Mean velocity of the sea's waves weighted with their brightness, and what the variance has beyond that of all waves.
+        let inverse = match power.value > 0.0 {
+            true => power.map(power.value.recip(), -power.value.powi(-2)),
+            false => Dual::constant(0.0),
+        };
+        let by_waves = moving * inverse;
+        let wider = spread * inverse - by_waves * by_waves;
+        let mut radial = of(Linear::Radial) + by_waves;
         if let Some(current) = self.effect(1, pixel) {
             radial = radial - current * self.sine;
         }
@@ -230,7 +240,9 @@ impl<'a, const N: usize> Drawn<'a, N> {
         let acceleration = of(Linear::Acceleration);
         let square = acceleration * acceleration;
         let least = SMALLEST_VARIANCE;
-        let variance = self.variance + square.times(d.variance_per_square);
+        let variance = self.variance
+            + square.times(d.variance_per_square)
+            + wider.times(d.rows_per_velocity.powi(2));
         Source {
             power,
             up: radial.times(d.rows_per_velocity),
@@ -242,11 +254,11 @@ impl<'a, const N: usize> Drawn<'a, N> {
         }
     }
 
-    /// σ⁰ without effects that change it as a whole.
+    /// σ⁰ without effects that change it as a whole, and its products of [`At`](super::cross_section::At) with the velocity of the sea's waves.
     ///
     /// - `factor` on the Bragg return
     #[inline(always)]
-    fn returned(&self, slope: [Dual<N>; 2], factor: impl FnOnce() -> Dual<N>) -> Dual<N> {
+    fn returned(&self, slope: [Dual<N>; 2], factor: impl FnOnce() -> Dual<N>) -> [Dual<N>; 3] {
         let point = slope.map(|s| s.value);
         let at = self.cross_section.at(point);
         let part = |n: usize| {
@@ -261,6 +273,7 @@ impl<'a, const N: usize> Drawn<'a, N> {
             }
             part
         };
-        part(0) * factor() + part(1)
+        let factor = factor();
+        [0, 2, 4].map(|n| part(n) * factor + part(n + 1))
     }
 }

@@ -14,6 +14,8 @@ use crate::scene::{Scene, Term};
 pub(super) struct Frozen {
     pub(super) plan: Plan,
     pub(super) ships: usize,
+    /// Whether the image is a mean over waves of a sea.
+    pub(super) over_seas: bool,
     /// Pixels with their margin.
     pub(super) raster: Raster,
     pub(super) fields: Vec<Linear>,

@@ -8,6 +8,7 @@
 //! Every stage hands its derivatives on by the chain rule. What a plan chooses (terms, pixels, margin, nodes of the wake,
 //! steps of the kernel) is chosen once, for one scene: so the image is a smooth function of the values.
 
+mod bright;
 mod cross_section;
 mod drawn;
 mod frozen;
@@ -37,6 +38,8 @@ pub struct Expected {
     pub intensity: Field,
     /// Its derivative by each value, in the unit of σ⁰ per unit of the value.
     pub derivatives: Vec<(Value, Field)>,
+    /// How much the sources differ that the waves of the sea move to a pixel \[1\]: variance of their intensity over the square of its mean.
+    pub contrast: Field,
 }
 
 /// Expected images of scenes that differ by a few values, with what a plan chooses frozen at one of them.
@@ -105,7 +108,8 @@ impl ExpectedImage {
         let mut prepared = Prepared::new(scene);
         let mut plan = Plan::of(&prepared)?;
         let raster = plan.with_margin(&prepared.models.pixels.computed);
-        if plan.uses(Term::Sea) || plan.uses(Term::Swell) {
+        let over_seas = plan.uses(Term::Sea) || plan.uses(Term::Swell);
+        if over_seas {
             prepared = prepared.over_all_seas();
             plan = plan.over_all_seas();
         }
@@ -121,6 +125,7 @@ impl ExpectedImage {
         let displacement = Displacement::new(&imaging, &raster);
         let mut frozen = Frozen {
             plan: plan.clone(),
+            over_seas,
             ships: models.wakes.len(),
             raster,
             fields,
@@ -160,15 +165,21 @@ impl ExpectedImage {
     /// A value of the scene out of its range, or another number of ships.
     pub fn at(&self, scene: &Scene) -> Result<Expected> {
         let fields = match self.values.len() {
-            0 => self.draw::<0>(scene, &[]),
-            1..=5 => self.draw::<5>(scene, &self.values),
-            6..=7 => self.draw::<7>(scene, &self.values),
-            _ => self.draw::<{ Value::ALL.len() }>(scene, &self.values),
+            0 => self.draw::<0>(scene, &[], false),
+            1..=5 => self.draw::<5>(scene, &self.values, false),
+            6..=7 => self.draw::<7>(scene, &self.values, false),
+            _ => self.draw::<{ Value::ALL.len() }>(scene, &self.values, false),
         }?;
         let mut fields = fields.into_iter();
+        let intensity = fields.next().unwrap_or_default();
+        let mut contrast = self.draw::<0>(scene, &[], true)?.swap_remove(0);
+        for (square, mean) in contrast.values.iter_mut().zip(&intensity.values) {
+            *square = (*square / (mean * mean) - 1.0).max(0.0);
+        }
         Ok(Expected {
-            intensity: fields.next().unwrap_or_default(),
             derivatives: self.values.iter().copied().zip(fields).collect(),
+            intensity,
+            contrast,
         })
     }
 
@@ -178,11 +189,18 @@ impl ExpectedImage {
     ///
     /// As [`Self::at`].
     pub fn intensity(&self, scene: &Scene) -> Result<Field> {
-        Ok(self.draw::<0>(scene, &[])?.swap_remove(0))
+        Ok(self.draw::<0>(scene, &[], false)?.swap_remove(0))
     }
 
     /// The image and its derivatives.
-    fn draw<const N: usize>(&self, scene: &Scene, values: &[Value]) -> Result<Vec<Field>> {
+    ///
+    /// - `squared`: the mean of the squares of the sources instead
+    fn draw<const N: usize>(
+        &self,
+        scene: &Scene,
+        values: &[Value],
+        squared: bool,
+    ) -> Result<Vec<Field>> {
         scene.validate()?;
         let models = averaged(scene);
         check(scene, &models, values)?;
@@ -199,14 +217,21 @@ impl ExpectedImage {
         let mut fields = match surface.is_uniform() {
             true => {
                 let power = drawn.source(0, 0).power;
+                let power = if squared { power * power } else { power };
                 let values = std::iter::once(power.value).chain(by.iter().map(|&n| power.by[n]));
                 values
                     .map(|v| Field::constant(&self.computed, v as f32))
                     .collect()
             }
-            false => self.sum.image(&by, |i, j| drawn.source(i, j)),
+            false => self.sum.image(&by, |i, j| {
+                let mut source = drawn.source(i, j);
+                if squared {
+                    source.power = source.power * source.power;
+                }
+                source
+            }),
         };
-        let noise = surface.noise() as f32;
+        let noise = if squared { 0.0 } else { surface.noise() as f32 };
         fields[0].values.iter_mut().for_each(|v| *v += noise);
         let finish = |field: Field| match &models.response {
             Some(response) => response.filtered(

@@ -1,13 +1,13 @@
 //! The surface of a scene with frozen plan: sums of waves, fields of effects, and σ⁰ by the slope.
 
-use super::cross_section::{CrossSection, OUTER};
+use super::bright::BrightWaves;
+use super::cross_section::{CrossSection, Facets, OUTER};
 use super::frozen::{Frozen, averaged, with_ships_of};
 use super::surroundings::{Slopes, Surroundings};
 use super::waves::{Change, Linear, Seen, WakeSums, difference, sums};
 use crate::estimate::value::Value;
 use crate::kelvin::fade_at;
 use crate::models::Models;
-use crate::scattering::Backscatter;
 use crate::scene::{Scene, Term};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
@@ -155,8 +155,14 @@ impl<'a> Surface<'a> {
 
     /// σ⁰ by the slope.
     pub(super) fn cross_section(&self, frozen: &Frozen) -> CrossSection {
-        let of = |models: &Models| frozen.backscatter(models);
-        let outer: Vec<Option<([Backscatter; 2], f64)>> = OUTER_VALUES
+        let of = |models: &Models| {
+            let waves = match frozen.over_seas {
+                true => BrightWaves::new(models, &frozen.plan),
+                false => BrightWaves::default(),
+            };
+            (frozen.backscatter(models), waves)
+        };
+        let outer: Vec<Option<([Facets; 2], f64)>> = OUTER_VALUES
             .iter()
             .map(|value| {
                 let moved = self.moved.iter().find(|m| m.value == *value)?;
@@ -166,7 +172,7 @@ impl<'a> Surface<'a> {
                 Some(([of(below), of(above)], 2.0 * moved.step))
             })
             .collect();
-        let outer: [Option<([&Backscatter; 2], f64)>; OUTER] = std::array::from_fn(|n| {
+        let outer: [Option<([&Facets; 2], f64)>; OUTER] = std::array::from_fn(|n| {
             let (pair, width) = outer[n].as_ref()?;
             Some((pair.each_ref(), *width))
         });
