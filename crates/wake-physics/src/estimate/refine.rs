@@ -18,7 +18,7 @@ use crate::models::Models;
 use crate::raster::Field;
 use crate::scene::{Scene, Sea};
 
-/// Ends of an ascent, of the first ascent with a wind, and of the ship before it: errors of the mean image are larger than the last steps.
+/// Ends of an ascent, of the first ascent with a wind, and of the ship before it.
 const END: Until = Until {
     steps: 20,
     small: 0.1,
@@ -49,9 +49,9 @@ const AROUND: [[f64; 2]; 5] = [
 
 /// Maximum-likelihood estimate of ship and wind near a guess.
 ///
-/// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind. Standard deviations are those of the
-/// information times a factor for the error of the mean image (1.5 to 5, measured on simulated scenes). That of y also contains the shift by bright waves, which has another sign
-/// if the wind is reversed.
+/// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind and a pixel away. Standard deviations are those of the
+/// information times a factor for the error of the model (1.2 to 2, measured on simulated scenes). Those of the ship also contain its values at the other maxima of about the same speed, by their probability:
+/// another wind shifts the wake otherwise.
 ///
 /// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
 /// standard deviations of prior and estimate together), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.

@@ -279,10 +279,7 @@ pub(super) fn covariance(scene: &Scene) -> Result<Field> {
         }
     };
     let torus = Torus::new(period);
-    let [mut spectrum, slope] = torus
-        .spectra([&field(0), &field(1)])
-        .try_into()
-        .unwrap_or_default();
+    let [mut spectrum, slope] = torus.spectra([&field(0), &field(1)]);
     let between = between_pixels(lean * lean * elevation);
     for (n, (value, slope)) in spectrum.iter_mut().zip(&slope).enumerate() {
         let [ky, kx] = [wavenumber(n / period), wavenumber(n % period)];

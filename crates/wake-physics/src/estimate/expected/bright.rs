@@ -43,9 +43,9 @@ impl BrightWaves {
                 true => transfer.radial(wave.k, wave.omega),
                 false => 0.0.into(),
             };
-            for axis in 0..2 {
-                sum.slope_modulation[axis] += wave.variance * (slope[axis] * m).re;
-                sum.velocity_slope[axis] += wave.variance * (slope[axis] * u.conj()).re;
+            for (axis, slope) in slope.into_iter().enumerate() {
+                sum.slope_modulation[axis] += wave.variance * (slope * m).re;
+                sum.velocity_slope[axis] += wave.variance * (slope * u.conj()).re;
             }
             sum.velocity_modulation += wave.variance * (u * m).re;
         }

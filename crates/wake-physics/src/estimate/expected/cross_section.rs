@@ -368,7 +368,7 @@ mod tests {
         );
         let section = CrossSection::new(&facets, &[const { None }; OUTER], 0.4);
         let (exact, waves) = &facets;
-        let step = 0.3;
+        let step = 0.1;
         let along = |slope: [f64; 2], n: f64| {
             exact.parts([0, 1].map(|a| slope[a] + n * step * waves.velocity_slope[a]))
         };
@@ -380,7 +380,7 @@ mod tests {
                 let first = (above - below) / (2.0 * step);
                 let second = (above - 2.0 * here + below) / (step * step);
                 let c = [waves.velocity_modulation, 0.0][n];
-                // Differences over 0.004 of a slope, of σ⁰ that changes by its own size over 0.04: 1e-3 of each derivative.
+                // Differences over 0.0014 of a slope, of σ⁰ that changes by its own size over 0.04: 1e-3 of each derivative.
                 let close = |found: f64, expected: f64, unit: f64| {
                     assert!((found - expected).abs() < 3e-3 * unit, "{found} {expected}");
                 };
