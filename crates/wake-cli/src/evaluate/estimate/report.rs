@@ -70,7 +70,7 @@ impl Report {
 
     pub(super) fn markdown(&self) -> String {
         let mut text = "<!-- Written by: wake evaluate estimate -->\n\n# Estimates of ship and wind, evaluated\n\n\
-             Each set has its own scenes, which nothing was fitted to. Errors, intervals and bounds are of the identifiable images. A Gaussian has 68 %, 95 % and 100 % of the errors \
+             Each set has its own scenes. Constants of the search were chosen with the first twelve of the paper's ranges in view, factors on the deviations with others. Errors, intervals and bounds are of the identifiable images. A Gaussian has 68 %, 95 % and 100 % of the errors \
              within 1, 2 and 3 standard deviations. Ranks count the images by Φ(error/deviation) in tenths: even numbers for exact error bars. Place and heading \
              before the estimate are wrong by 60 m along each axis and 3 degrees (standard deviations, at most two of them).\n"
             .to_owned();
