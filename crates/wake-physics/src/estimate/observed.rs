@@ -87,12 +87,7 @@ impl Observed {
 
     /// Residual of a mean image over the spread of its noise, in the window.
     pub(super) fn residual_over(&self, gain: f32, mean: &Field, spread: &Field) -> Field {
-        let mut left = self.residual(gain, mean);
-        left.values
-            .iter_mut()
-            .zip(&spread.values)
-            .for_each(|(v, s)| *v /= s);
-        left
+        over(self.residual(gain, mean), spread)
     }
 
     /// Residual of a mean image in the window.
@@ -157,10 +152,10 @@ impl Observed {
     ) -> Near {
         let spread = self.spread(&expected.contrast, &texture.noise);
         let spectra = self.spectra(parameters, expected, &spread);
-        let mean = &expected.intensity;
+        let mean = (factors, &expected.intensity);
         self.near_by(
             parameters,
-            (factors, mean),
+            mean,
             (&spectra, &spread),
             texture,
             with_variance,
@@ -249,12 +244,7 @@ impl Observed {
         expected: &Expected,
         spread: &Field,
     ) -> Vec<Field> {
-        let of = |p: &Parameter| {
-            let mut direction = self.direction(*p, expected);
-            let pixels = direction.values.iter_mut().zip(&spread.values);
-            pixels.for_each(|(value, spread)| *value /= spread);
-            direction
-        };
+        let of = |p: &Parameter| over(self.direction(*p, expected), spread);
         parameters.iter().map(of).collect()
     }
 
@@ -428,6 +418,13 @@ impl Observed {
         }
         out
     }
+}
+
+/// A field over another one.
+fn over(mut field: Field, by: &Field) -> Field {
+    let pixels = field.values.iter_mut().zip(&by.values);
+    pixels.for_each(|(value, by)| *value /= by);
+    field
 }
 
 /// The score of each parameter.

@@ -42,11 +42,19 @@ fn a_ship_is_found_from_a_guess_and_only_where_there_is_one() {
     open.ships.clear();
     let image = simulate(&open).unwrap().speckled;
     let none = refine(&image, &guess, &Priors::default()).unwrap();
-    assert!(!none.identifiable && none.over_open_sea < 20.0, "{:?}", none.values);
+    assert!(
+        !none.identifiable && none.over_open_sea < 20.0,
+        "{:?}",
+        none.values
+    );
     let image = simulate(&small(&["radar.looks=2"])).unwrap().speckled;
     let other = refine(&image, &guess, &Priors::default()).unwrap();
     // Half the looks have twice the speckle, most of the power of short waves; a part of it is fitted as texture.
-    assert!(!other.identifiable && other.misfit() > 1.25, "{:?}", other.power);
+    assert!(
+        !other.identifiable && other.misfit() > 1.25,
+        "{:?}",
+        other.power
+    );
 }
 
 /// From a sighting 50 m and 3 degrees off, with any speed, the right maximum is found; also under an echo, and in units of the image's own.
