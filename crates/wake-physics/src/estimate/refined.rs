@@ -54,7 +54,7 @@ pub struct Estimate {
     pub power: Vec<f64>,
     /// Velocity of the ship toward the radar by the displacement of its echo alone, and its standard deviation [m/s]; [`estimate`](super::estimate) uses it.
     pub by_echo: Option<[f64; 2]>,
-    /// Whether the estimate passes the tests of [`refine`].
+    /// Whether the estimate passes the tests of [`refine`](super::refine).
     pub identifiable: bool,
 }
 
