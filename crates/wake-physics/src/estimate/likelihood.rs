@@ -9,6 +9,7 @@
 //! score of the spectrum  g = ½ c Σ (∂ln S)(|R|²/S − 1)
 //! ```
 //!
+//! r and ∂ln μ are divided by the spread of the noise, which is larger where waves of the sea move bright sources beside dark ones; it is fixed at one scene.
 //! The scores have the mean 0 whenever mean and covariance are right: Gamma speckle and a sea that is not Gaussian change no
 //! more than their variances. The variance V of the score of the mean is computed with the covariance between all pixels, not
 //! from the approximation; that of the spectrum is the Gaussian one. Standard deviations are those of J⁻¹VJ⁻¹

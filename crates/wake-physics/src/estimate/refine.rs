@@ -50,7 +50,7 @@ const AROUND: [[f64; 2]; 5] = [
 /// Maximum-likelihood estimate of ship and wind near a guess.
 ///
 /// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind and a pixel away. Standard deviations are those of the
-/// information times a factor for the error of the model (1.2 to 2, measured on simulated scenes). Those of the ship also contain its values at the other maxima of about the same speed, by their probability:
+/// information times a factor for the error of the model (1.2 to 2, chosen). Those of the ship also contain its values at the other maxima of about the same speed, by their probability:
 /// another wind shifts the wake otherwise.
 ///
 /// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2

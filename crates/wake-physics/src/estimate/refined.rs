@@ -54,7 +54,7 @@ pub struct Estimate {
     pub power: Vec<f64>,
     /// Velocity of the ship toward the radar by the displacement of its echo alone, and its standard deviation [m/s]; [`estimate`](super::estimate) uses it.
     pub by_echo: Option<[f64; 2]>,
-    /// Whether the estimate passes the tests of [`refine`](super::refine).
+    /// True if the estimate passes the tests of [`refine`](super::refine).
     pub identifiable: bool,
 }
 
@@ -93,7 +93,7 @@ pub(super) fn no_start() -> Error {
     }
 }
 
-/// Root mean square ratio of error to standard deviation of the information, on simulated scenes: maxima beside the highest one, and the covariance.
+/// Factor on the standard deviation of the information: errors of the covariance, and maxima beside the highest one (chosen, from errors of some ten simulated scenes).
 fn model_error(parameter: Parameter) -> f64 {
     match parameter {
         Parameter::Texture => 2.0,
@@ -102,7 +102,7 @@ fn model_error(parameter: Parameter) -> f64 {
     }
 }
 
-/// Factor on the difference of log-likelihood between winds: the likelier of two opposite winds is wrong up to a difference of some 15 (measured).
+/// Factor on the difference of log-likelihood between winds: the likelier of two opposite winds can be the wrong one (chosen).
 const BELIEVED: f64 = 0.05;
 
 /// Estimate from maxima, the highest one first.

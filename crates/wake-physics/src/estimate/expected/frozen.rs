@@ -14,7 +14,7 @@ use crate::scene::{Scene, Term};
 pub(super) struct Frozen {
     pub(super) plan: Plan,
     pub(super) ships: usize,
-    /// Whether the image is a mean over waves of a sea.
+    /// True for a mean over the waves of a sea.
     pub(super) over_seas: bool,
     /// Pixels with their margin.
     pub(super) raster: Raster,

@@ -34,11 +34,11 @@ use waves::Linear;
 /// The expected image of a scene, and its derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
-    /// Mean over all seas of the intensity before speckle, see [`expected_intensity`](crate::expected_intensity).
+    /// Mean over all seas of the intensity before speckle. It has the shift and blur by bright waves, which [`expected_intensity`](crate::expected_intensity) leaves out.
     pub intensity: Field,
     /// Its derivative by each value, in the unit of σ⁰ per unit of the value.
     pub derivatives: Vec<(Value, Field)>,
-    /// How much the sources differ that the waves of the sea move to a pixel \[1\]: variance of their intensity over the square of its mean.
+    /// Contrast of the sources around a pixel, as far as waves of the sea move them \[1\]: variance of their intensity over the square of its mean.
     pub contrast: Field,
 }
 
