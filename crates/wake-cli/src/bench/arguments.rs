@@ -19,12 +19,15 @@ pub(crate) struct Arguments {
     /// What to measure
     #[arg(long, value_enum, default_value = "all")]
     pub(crate) part: Part,
-    /// Where the loader's model computes: flex, ndarray, wgpu or cuda, where compiled in
+    /// Where the loader's model and the blocks compute: flex, ndarray, wgpu or cuda, where compiled in
     #[arg(long, default_value = "flex")]
     pub(crate) device: String,
     /// Stages of the simulator alone, without spacing, model and loader [repeatable; default: all]
     #[arg(long, value_name = "STAGE", value_parser = STAGES)]
     pub(crate) stage: Vec<String>,
+    /// With --part device: blocks whose names contain this alone [repeatable; default: all]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) block: Vec<String>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -36,4 +39,6 @@ pub(crate) enum Part {
     Model,
     /// Images per second of the data set's loader
     Loader,
+    /// Blocks of the networks on --device against flex (not part of all)
+    Device,
 }

@@ -11,7 +11,7 @@ use crate::exit::Outcome;
 
 /// Threads that make batches, as many as there are cores at most; on each the physics of one batch is computed while the device draws
 /// another.
-const THREADS: [usize; 4] = [1, 2, 4, 8];
+const THREADS: [usize; 5] = [1, 2, 4, 8, 16];
 /// Images of a batch.
 const BATCH: usize = 16;
 /// Batches that are timed, after as many as there are threads.

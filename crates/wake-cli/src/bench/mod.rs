@@ -10,6 +10,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod arguments;
+mod device;
 mod loader;
 mod model;
 mod model_row;
@@ -69,6 +70,21 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         bar.finish_and_clear();
         parts.push(("loader.md", loader::table(&measured)));
         add(&mut rows, &measured)?;
+    }
+    if arguments.part == Part::Device {
+        let bar = progress::bar(device::parts(&arguments.block), "blocks on the device");
+        let mut lines = Vec::new();
+        let measured = device::measure(&arguments.device, &arguments.block, |of_block| {
+            bar.inc(1);
+            lines.extend_from_slice(of_block);
+            // What was measured stays where a driver ends the process.
+            Ok(whole_files::write_json(&out.join("device.json"), &lines)?)
+        })?;
+        bar.finish_and_clear();
+        let checks = device::checks(&arguments.device)?;
+        parts.push(("device.md", device::table(&measured, &checks)));
+        add(&mut rows, &measured)?;
+        add(&mut rows, &checks)?;
     }
     let report = json!({ "rows": rows });
     whole_files::write_json(&out.join("report.json"), &report)?;

@@ -52,6 +52,20 @@ fn the_loader_is_measured() {
     assert!(rows.iter().all(|row| rate(row).is_some_and(|r| r > 0.0)));
 }
 
+/// flex against itself differs by nothing.
+#[test]
+fn blocks_are_measured_on_a_device() {
+    let arguments = ["--part", "device", "--block", "half the size"];
+    let files = ["report.json", "device.json", "device.md"];
+    let rows = rows(&arguments, &files);
+    let of = |stage| rows.iter().filter(move |row| row["stage"] == stage);
+    let mut plain = of("device").filter(|row| row["precision"] == "f32");
+    assert!(plain.all(|row| row["max_error"] == 0.0 && row["seconds"].as_f64() > Some(0.0)));
+    assert!(of("device").count() > 0);
+    assert!(of("self-check").all(|row| row["failure"].is_null()));
+    assert!(of("self-check").count() >= 3);
+}
+
 #[test]
 fn the_pictures_of_the_documentation_are_drawn() {
     let folder = tempfile::tempdir().expect("a folder");

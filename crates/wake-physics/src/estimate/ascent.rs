@@ -2,11 +2,10 @@
 
 use super::expected::ExpectedImage;
 use super::matrix::Matrix;
-use super::observed::{Near, Observed};
+use super::observed::{Directions, Near, Observed};
 use super::parameter::{Factors, Parameter};
 use super::priors::{Priors, values_of};
-use super::texture::Texture;
-use super::torus::Spectrum;
+use super::texture::Textures;
 use super::value::Value;
 use crate::error::Result;
 use crate::raster::Field;
@@ -39,20 +38,13 @@ pub(super) struct Until {
     pub(super) steps: usize,
     /// Length of the last step, in standard deviations of the information.
     pub(super) small: f64,
+    /// How many times the wind may differ more than usual from that of a texture: [`Textures::of`].
+    pub(super) farther: f64,
 }
 
 /// Limits of the wind speed [m/s], and of the ship's length relative to the guess.
 const WINDS: [f64; 2] = [1.5, 20.0];
 const LENGTHS: [f64; 2] = [0.3, 3.0];
-
-/// Texture of a sea, and its wind.
-struct Known {
-    wind: [f64; 2],
-    texture: Texture,
-}
-
-/// Changes of wind speed (relative) and direction \[deg\] that need a new texture, over the length of the last step.
-const OTHER: [f64; 2] = [0.025, 2.5];
 
 /// Image, parameters and priors of an ascent.
 #[derive(Clone, Copy)]
@@ -60,6 +52,7 @@ pub(super) struct Ascent<'a> {
     pub(super) observed: &'a Observed,
     pub(super) parameters: &'a [Parameter],
     pub(super) priors: &'a Priors,
+    pub(super) textures: &'a Textures,
     /// Length of the guessed ship \[m\].
     pub(super) length: f64,
 }
@@ -77,48 +70,27 @@ struct Step {
 /// Frozen plan of an ascent, with what its last points needed.
 struct Path {
     image: ExpectedImage,
-    /// Length of its last step in standard deviations.
-    small: f64,
-    known: Option<Known>,
-    /// Derivatives of the mean image at a point before, and the spread of its noise.
-    spectra: Vec<Spectrum>,
-    spread: Field,
-}
-
-impl Path {
-    /// Takes the texture of the sea of a scene, or of one with nearly the same wind.
-    fn take(&mut self, scene: &Scene, parameters: &[Parameter]) -> Result<Known> {
-        let wind = [scene.sea.wind_speed, scene.sea.wind_toward];
-        let small = self.small;
-        let is_near = |known: &Known| {
-            (wind[0] / known.wind[0] - 1.0).abs() < small * OTHER[0]
-                && (wind[1] - known.wind[1]).abs() < small * OTHER[1]
-        };
-        Ok(match self.known.take().filter(is_near) {
-            Some(known) => known,
-            None => Known {
-                texture: Texture::new(scene, parameters)?,
-                wind,
-            },
-        })
-    }
+    /// How many times the wind may differ more than usual from that of a texture.
+    farther: f64,
+    /// Derivatives of the mean image at a point before.
+    directions: Directions,
 }
 
 impl Ascent<'_> {
     /// Likelihood at a scene, with the variance of the score.
     pub(super) fn point(&self, scene: Scene, factors: Factors) -> Result<Point> {
         let mut path = self.path(&scene, 0.0)?;
-        self.linearised(&mut path, (scene, factors), true)
+        self.linearised(&mut path, scene, factors, true)
     }
 
     /// A path that begins at a scene.
-    fn path(&self, start: &Scene, small: f64) -> Result<Path> {
+    ///
+    /// - `farther`: as [`Textures::of`]
+    fn path(&self, start: &Scene, farther: f64) -> Result<Path> {
         Ok(Path {
             image: ExpectedImage::new(start, &values_of(self.parameters))?,
-            small,
-            known: None,
-            spectra: Vec::new(),
-            spread: Field::default(),
+            farther,
+            directions: Directions::default(),
         })
     }
 
@@ -128,42 +100,51 @@ impl Ascent<'_> {
     fn linearised(
         &self,
         path: &mut Path,
-        (scene, factors): (Scene, Factors),
+        scene: Scene,
+        factors: Factors,
         last: bool,
     ) -> Result<Point> {
         let expected = path.image.at(&scene)?;
-        let known = path.take(&scene, self.parameters)?;
-        let spread = self
+        let texture = self.textures.of(&scene, self.parameters, path.farther)?;
+        path.directions = self
             .observed
-            .spread(&expected.contrast, &known.texture.noise);
-        path.known = Some(known);
-        path.spectra = self.observed.spectra(self.parameters, &expected, &spread);
-        path.spread = spread;
-        self.point_by(path, (scene, factors, &expected.intensity), last)
+            .towards(self.parameters, &expected, &texture.noise);
+        self.point_by(path, scene, factors, &expected.intensity, last)
     }
 
     /// Likelihood at a scene, with the derivatives of the path.
-    fn beside(&self, path: &mut Path, (scene, factors): (Scene, Factors)) -> Result<Point> {
+    fn beside(&self, path: &Path, (scene, factors): (Scene, Factors)) -> Result<Point> {
         let mean = path.image.intensity(&scene)?;
-        self.point_by(path, (scene, factors, &mean), false)
+        self.point_by(path, scene, factors, &mean, false)
     }
 
     fn point_by(
         &self,
-        path: &mut Path,
-        (scene, factors, mean): (Scene, Factors, &Field),
+        path: &Path,
+        scene: Scene,
+        factors: Factors,
+        mean: &Field,
         last: bool,
     ) -> Result<Point> {
-        let known = path.take(&scene, self.parameters)?;
-        let linear = (&path.spectra[..], &path.spread);
+        let texture = self.textures.of(&scene, self.parameters, path.farther)?;
         let near = self.observed.near_by(
             self.parameters,
-            (&factors, mean),
-            linear,
-            &known.texture,
+            &factors,
+            mean,
+            &path.directions,
+            &texture,
             last,
         );
-        path.known = Some(known);
+        Ok(Point {
+            log_posterior: near.log_likelihood + self.log_prior(&factors),
+            scene,
+            factors,
+            near,
+        })
+    }
+
+    /// Log-prior of factors.
+    fn log_prior(&self, factors: &Factors) -> f64 {
         let prior = |parameter: &Parameter| {
             let off = match parameter {
                 Parameter::Gain => factors.gain.ln(),
@@ -172,18 +153,13 @@ impl Ascent<'_> {
             };
             -0.5 * self.priors.precision(*parameter) * off * off
         };
-        Ok(Point {
-            log_posterior: near.log_likelihood + self.parameters.iter().map(prior).sum::<f64>(),
-            scene,
-            factors,
-            near,
-        })
+        self.parameters.iter().map(prior).sum()
     }
 
     /// Ascent from a start.
     pub(super) fn climb(&self, start: Scene, factors: Factors, until: Until) -> Result<Point> {
-        let mut path = self.path(&start, until.small)?;
-        let here = self.linearised(&mut path, (start, factors), false)?;
+        let mut path = self.path(&start, until.farther)?;
+        let here = self.linearised(&mut path, start, factors, false)?;
         self.ascend(&mut path, here, until)
     }
 
@@ -208,8 +184,10 @@ impl Ascent<'_> {
         let Some(step) = self.by_pixel(here) else {
             return Ok(None);
         };
-        let mut path = self.path(&here.scene, 1.0)?;
-        self.linearised(&mut path, (here.scene.clone(), here.factors), false)?;
+        let image = ExpectedImage::new(&here.scene, &[])?;
+        let expected = image.at(&here.scene)?;
+        let texture = self.textures.of(&here.scene, self.parameters, 1.0)?;
+        let directions = self.observed.towards(&[], &expected, &texture.noise);
         let is_y = |p: &Parameter| *p == Parameter::Value(Value::Y);
         let mut best = (here.log_posterior, None);
         for pixels in (-FARTHEST..=FARTHEST).filter(|n| *n != 0) {
@@ -217,10 +195,14 @@ impl Ascent<'_> {
                 let parameters = self.parameters.iter().zip(&step);
                 let step = parameters.map(|(p, s)| if is_y(p) { *s } else { part * s });
                 let step: Vec<f64> = step.collect();
-                let to = self.moved(here, &step, f64::from(pixels));
-                let there = self.beside(&mut path, to)?;
-                if there.log_posterior > best.0 {
-                    best = (there.log_posterior, Some((there.scene, there.factors)));
+                let (scene, factors) = self.moved(here, &step, f64::from(pixels));
+                let mean = image.intensity(&scene)?;
+                let noise = &self.textures.of(&scene, self.parameters, 1.0)?.noise;
+                let observed = self.observed;
+                let found = observed.log_likelihood_by(&factors, &mean, &directions, noise)
+                    + self.log_prior(&factors);
+                if found > best.0 {
+                    best = (found, Some((scene, factors)));
                 }
             }
         }
@@ -244,7 +226,7 @@ impl Ascent<'_> {
         &self,
         path: &mut Path,
         mut here: Point,
-        Until { steps, small }: Until,
+        Until { steps, small, .. }: Until,
     ) -> Result<Point> {
         let (mut fresh, mut part) = (true, 1.0);
         for _ in 0..steps {
@@ -268,7 +250,7 @@ impl Ascent<'_> {
             part = 1.0;
             fresh = !trusted;
             if fresh {
-                here = self.linearised(path, (here.scene, here.factors), false)?;
+                here = self.linearised(path, here.scene, here.factors, false)?;
             }
         }
         Ok(here)

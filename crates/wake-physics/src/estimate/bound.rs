@@ -44,12 +44,7 @@ pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result
     let expected = image.at(scene)?;
     let texture = Texture::new(scene, parameters)?;
     let observed = Observed::new(expected.intensity.clone(), scene, |_, _| 1.0);
-    let near = observed.near(
-        parameters,
-        (&Factors::default(), &expected),
-        &texture,
-        false,
-    );
+    let near = observed.near(parameters, &Factors::default(), &expected, &texture, false);
     let untapered = Observed::whole(&observed);
     let spread = untapered.spread(&expected.contrast, &texture.noise);
     let directions = untapered.directions(parameters, &expected, &spread);
@@ -66,7 +61,7 @@ pub fn bound(scene: &Scene, parameters: &[Parameter], priors: &Priors) -> Result
     let without = ExpectedImage::new(&open, &[])?.intensity(&open)?;
     let wake = observed.residual_over(1.0, &without, &spread);
     let spectrum = observed.torus.spectrum(&wake);
-    let power = observed.power(&texture.noise);
+    let power = observed.power(&texture.noise.covariance(1.0));
     let area = (observed.torus.size * observed.torus.size) as f64;
     let sum: f64 = (0..spectrum.len())
         .map(|n| observed.torus.weight(n) * f64::from(spectrum[n].norm_sqr() / power[n]))

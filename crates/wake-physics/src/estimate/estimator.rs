@@ -109,7 +109,7 @@ impl<'a> WithWind<'a> {
         let mut scene = known.clone();
         scene.sea = wind.open.sea.clone();
         Self {
-            search: Search::new(observed, (&scene, &wind.noise, &wind.mean), sighting),
+            search: Search::new(observed, &scene, &wind.noise, &wind.mean, sighting),
             log_likelihood: wind.log_likelihood,
             scene,
         }

@@ -115,7 +115,8 @@ impl Likelihood {
         let observed = Observed::new(image.clone(), &self.scene, |_, _| 1.0);
         let near = observed.near(
             &self.parameters,
-            (factors, &self.expected),
+            factors,
+            &self.expected,
             &self.texture,
             true,
         );

@@ -13,6 +13,7 @@ mod bound;
 mod echo;
 mod estimator;
 mod expected;
+mod information;
 mod likelihood;
 mod matrix;
 mod noise;

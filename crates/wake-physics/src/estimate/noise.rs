@@ -52,6 +52,14 @@ impl Noise {
         })
     }
 
+    /// Adds a part of the change from one sea to another.
+    pub(super) fn add_change(&mut self, part: f32, from: &Self, to: &Self) {
+        let changes = to.sea.iter().zip(&from.sea).map(|(to, from)| to - from);
+        for (value, change) in self.sea.iter_mut().zip(changes) {
+            *value += part * change;
+        }
+    }
+
     /// Covariance of the sea alone.
     #[cfg(test)]
     pub(super) fn sea(&self) -> Field {

@@ -1,6 +1,7 @@
-//! An image and how it is looked at: score and information of the likelihood of [`super::likelihood`].
+//! An image and how it is looked at: the likelihood of [`super::likelihood`] with its score and information.
 
 use super::expected::Expected;
+use super::information::{Information, Sums};
 use super::matrix::Matrix;
 use super::noise::{Noise, Taper};
 use super::parameter::{Factors, Parameter};
@@ -32,13 +33,11 @@ pub(super) struct Near {
     pub(super) rings: Vec<[f64; 2]>,
 }
 
-/// What an image tells of the parameters.
-#[derive(Debug, Clone)]
-pub(super) struct Information {
-    /// Expected slope J of the score.
-    pub(super) slope: Matrix,
-    /// Variance V of the score.
-    pub(super) variance: Matrix,
+/// F[w ∂ln μ] over the spread of the noise by each parameter, with that spread.
+#[derive(Default)]
+pub(super) struct Directions {
+    spectra: Vec<Spectrum>,
+    spread: Field,
 }
 
 /// Relative intensity whose logarithm stands for all darker pixels (chosen): of four looks, 8 pixels of a million are darker.
@@ -126,18 +125,18 @@ impl Observed {
     pub(super) fn log_likelihood_of(&self, noise: &Noise, mean: &Field) -> f64 {
         let gain = self.gain(mean) as f32;
         let left = self.torus.spectrum(&self.residual(gain, mean));
-        let scale = self.taper.energy / (self.torus.size * self.torus.size) as f64;
         self.log_likelihood(
-            scale,
-            (&left, &self.power(noise)),
+            self.scale(),
+            &left,
+            &self.power(&noise.covariance(1.0)),
             gain,
             mean.values.iter().copied(),
         )
     }
 
-    /// Power of a noise.
-    pub(super) fn power(&self, noise: &Noise) -> Vec<f32> {
-        let power = self.taper.power(&self.torus, &noise.covariance(1.0));
+    /// Power of noise of a covariance.
+    pub(super) fn power(&self, covariance: &Field) -> Vec<f32> {
+        let power = self.taper.power(&self.torus, covariance);
         let floor = 1e-6 * power.iter().copied().fold(0.0, f32::max);
         power.into_iter().map(|p| p.max(floor)).collect()
     }
@@ -146,72 +145,95 @@ impl Observed {
     pub(super) fn near(
         &self,
         parameters: &[Parameter],
-        (factors, expected): (&Factors, &Expected),
+        factors: &Factors,
+        expected: &Expected,
         texture: &Texture,
         with_variance: bool,
     ) -> Near {
-        let spread = self.spread(&expected.contrast, &texture.noise);
-        let spectra = self.spectra(parameters, expected, &spread);
-        let mean = (factors, &expected.intensity);
+        let directions = self.towards(parameters, expected, &texture.noise);
+        let mean = &expected.intensity;
         self.near_by(
             parameters,
+            factors,
             mean,
-            (&spectra, &spread),
+            &directions,
             texture,
             with_variance,
         )
     }
 
-    /// The same with spectra of a scene nearby.
-    ///
-    /// - `spectra`: as [`Self::spectra`] gives them for this spread
+    /// The same with the directions of a scene nearby.
     pub(super) fn near_by(
         &self,
         parameters: &[Parameter],
-        (factors, mean): (&Factors, &Field),
-        (spectra, spread): (&[Spectrum], &Field),
+        factors: &Factors,
+        mean: &Field,
+        directions: &Directions,
         texture: &Texture,
         with_variance: bool,
     ) -> Near {
         let (torus, taper) = (&self.torus, &self.taper);
-        let factor = factors.texture;
-        let power = taper.power(torus, &texture.noise.covariance(factor));
-        let floor = 1e-6 * power.iter().copied().fold(0.0, f32::max);
-        let power: Vec<f32> = power.into_iter().map(|p| p.max(floor)).collect();
+        let Directions { spectra, spread } = directions;
+        let covariance = texture.noise.covariance(factors.texture);
+        let slopes = texture.slopes(parameters, factors.texture);
+        let sums = Sums {
+            torus,
+            taper,
+            spectra,
+            power: self.power(&covariance),
+            by: slopes
+                .par_iter()
+                .map(|s| s.as_ref().map(|s| taper.power(torus, s)))
+                .collect(),
+        };
         let gain = factors.gain as f32;
         let left = torus.spectrum(&self.residual_over(gain, mean, spread));
         let scales = mean.values.iter().zip(&spread.values).map(|(m, s)| m * s);
-        let slopes = texture.slopes(parameters, factor);
-        let slopes: Vec<Option<Vec<f32>>> = slopes
-            .par_iter()
-            .map(|s| s.as_ref().map(|s| taper.power(torus, s)))
-            .collect();
-        let scale = taper.energy / (torus.size * torus.size) as f64;
-        let (information, of_power) =
-            self.information(scale, &power, (spectra, &slopes), taper.peakedness);
+        let (information, of_power) = sums.information();
+        let scale = sums.scale();
         let mut near = Near {
-            score: score(torus, scale, (&left, &power), (spectra, &slopes)),
-            log_likelihood: self.log_likelihood(scale, (&left, &power), gain, scales),
+            score: sums.score(&left),
+            log_likelihood: self.log_likelihood(scale, &left, &sums.power, gain, scales),
             information,
             of_power,
-            rings: self.rings(scale, &left, &power),
+            rings: self.rings(scale, &left, &sums.power),
         };
         if with_variance {
-            let covariance = texture.noise.covariance(factor);
-            near.information.variance =
-                self.variance(scale, (&power, &covariance), (spectra, &slopes));
+            near.information.variance = sums.variance(&covariance);
         }
         near
     }
 
-    /// F[w ∂ln μ] over the spread by each parameter.
-    pub(super) fn spectra(
+    /// ln L alone, likewise.
+    pub(super) fn log_likelihood_by(
+        &self,
+        factors: &Factors,
+        mean: &Field,
+        directions: &Directions,
+        noise: &Noise,
+    ) -> f64 {
+        let spread = &directions.spread;
+        let power = self.power(&noise.covariance(factors.texture));
+        let gain = factors.gain as f32;
+        let left = self.torus.spectrum(&self.residual_over(gain, mean, spread));
+        let scales = mean.values.iter().zip(&spread.values).map(|(m, s)| m * s);
+        self.log_likelihood(self.scale(), &left, &power, gain, scales)
+    }
+
+    /// Σw² over the number of wavenumbers.
+    fn scale(&self) -> f64 {
+        self.taper.energy / (self.torus.size * self.torus.size) as f64
+    }
+
+    /// Directions of the parameters, with the noise of a sea.
+    pub(super) fn towards(
         &self,
         parameters: &[Parameter],
         expected: &Expected,
-        spread: &Field,
-    ) -> Vec<Spectrum> {
-        let directions = self.directions(parameters, expected, spread);
+        noise: &Noise,
+    ) -> Directions {
+        let spread = self.spread(&expected.contrast, noise);
+        let directions = self.directions(parameters, expected, &spread);
         let mut spectra = Vec::new();
         for pair in directions.chunks(2) {
             let [first, last] = [&pair[0], &pair[pair.len() - 1]];
@@ -222,7 +244,7 @@ impl Observed {
                     .take(pair.len()),
             );
         }
-        spectra
+        Directions { spectra, spread }
     }
 
     /// The same image without a taper.
@@ -275,7 +297,8 @@ impl Observed {
     fn log_likelihood(
         &self,
         scale: f64,
-        (left, power): (&Spectrum, &[f32]),
+        left: &Spectrum,
+        power: &[f32],
         gain: f32,
         scales: impl Iterator<Item = f32>,
     ) -> f64 {
@@ -311,113 +334,6 @@ impl Observed {
         }
         rings
     }
-
-    /// J, and V as if wavenumbers were independent.
-    fn information(
-        &self,
-        scale: f64,
-        power: &[f32],
-        (spectra, slopes): (&[Spectrum], &[Option<Vec<f32>>]),
-        peakedness: f64,
-    ) -> (Information, Matrix) {
-        let size = spectra.len();
-        let [mut of_mean, mut of_power] = [Matrix::zero(size), Matrix::zero(size)];
-        let pairs: Vec<[usize; 2]> = (0..size)
-            .flat_map(|p| (0..=p).map(move |q| [p, q]))
-            .collect();
-        let sums: Vec<[f64; 2]> = pairs
-            .par_iter()
-            .map(|&[p, q]| {
-                let mut sums = [0.0; 2];
-                for n in 0..power.len() {
-                    let product = (spectra[p][n].conj() * spectra[q][n]).re / power[n];
-                    sums[0] += self.torus.weight(n) * f64::from(product);
-                }
-                if let (Some(a), Some(b)) = (&slopes[p], &slopes[q]) {
-                    for n in 0..power.len() {
-                        let product = a[n] / power[n] * (b[n] / power[n]);
-                        sums[1] += 0.5 * self.torus.weight(n) * f64::from(product);
-                    }
-                }
-                sums.map(|s| scale * s)
-            })
-            .collect();
-        for (&[p, q], [mean, power]) in pairs.iter().zip(sums) {
-            for [p, q] in if p == q {
-                vec![[p, q]]
-            } else {
-                vec![[p, q], [q, p]]
-            } {
-                of_mean.add(p, q, mean);
-                of_power.add(p, q, power);
-            }
-        }
-        let mut variance = of_power.clone();
-        variance.values.iter_mut().for_each(|v| *v *= peakedness);
-        let information = Information {
-            slope: of_mean.clone().plus(&of_power),
-            variance: variance.plus(&of_mean),
-        };
-        (information, of_power)
-    }
-
-    /// V with the covariance between all pixels.
-    fn variance(
-        &self,
-        scale: f64,
-        (power, covariance): (&[f32], &Field),
-        (spectra, slopes): (&[Spectrum], &[Option<Vec<f32>>]),
-    ) -> Matrix {
-        let (torus, taper) = (&self.torus, &self.taper);
-        let exact: Vec<f32> = torus
-            .spectrum(covariance)
-            .iter()
-            .map(|v| v.re.max(0.0))
-            .collect();
-        let keep = [self.image.rows, self.image.columns];
-        let whitened: Vec<Spectrum> = spectra
-            .iter()
-            .map(|s| {
-                s.iter()
-                    .zip(power)
-                    .map(|(d, p)| d * (taper.energy as f32 / p))
-                    .collect()
-            })
-            .collect();
-        // v = w F⁻¹[D/S], so that g = Σ v r.
-        let mut seen: Vec<Spectrum> = Vec::new();
-        for pair in whitened.chunks(2) {
-            let second = pair.get(1).unwrap_or(&pair[0]);
-            let fields = torus.fields([&pair[0], second], keep);
-            let [a, b] = fields.map(|f| taper.of(f.values.into_iter()));
-            let [a, b] = torus.spectra([&a, &b]);
-            seen.push(a);
-            if pair.len() > 1 {
-                seen.push(b);
-            }
-        }
-        let count = spectra.len();
-        let area = (torus.size * torus.size) as f64;
-        let mut out = Matrix::zero(count);
-        for p in 0..count {
-            for q in 0..count {
-                let mut sum = 0.0;
-                for n in 0..exact.len() {
-                    let product = (seen[p][n].conj() * seen[q][n]).re * exact[n];
-                    sum += torus.weight(n) * f64::from(product);
-                }
-                out.add(p, q, sum / area);
-                if let (Some(a), Some(b)) = (&slopes[p], &slopes[q]) {
-                    let mut sum = 0.0;
-                    for n in 0..power.len() {
-                        sum += torus.weight(n) * f64::from(a[n] / power[n] * (b[n] / power[n]));
-                    }
-                    out.add(p, q, 0.5 * scale * taper.peakedness * sum);
-                }
-            }
-        }
-        out
-    }
 }
 
 /// A field over another one.
@@ -425,27 +341,6 @@ fn over(mut field: Field, by: &Field) -> Field {
     let pixels = field.values.iter_mut().zip(&by.values);
     pixels.for_each(|(value, by)| *value /= by);
     field
-}
-
-/// The score of each parameter.
-fn score(
-    torus: &Torus,
-    scale: f64,
-    (left, power): (&Spectrum, &[f32]),
-    (spectra, slopes): (&[Spectrum], &[Option<Vec<f32>>]),
-) -> Vec<f64> {
-    let one = |p: usize| {
-        let mut sum = 0.0;
-        for n in 0..power.len() {
-            let mut term = (spectra[p][n].conj() * left[n]).re / power[n];
-            if let Some(slope) = &slopes[p] {
-                term += 0.5 * slope[n] / power[n] * (left[n].norm_sqr() / power[n] - 1.0);
-            }
-            sum += torus.weight(n) * f64::from(term);
-        }
-        scale * sum
-    };
-    (0..spectra.len()).map(one).collect()
 }
 
 #[cfg(test)]

@@ -39,7 +39,8 @@ fn scores(
         observed.image = image(&expected, &texture, seed);
         let near = observed.near(
             &parameters,
-            (&Factors::default(), &expected),
+            &Factors::default(),
+            &expected,
             &texture,
             seed == 0,
         );
@@ -176,7 +177,7 @@ fn power_of_simulated_seas_is_that_of_the_nonlinear_transform() {
             let image = simulator.simulate(&scene).unwrap().speckled;
             let observed = Observed::new(image, &scene, |_, _| 1.0);
             let left = observed.torus.spectrum(&observed.residual(1.0, &mean));
-            let power = observed.power(&noise);
+            let power = observed.power(&noise.covariance(1.0));
             let scale = observed.taper.energy / (observed.torus.size.pow(2)) as f64;
             for (sum, ring) in rings.iter_mut().zip(observed.rings(scale, &left, &power)) {
                 sum[0] += ring[0] / seeds as f64;

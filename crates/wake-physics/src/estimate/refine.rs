@@ -11,6 +11,7 @@ use super::refined::{CERTAIN, Estimate, concluded, no_start};
 use super::search::{Found, Search};
 use super::sighting::Sighting;
 use super::similar::Course;
+use super::texture::Textures;
 use crate::error::{Error, Result};
 use crate::linear::OpenSea;
 use crate::measure::axis_between;
@@ -22,14 +23,17 @@ use crate::scene::{Scene, Sea};
 const END: Until = Until {
     steps: 20,
     small: 0.1,
+    farther: 0.25,
 };
 const FIRST: Until = Until {
     steps: 5,
     small: 2.0,
+    farther: 1.0,
 };
 const SHIP: Until = Until {
     steps: 8,
     small: 2.0,
+    farther: 1.0,
 };
 
 /// Log-likelihood below the highest from which a maximum is looked at no further (chosen).
@@ -122,10 +126,12 @@ pub(super) fn settled(
     let Some(ship) = starts.first().and_then(|start| start.ships.first()) else {
         return Err(no_start());
     };
+    let textures = Textures::default();
     let ascent = Ascent {
         observed,
         parameters: &Parameter::OF_WAKE,
         priors,
+        textures: &textures,
         length: ship.length,
     };
     let of_ship = Parameter::OF_WAKE.into_iter().filter(|p| p.is_of_ship());
@@ -173,7 +179,7 @@ pub(super) fn settled(
         });
     let mut points = each.collect::<Result<Vec<_>>>()?;
     sort(&mut points);
-    let open = without_ship(observed, &points[0], priors)?;
+    let open = without_ship(&ascent, &points[0])?;
     concluded(&ascent, points, open)
 }
 
@@ -192,7 +198,7 @@ fn on_sea(observed: &Observed, scene: &Scene, sea: Sea) -> Result<Scene> {
     open.ships.clear();
     let mean = ExpectedImage::new(&open, &[])?.intensity(&open)?;
     let noise = Noise::new(&open)?;
-    let search = Search::new(observed, (&other, &noise, &mean), &sighting);
+    let search = Search::new(observed, &other, &noise, &mean, &sighting);
     let course = Course {
         speed: other.ships[0].speed,
         heading: sighting.heading,
@@ -243,15 +249,14 @@ fn as_bright(observed: &Observed, scene: &Scene) -> Result<Factors> {
 }
 
 /// Largest log-posterior of a sea without the ship.
-fn without_ship(observed: &Observed, point: &Point, priors: &Priors) -> Result<f64> {
+fn without_ship(of: &Ascent<'_>, point: &Point) -> Result<f64> {
     let mut scene = point.scene.clone();
     scene.ships.clear();
     let of_sea = Parameter::OF_WAKE.into_iter().filter(|p| !p.is_of_ship());
     let ascent = Ascent {
-        observed,
         parameters: &of_sea.collect::<Vec<_>>(),
-        priors,
         length: 1.0,
+        ..*of
     };
     let found = ascent.climb(scene, point.factors, FIRST)?;
     if point.log_posterior - found.log_posterior > 10.0 * CERTAIN {

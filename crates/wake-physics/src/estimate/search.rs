@@ -56,6 +56,13 @@ const TOLERANCE: f64 = 0.05;
 /// Pixels around the image that wakes are drawn on.
 const MARGIN: usize = 20;
 
+/// Places that are searched \[m\].
+#[derive(Clone, Copy)]
+struct Disc {
+    middle: [f64; 2],
+    radius: f64,
+}
+
 /// Whitened image around a sighting.
 pub(super) struct Search<'a> {
     observed: &'a Observed,
@@ -73,11 +80,13 @@ impl<'a> Search<'a> {
     /// - `scene`: hull, radar and wind
     pub(super) fn new(
         observed: &'a Observed,
-        (scene, noise, mean): (&Scene, &Noise, &Field),
+        scene: &Scene,
+        noise: &Noise,
+        mean: &Field,
         sighting: &'a Sighting,
     ) -> Self {
         let (torus, taper) = (&observed.torus, &observed.taper);
-        let power = observed.power(noise);
+        let power = observed.power(&noise.covariance(1.0));
         let mut ratio = torus.spectrum(&observed.residual(observed.gain(mean) as f32, mean));
         for (value, power) in ratio.iter_mut().zip(&power) {
             *value *= taper.energy as f32 / power;
@@ -117,7 +126,10 @@ impl<'a> Search<'a> {
             place,
             place_sd,
         } = *self.sighting;
-        let around = (place, Sighting::REACH * place_sd);
+        let around = Disc {
+            middle: place,
+            radius: Sighting::REACH * place_sd,
+        };
         let course = Course {
             speed: (speeds[0] * speeds[1]).sqrt(),
             heading,
@@ -142,7 +154,7 @@ impl<'a> Search<'a> {
                 }
                 ((1.0 - square) * (1.0 - square)) as f32
             };
-            drawn.moved(&self.image, (course, around.0), weight)
+            drawn.moved(&self.image, course, place, weight)
         };
         let best = |n: i32| {
             let part = (f64::from(n) + 0.5) / f64::from(count);
@@ -200,10 +212,14 @@ impl<'a> Search<'a> {
         scene.grid.rows += 2 * MARGIN;
         scene.grid.columns += 2 * MARGIN;
         let drawn = Drawn::new(&scene, course, place, self.open)?;
-        let changes = |course| drawn.moved(&self.image, (course, place), |_| 1.0);
+        let around = Disc {
+            middle: place,
+            radius: reach,
+        };
+        let changes = |course| drawn.moved(&self.image, course, place, |_| 1.0);
         let all = each
             .par_chunks(2)
-            .filter_map(|pair| self.best(pair, (place, reach), changes));
+            .filter_map(|pair| self.best(pair, around, changes));
         let best = all.max_by(|a, b| a.gain.total_cmp(&b.gain));
         Ok(best.unwrap_or(*found))
     }
@@ -212,7 +228,7 @@ impl<'a> Search<'a> {
     fn best(
         &self,
         courses: &[Course],
-        around: ([f64; 2], f64),
+        around: Disc,
         change: impl Fn(Course) -> Field,
     ) -> Option<Found> {
         let found = self.each(courses, around, change).into_iter();
@@ -223,7 +239,7 @@ impl<'a> Search<'a> {
     fn each(
         &self,
         courses: &[Course],
-        around: ([f64; 2], f64),
+        around: Disc,
         change: impl Fn(Course) -> Field,
     ) -> Vec<Found> {
         let found = courses.chunks(2).flat_map(|pair| {
@@ -234,7 +250,7 @@ impl<'a> Search<'a> {
     }
 
     /// Best places of the changes of one or two courses.
-    fn placed(&self, courses: &[Course], around: ([f64; 2], f64), changes: &[Field]) -> Vec<Found> {
+    fn placed(&self, courses: &[Course], around: Disc, changes: &[Field]) -> Vec<Found> {
         let [Some(first), Some(last)] = [changes.first(), changes.last()] else {
             return Vec::new();
         };
@@ -248,22 +264,16 @@ impl<'a> Search<'a> {
         }
         let maps = torus.fields([&products[0], &products[1]], [torus.size; 2]);
         let each = courses.iter().zip(&maps).zip(energies);
-        each.map(|((course, map), energy)| self.peak(*course, around, (map, energy)))
+        each.map(|((course, map), energy)| self.peak(*course, around, map, energy))
             .collect()
     }
 
     /// Highest gain of the map of places.
-    ///
-    /// - `place` and distance from it that is searched
-    fn peak(
-        &self,
-        course: Course,
-        (place, reach): ([f64; 2], f64),
-        (map, energy): (&Field, f64),
-    ) -> Found {
+    fn peak(&self, course: Course, around: Disc, map: &Field, energy: f64) -> Found {
+        let place = around.middle;
         let spacing = self.image.spacing;
         let size = map.rows as i64;
-        let pixels = ((reach / spacing).floor() as i64).min(size / 2 - 2);
+        let pixels = ((around.radius / spacing).floor() as i64).min(size / 2 - 2);
         let turned = (course.heading - self.sighting.heading) / self.sighting.heading_sd;
         let fitted = |down: i64, right: i64| {
             let [i, j] = [down, right].map(|n| n.rem_euclid(size) as usize);

@@ -84,7 +84,8 @@ impl Drawn {
     pub(super) fn moved(
         &self,
         raster: &Raster,
-        (course, midship): (Course, [f64; 2]),
+        course: Course,
+        midship: [f64; 2],
         weight: impl Fn([f64; 2]) -> f32,
     ) -> Field {
         let scale = (self.course.speed / course.speed).powi(2);
@@ -169,7 +170,7 @@ mod tests {
         let there = [22.0, 51.0];
         let expected = pattern(of(9.6, 52.0), there);
         let off = |course| {
-            let found = drawn.moved(&raster, (course, there), |_| 1.0);
+            let found = drawn.moved(&raster, course, there, |_| 1.0);
             found.difference(&expected).0
         };
         assert!(off(of(9.6, 52.0)) < 0.008, "{}", off(of(9.6, 52.0)));

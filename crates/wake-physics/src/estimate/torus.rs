@@ -102,7 +102,7 @@ impl Torus {
         let [mut re, mut im] = [(); 2].map(|()| vec![0.0; size * size]);
         let keep = [size, size];
         self.synthesis
-            .run(lines, keep, (&mut re, &mut im), |_, _| {});
+            .run(lines, keep, [&mut re, &mut im], |_, _| {});
         [re, im]
     }
 }

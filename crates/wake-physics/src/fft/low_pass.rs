@@ -125,7 +125,8 @@ impl LowPass {
         fill: impl Fn(usize, &mut [Complex32]) + Sync,
         points: &[Point],
         window: &Window,
-        (out, take): (&mut [T], impl Fn(&[Complex32], &mut [T]) + Sync),
+        out: &mut [T],
+        take: impl Fn(&[Complex32], &mut [T]) + Sync,
     ) {
         let [keep_rows, keep_columns] = window.keep;
         assert!(rows <= self.sizes[0], "more rows than planned");
@@ -140,7 +141,7 @@ impl LowPass {
         let blocks = self.rows_to_band(rows, fill);
         let lines = self.columns_of_band(&blocks, points, window);
         drop(blocks);
-        self.band_to_rows(&lines, window, (out, take));
+        self.band_to_rows(&lines, window, out, take);
     }
 
     /// First pass: transforms each row and keeps its band, `[block][band][BLOCK]`.
@@ -221,7 +222,8 @@ impl LowPass {
         &self,
         lines: &[Complex32],
         window: &Window,
-        (out, take): (&mut [T], impl Fn(&[Complex32], &mut [T]) + Sync),
+        out: &mut [T],
+        take: impl Fn(&[Complex32], &mut [T]) + Sync,
     ) {
         let [keep_rows, keep_columns] = window.keep;
         let short = self.sizes[1] / self.step;
@@ -418,7 +420,8 @@ mod tests {
                 |i, row| row[..size[1]].copy_from_slice(&field[i * size[1]..][..size[1]]),
                 &points,
                 &window,
-                (&mut out, |from, to| to.copy_from_slice(from)),
+                &mut out,
+                |from, to| to.copy_from_slice(from),
             );
             let expected = direct(&plan, &field, size[1], &points, &window);
             let rms = (expected.iter().map(Complex64::norm_sqr).sum::<f64>()

@@ -113,7 +113,7 @@ impl<T: Real> Synthesis<T> {
         &self,
         spectrum: &mut [Complex<T>],
         keep: [usize; 2],
-        out: (&mut [f32], &mut [f32]),
+        out: [&mut [f32]; 2],
         finish: F,
     ) where
         F: Fn(usize, &mut [Complex<T>]) + Sync,
@@ -131,7 +131,7 @@ impl<T: Real> Synthesis<T> {
         spectrum: &mut [Complex<T>],
         start: [usize; 2],
         keep: [usize; 2],
-        (re, im): (&mut [f32], &mut [f32]),
+        [re, im]: [&mut [f32]; 2],
         finish: F,
     ) where
         F: Fn(usize, &mut [Complex<T>]) + Sync,
@@ -206,8 +206,9 @@ impl<T: Real> Synthesis<T> {
     pub(crate) fn run_real<F>(
         &self,
         half: &mut [Complex<T>],
-        (rows, keep_columns): (Range<usize>, usize),
-        (first, second): (&mut [f32], &mut [f32]),
+        rows: Range<usize>,
+        keep_columns: usize,
+        [first, second]: [&mut [f32]; 2],
         fill: F,
     ) where
         F: Fn(usize, &mut [Complex<T>], &mut [Complex<T>]) + Sync,
@@ -254,7 +255,7 @@ impl<T: Real> Synthesis<T> {
                 |(block, scratch), (n, (first, second))| {
                     let rows = n * BLOCK..((n + 1) * BLOCK).min(keep_rows);
                     let block = &mut block[..rows.len() * self.columns];
-                    self.gather_real((half, keep_rows), rows, block);
+                    self.gather_real(half, keep_rows, rows, block);
                     self.along_x.process_with_scratch(block, scratch);
                     let rows = block.chunks_exact(self.columns);
                     let out = first
@@ -270,7 +271,8 @@ impl<T: Real> Synthesis<T> {
     /// Transposes some rows of two half spectra into rows of the full spectrum of `first + i second`.
     fn gather_real(
         &self,
-        (half, kept): (&[Complex<T>], usize),
+        half: &[Complex<T>],
+        kept: usize,
         rows: Range<usize>,
         block: &mut [Complex<T>],
     ) {
@@ -361,7 +363,7 @@ fn split<T: Real>(row: &[Complex<T>], re: &mut [f32], im: &mut [f32]) {
 pub fn lattice_sum(waves: &mut [Complex32], period: [usize; 2], size: [usize; 2]) -> [Vec<f32>; 2] {
     let [mut re, mut im] = [(); 2].map(|()| vec![0.0; size[0] * size[1]]);
     let synthesis = Synthesis::new(period[0], period[1]);
-    synthesis.run(waves, size, (&mut re, &mut im), |_, _| {});
+    synthesis.run(waves, size, [&mut re, &mut im], |_, _| {});
     [re, im]
 }
 
@@ -410,7 +412,7 @@ mod tests {
                 plan.run(
                     &mut spectrum,
                     [rows, columns],
-                    (&mut re, &mut im),
+                    [&mut re, &mut im],
                     |_, _| (),
                 );
                 for (n, (&re, &im)) in re.iter().zip(&im).enumerate() {
@@ -455,15 +457,15 @@ mod tests {
             }
             let n = rows * columns;
             let (mut re, mut im) = (vec![0.0; n], vec![0.0; n]);
-            plan.run(&mut full, [rows, columns], (&mut re, &mut im), |_, _| ());
+            plan.run(&mut full, [rows, columns], [&mut re, &mut im], |_, _| ());
             // Fewer rows, from the middle on, and columns kept, and a workspace that is not clean.
             let keep = [rows.div_ceil(2), columns.div_ceil(2)];
             let from = rows - keep[0];
             let mut half = vec![Complex::new(f64::NAN, 1.0); plan.half_len(keep[0])];
             let (mut first, mut second) =
                 (vec![0.0; keep[0] * keep[1]], vec![0.0; keep[0] * keep[1]]);
-            let kept = (from..rows, keep[1]);
-            plan.run_real(&mut half, kept, (&mut first, &mut second), |b, one, two| {
+            let out = [&mut first[..], &mut second[..]];
+            plan.run_real(&mut half, from..rows, keep[1], out, |b, one, two| {
                 for a in 0..rows {
                     one[a] = value(b, a, 0.1);
                     two[a] = value(b, a, 0.9);

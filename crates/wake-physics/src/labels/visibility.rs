@@ -235,7 +235,7 @@ impl<'a> Background<'a> {
                 (rays, self.dark_line(band, edge))
             });
             let (rays, local) = tangent.as_ref().map_or((&rays, &band), |(r, b)| (r, b));
-            let row = self.row(wake, distance, windows, rays, (local, profile.as_ref()));
+            let row = self.row(wake, distance, windows, rays, local, profile.as_ref());
             let end = distance + 0.5 * step + 2.0 * half_length;
             let independent = WINDOW as f64 / self.correlated.sqrt();
             let seen = |square: f64| independent * square.sqrt() >= THRESHOLD * self.noise;
@@ -338,7 +338,8 @@ impl<'a> Background<'a> {
         distance: f64,
         [first, last]: [f64; 2],
         rays: &[ImagedRay],
-        (band, short): (&DarkLine, Option<&Profile>),
+        band: &DarkLine,
+        short: Option<&Profile>,
     ) -> Row {
         let width = WINDOW as f64 * self.raster.spacing;
         let from_midship = distance + 0.5 * wake.hull.length();

@@ -79,7 +79,7 @@ fn magnitudes(image: &Field) -> Vec<f64> {
     }
     let (mut re, mut im) = (vec![0.0f32; rows * columns], vec![0.0f32; rows * columns]);
     let synthesis = Synthesis::<f64>::new(rows, columns);
-    synthesis.run(&mut lines, [rows, columns], (&mut re, &mut im), |_, _| ());
+    synthesis.run(&mut lines, [rows, columns], [&mut re, &mut im], |_, _| ());
     let parts = re.iter().zip(&im);
     parts
         .map(|(&a, &b)| f64::from(a).hypot(f64::from(b)))

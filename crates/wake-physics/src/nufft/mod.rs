@@ -101,7 +101,8 @@ pub(crate) fn synthesize_each(
 /// - `wavenumbers`: kx and ky [rad/m], as many as each set has strengths
 pub(crate) fn sum_strengths(
     workspace: &mut Workspace,
-    (wavenumbers, strengths): ([&[f64]; 2], Vec<Vec<Complex64>>),
+    wavenumbers: [&[f64]; 2],
+    strengths: Vec<Vec<Complex64>>,
     raster: &Raster,
     tolerance: f64,
     take: impl FnMut(usize, &mut Field),
@@ -331,7 +332,7 @@ impl<'a> CentredSums<'a> {
         let keep = [raster.rows, raster.columns];
         let mut transform = |pair: &[usize], lattice: &mut [Complex<T>]| {
             let [re, im] = fields.each_mut().map(|field| &mut field.values[..]);
-            synthesis.run_window(lattice, start, keep, (re, im), |i, row| {
+            synthesis.run_window(lattice, start, keep, [re, im], |i, row| {
                 for (v, &factor) in row.iter_mut().zip(&right) {
                     *v = *v * (factor * down[i]);
                 }

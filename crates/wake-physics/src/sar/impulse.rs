@@ -170,7 +170,8 @@ impl ImpulseResponse {
             fill,
             &points,
             &view.window,
-            (&mut out.values, take),
+            &mut out.values,
+            take,
         );
         out
     }
@@ -189,7 +190,7 @@ impl ImpulseResponse {
     ) -> Vec<Complex32> {
         let mut out = vec![Complex32::ZERO; image.len()];
         let look = |from: &[Complex32], to: &mut [Complex32]| to.copy_from_slice(from);
-        self.looks(sources, image, (seed, 0..1), &mut out, |_| look);
+        self.looks(sources, image, seed, 0..1, &mut out, |_| look);
         out
     }
 
@@ -207,20 +208,14 @@ impl ImpulseResponse {
         let weights = look_weights(looks.equivalent);
         let mut out = Field::constant(image, 0.0);
         let numbers = 0..weights.len() as u64;
-        self.looks(
-            sources,
-            image,
-            (looks.seed, numbers),
-            &mut out.values,
-            |n| {
-                let weight = weights[n as usize] as f32;
-                move |from: &[Complex32], to: &mut [f32]| {
-                    for (to, from) in to.iter_mut().zip(from) {
-                        *to += weight * from.norm_sqr();
-                    }
+        self.looks(sources, image, looks.seed, numbers, &mut out.values, |n| {
+            let weight = weights[n as usize] as f32;
+            move |from: &[Complex32], to: &mut [f32]| {
+                for (to, from) in to.iter_mut().zip(from) {
+                    *to += weight * from.norm_sqr();
                 }
-            },
-        );
+            }
+        });
         out
     }
 
@@ -229,7 +224,8 @@ impl ImpulseResponse {
         &self,
         sources: &Reflectivity<'_>,
         image: &Raster,
-        (seed, numbers): (u64, std::ops::Range<u64>),
+        seed: u64,
+        numbers: std::ops::Range<u64>,
         out: &mut [T],
         take: impl Fn(u64) -> F,
     ) {
@@ -252,7 +248,7 @@ impl ImpulseResponse {
             let fill = |i: usize, row: &mut [Complex32]| {
                 rough_row(view.row(sources, i), seed, first + i as u64, row);
             };
-            filter.run(raster.rows, fill, &points, &view.window, (out, take(look)));
+            filter.run(raster.rows, fill, &points, &view.window, out, take(look));
         }
     }
 

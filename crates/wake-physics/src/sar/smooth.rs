@@ -26,8 +26,8 @@ const ROUNDED: f64 = 1.0 / 32.0;
 /// Largest share of a source's power that the kernel may put in the wrong place.
 const TOLERANCE: f64 = 1e-6;
 
-/// Columns of a block.
-const BLOCK: usize = 24;
+/// Columns of a block for one sum, and at least for more; the sums of a block stay in the cache.
+const BLOCK: [usize; 2] = [48, 24];
 
 /// A source: what it returns, and where that is imaged.
 pub(crate) struct Source<const N: usize> {
@@ -145,14 +145,15 @@ impl SmoothSum {
     ) -> Vec<Field> {
         let parts = 1 + by.len();
         let columns = self.image.columns;
-        let blocks: Vec<Vec<f64>> = (0..columns.div_ceil(BLOCK))
+        let wide = BLOCK[usize::from(N > 0)];
+        let blocks: Vec<Vec<f64>> = (0..columns.div_ceil(wide))
             .into_par_iter()
             .map(|b| {
-                let range = b * BLOCK..((b + 1) * BLOCK).min(columns);
+                let range = b * wide..((b + 1) * wide).min(columns);
                 let mut lines = vec![0.0; range.len() * parts * self.count];
                 vectorized(
                     #[inline(always)]
-                    || self.block(by, (range.start, range.len()), &source, &mut lines),
+                    || self.block(by, range.start, range.len(), &source, &mut lines),
                 );
                 lines
             })
@@ -164,8 +165,8 @@ impl SmoothSum {
                 let weights = &self.filling[m % self.steps.step];
                 let first = (m / self.steps.step + self.pad) as i64 + self.filling_first;
                 for (j, value) in row.iter_mut().enumerate() {
-                    let line = ((j % BLOCK) * parts + part) * self.count + first as usize;
-                    let steps = &blocks[j / BLOCK][line..][..weights.len()];
+                    let line = ((j % wide) * parts + part) * self.count + first as usize;
+                    let steps = &blocks[j / wide][line..][..weights.len()];
                     let sum: f64 = steps
                         .iter()
                         .zip(weights)
@@ -183,7 +184,8 @@ impl SmoothSum {
     fn block<const N: usize>(
         &self,
         by: &[usize],
-        (first, width): (usize, usize),
+        first: usize,
+        width: usize,
         source: &impl Fn(usize, usize) -> Source<N>,
         lines: &mut [f64],
     ) {
@@ -198,7 +200,7 @@ impl SmoothSum {
             for j in reaching.clone() {
                 let source = source(i, j);
                 let column = j as i64 + self.offset[1] - first as i64;
-                self.add(by, (i, column), &source, &mut taps, (width, lines));
+                self.add(by, [i as i64, column], &source, &mut taps, width, lines);
             }
         }
     }
@@ -207,15 +209,21 @@ impl SmoothSum {
     fn add<const N: usize>(
         &self,
         by: &[usize],
-        (row, column): (usize, i64),
+        [row, column]: [i64; 2],
         source: &Source<N>,
         taps: &mut Taps,
-        (width, lines): (usize, &mut [f64]),
+        width: usize,
+        lines: &mut [f64],
     ) {
         let step = self.steps.step as f64;
-        let from_top = (row as i64 + self.offset[0]) as f64;
+        let from_top = (row + self.offset[0]) as f64;
         let centre = (from_top - source.up.value) / step + self.pad as f64;
-        let Some(start) = taps.set(&self.steps, centre, source.variance.value, self.count) else {
+        let variance = source.variance.value;
+        let set = match N {
+            0 => taps.set::<false>(&self.steps, centre, variance, self.count),
+            _ => taps.set::<true>(&self.steps, centre, variance, self.count),
+        };
+        let Some(start) = set else {
             return;
         };
         let parts = 1 + by.len();
@@ -258,8 +266,16 @@ struct Taps {
 
 impl Taps {
     /// Returns the first step; none for a source beyond the steps.
+    ///
+    /// - `BY`: with derivatives
     #[inline(always)]
-    fn set(&mut self, steps: &Steps, centre: f64, variance: f64, most: usize) -> Option<usize> {
+    fn set<const BY: bool>(
+        &mut self,
+        steps: &Steps,
+        centre: f64,
+        variance: f64,
+        most: usize,
+    ) -> Option<usize> {
         let variance = variance.max(SMALLEST_VARIANCE);
         let count = steps.taps(variance as f32);
         let start = centre.floor() - (count / 2 - 1) as f64;
@@ -278,8 +294,15 @@ impl Taps {
         let mut sums = [0.0; 3];
         for n in 0..count {
             let d = n as f64 + offset;
-            let value = crate::numeric::vector::exp(-d * d * scale);
-            values[n] = value;
+            values[n] = crate::numeric::vector::exp(-d * d * scale);
+        }
+        if !BY {
+            let norm = 1.0 / values.iter().sum::<f64>();
+            values.iter_mut().for_each(|value| *value *= norm);
+            return Some(start as usize);
+        }
+        for n in 0..count {
+            let (d, value) = (n as f64 + offset, values[n]);
             places[n] = value * d / narrow;
             widths[n] = value * d * d * scale / (narrow * step * step);
         }

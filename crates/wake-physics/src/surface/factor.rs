@@ -63,10 +63,12 @@ impl<'a, T: Lane> Factors<'a, T> {
             let waves = self.ky[range].iter().zip(out);
             match self.depth {
                 None => {
-                    waves.for_each(|(&ky, out)| frequency(kx * kx + ky * ky, |_| T::one(), out));
+                    waves.for_each(|(&ky, (omega, orbital))| {
+                        frequency(kx * kx + ky * ky, |_| T::one(), omega, orbital);
+                    });
                 }
-                Some(depth) => waves.for_each(|(&ky, out)| {
-                    frequency(kx * kx + ky * ky, |k| (k * depth).tanh(), out);
+                Some(depth) => waves.for_each(|(&ky, (omega, orbital))| {
+                    frequency(kx * kx + ky * ky, |k| (k * depth).tanh(), omega, orbital);
                 }),
             }
         }
@@ -122,7 +124,7 @@ impl<'a, T: Lane> Factors<'a, T> {
 
 /// ω² = (gk + (τ/ρ)k³) tanh(kh) and ω coth(kh)/k from k².
 #[inline(always)]
-fn frequency<T: Lane>(squared: T, tanh: impl Fn(T) -> T, (omega, orbital): (&mut T, &mut T)) {
+fn frequency<T: Lane>(squared: T, tanh: impl Fn(T) -> T, omega: &mut T, orbital: &mut T) {
     let tension = T::constant(KINEMATIC_SURFACE_TENSION);
     let k = squared.sqrt();
     let t = tanh(k);

@@ -314,11 +314,11 @@ impl Surface {
         let mut half = blocks.take(plan.half_len(rows.len()));
         for (pair, quantities) in fields.chunks_mut(2).zip(quantities.chunks(2)) {
             let out = match pair {
-                [first, second] => (&mut first.values[..], &mut second.values[..]),
-                [first] => (&mut first.values[..], &mut unused[..]),
+                [first, second] => [&mut first.values[..], &mut second.values[..]],
+                [first] => [&mut first.values[..], &mut unused[..]],
                 _ => continue,
             };
-            plan.run_real(&mut half, (rows.clone(), columns), out, |line, one, two| {
+            plan.run_real(&mut half, rows.clone(), columns, out, |line, one, two| {
                 vectorized(
                     #[inline(always)]
                     || self.half_spectra(&factors, line, quantities, [one, two]),

@@ -4,8 +4,8 @@
 //! SIDE=512 RANK=8 cargo test --release -p wake-train --lib full_size -- --ignored --nocapture
 //! ```
 //!
-//! Environment: `SIDE` of the images \[pixels\], `RANK` (without it the whole U-Net learns), `BATCH`, `STEPS`, and `CHECKPOINTING` and
-//! `BF16`, which are on if they are set. `benches/torch_reference.py fine-tune` measures the same with torch.
+//! Environment: `SIDE` of the images \[pixels\], `RANK` (without it the whole U-Net learns), `BATCH`, `STEPS`, `DEVICE` (flex), and `CHECKPOINTING`
+//! and `BF16`, which are on if they are set. `benches/torch_reference.py fine-tune` measures the same with torch.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 #![allow(clippy::print_stdout, reason = "figures are what it is for")]
@@ -13,7 +13,6 @@
 use std::env::var;
 use std::time::Instant;
 
-use burn::tensor::Device;
 use serde_json::{Value, json};
 use wake_dataset::Grey;
 
@@ -88,7 +87,7 @@ fn steps<M: Module>(mut run: Run<M>, task: &impl Task<M>) {
 #[test]
 #[ignore = "gigabytes and minutes; prints figures"]
 fn full_size() {
-    let device = Device::flex();
+    let device = wake_nn::device_named(&var("DEVICE").unwrap_or("flex".into())).unwrap();
     let options = StageOptions {
         checkpointing: var("CHECKPOINTING").is_ok(),
         bf16: var("BF16").is_ok(),

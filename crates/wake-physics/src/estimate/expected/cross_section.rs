@@ -31,8 +31,8 @@ pub(super) const OUTER: usize = 3;
 /// Bragg return, specular return, both times the velocity of the waves, and both times what its square has beyond its variance.
 const PARTS: usize = 6;
 
-/// The parts and their derivatives by the outer values.
-const CHANNELS: usize = PARTS * (1 + OUTER);
+/// Derivatives of the parts by the outer values.
+const BY_OUTER: usize = PARTS * OUTER;
 
 /// Cells of the spline across the square of slopes, and beyond it on each side, where the conditions at its ends fade.
 const CELLS: usize = 64;
@@ -43,7 +43,9 @@ pub(super) struct CrossSection {
     /// Half the side of the square of slopes that it covers \[1\].
     reach: f64,
     /// Coefficients of B-splines, `[side, side]`, that of the slope along x running fastest.
-    coefficients: Vec<[f64; CHANNELS]>,
+    parts: Vec<[f64; PARTS]>,
+    /// The same of their derivatives by the outer values, if there are any.
+    by_outer: Vec<[f64; BY_OUTER]>,
 }
 
 /// Coefficients along each axis.
@@ -79,36 +81,40 @@ impl CrossSection {
             .map(|facets| lattice.averages(facets))
             .collect::<Vec<_>>()
             .into_iter();
-        let mut channels = vec![[0.0; CHANNELS]; SIDE * SIDE];
-        let mut put = |channel: usize, values: &mut dyn Iterator<Item = [f64; PARTS]>| {
-            for (to, from) in channels.iter_mut().zip(values) {
-                for (n, from) in from.into_iter().enumerate() {
-                    to[channel + n * (1 + OUTER)] = from;
-                }
-            }
+        let mut parts = tables.next().unwrap_or_default();
+        let count = if outer.iter().any(Option::is_some) {
+            SIDE * SIDE
+        } else {
+            0
         };
-        put(0, &mut tables.next().unwrap_or_default().into_iter());
+        let mut by_outer = vec![[0.0; BY_OUTER]; count];
         for (n, pair) in outer.iter().enumerate() {
             if let (Some((_, width)), Some(below), Some(above)) = (
                 pair,
                 pair.and_then(|_| tables.next()),
                 pair.and_then(|_| tables.next()),
             ) {
-                let pairs = below.iter().zip(&above);
-                let mut slopes = pairs.map(|(a, b)| std::array::from_fn(|n| (b[n] - a[n]) / width));
-                put(1 + n, &mut slopes);
+                for (to, (a, b)) in by_outer.iter_mut().zip(below.iter().zip(&above)) {
+                    for part in 0..PARTS {
+                        to[part * OUTER + n] = (b[part] - a[part]) / width;
+                    }
+                }
             }
         }
-        spline(&mut channels);
+        spline(&mut parts);
+        spline(&mut by_outer);
         Self {
             reach,
-            coefficients: channels,
+            parts,
+            by_outer,
         }
     }
 
     /// σ⁰ at a slope; steeper slopes than the spline covers are taken as its edge.
+    ///
+    /// - `BY`: with derivatives
     #[inline(always)]
-    pub(super) fn at(&self, slope: [f64; 2]) -> At {
+    pub(super) fn at<const BY: bool>(&self, slope: [f64; 2]) -> At {
         let per = CELLS as f64 / (2.0 * self.reach);
         let mut first_cell = [0; 2];
         let mut weights = [[[0.0; 4]; 2]; 2];
@@ -120,37 +126,38 @@ impl CrossSection {
             weights[axis] = spline_weights(place - cell as f64);
         }
         let [[u, du], [v, dv]] = weights;
-        let mut value = [0.0; CHANNELS];
-        let mut first = [[0.0; 2]; PARTS];
+        let mut at = At::default();
         for j in 0..4 {
             let start = (first_cell[1] + j) * SIDE + first_cell[0];
-            let Some(line) = self.coefficients[start..].first_chunk::<4>() else {
-                continue;
-            };
-            let mut sum = [0.0; CHANNELS];
-            let mut slope = [0.0; PARTS];
-            for (i, c) in line.iter().enumerate() {
-                for (sum, c) in sum.iter_mut().zip(c) {
-                    *sum += u[i] * c;
+            let line = self.parts[start..].first_chunk::<4>();
+            let (mut sum, mut slope) = ([0.0; PARTS], [0.0; PARTS]);
+            for (i, c) in line.into_iter().flatten().enumerate() {
+                for n in 0..PARTS {
+                    sum[n] += u[i] * c[n];
+                    slope[n] += du[i] * c[n];
                 }
-                for (n, slope) in slope.iter_mut().enumerate() {
-                    *slope += du[i] * c[n * (1 + OUTER)];
-                }
-            }
-            for (value, sum) in value.iter_mut().zip(&sum) {
-                *value += v[j] * sum;
             }
             for n in 0..PARTS {
-                let sum = sum[n * (1 + OUTER)];
-                first[n][0] += v[j] * slope[n];
-                first[n][1] += dv[j] * sum;
+                at.value[n] += v[j] * sum[n];
+                at.slope[n][0] += per * v[j] * slope[n];
+                at.slope[n][1] += per * dv[j] * sum[n];
             }
         }
-        At {
-            value: std::array::from_fn(|n| value[n * (1 + OUTER)]),
-            slope: first.map(|d| d.map(|d| per * d)),
-            outer: std::array::from_fn(|n| std::array::from_fn(|p| value[n * (1 + OUTER) + 1 + p])),
+        if !BY || self.by_outer.is_empty() {
+            return at;
         }
+        let mut by_outer = [0.0; BY_OUTER];
+        for j in 0..4 {
+            let start = (first_cell[1] + j) * SIDE + first_cell[0];
+            let line = self.by_outer[start..].first_chunk::<4>();
+            for (i, c) in line.into_iter().flatten().enumerate() {
+                for (sum, c) in by_outer.iter_mut().zip(c) {
+                    *sum += v[j] * u[i] * c;
+                }
+            }
+        }
+        at.outer = std::array::from_fn(|n| std::array::from_fn(|p| by_outer[n * OUTER + p]));
+        at
     }
 }
 
@@ -175,7 +182,10 @@ fn spline_weights(t: f64) -> [[f64; 4]; 2] {
 }
 
 /// B-spline coefficients in place of the values at the knots: the inverse of 1/6, 4/6, 1/6 along both axes.
-fn spline(knots: &mut [[f64; CHANNELS]]) {
+fn spline<const CHANNELS: usize>(knots: &mut [[f64; CHANNELS]]) {
+    if knots.is_empty() {
+        return;
+    }
     for (step, line) in [(1, SIDE), (SIDE, 1)] {
         for n in 0..SIDE {
             let places: Vec<usize> = (0..SIDE).map(|k| n * line + k * step).collect();
@@ -329,21 +339,29 @@ mod tests {
         let t4 = |x: f64| 8.0 * x.powi(4) - 8.0 * x * x + 1.0;
         let half = (SIDE / 2) as f64;
         let at = |n: usize| n as f64 / half - 1.0;
-        // T₃(x) T₂(y) in the first channel, T₄(x) in the specular one.
+        // T₃(x) T₂(y) in the Bragg part, T₄(x) in the specular one, and the first as the derivative of a part by an outer value.
         let knot = |n: usize| {
-            let mut channels = [0.0; CHANNELS];
-            channels[0] = t3(at(n % SIDE)) * t2(at(n / SIDE));
-            channels[1 + OUTER] = t4(at(n % SIDE));
-            channels
+            let mut parts = [0.0; PARTS];
+            parts[0] = t3(at(n % SIDE)) * t2(at(n / SIDE));
+            parts[1] = t4(at(n % SIDE));
+            parts
         };
-        let mut coefficients: Vec<_> = (0..SIDE * SIDE).map(knot).collect();
-        spline(&mut coefficients);
+        let mut parts: Vec<_> = (0..SIDE * SIDE).map(knot).collect();
+        spline(&mut parts);
+        let outer = |part: &[f64; PARTS]| {
+            let mut outer = [0.0; BY_OUTER];
+            outer[2 * OUTER + 1] = part[0];
+            outer
+        };
         let section = CrossSection {
             reach: 1.0 / (1.0 + 2.0 * BEYOND as f64 / CELLS as f64),
-            coefficients,
+            by_outer: parts.iter().map(outer).collect(),
+            parts,
         };
         for [x, y] in [[0.0, 0.0], [0.31, -0.52], [-0.8, 0.7], [0.123, 0.456]] {
-            let at = section.at([x, y]);
+            let at = section.at::<true>([x, y]);
+            assert!((at.outer[2][1] - at.value[0]).abs() < 1e-12);
+            assert_eq!(section.at::<false>([x, y]).value, at.value);
             let (d3, d2) = (12.0 * x * x - 3.0, 4.0 * y);
             // Fourth order in cells of 1/38, fourth derivatives up to 192.
             assert!((at.value[0] - t3(x) * t2(y)).abs() < 1e-5);
@@ -373,7 +391,7 @@ mod tests {
             exact.parts([0, 1].map(|a| slope[a] + n * step * waves.velocity_slope[a]))
         };
         for slope in [[0.0, 0.0], [0.2, -0.1]] {
-            let found = section.at(slope).value;
+            let found = section.at::<true>(slope).value;
             let shifted = [0, 1].map(|a| slope[a] + waves.slope_modulation[a]);
             for (n, at) in [shifted, slope].into_iter().enumerate() {
                 let [below, here, above] = [-1.0, 0.0, 1.0].map(|by: f64| along(at, by)[n]);
@@ -412,7 +430,7 @@ mod tests {
             let exact = &facets.0;
             let calm: f64 = exact.parts([0.0; 2]).iter().sum();
             for slope in [[0.0, 0.0], [0.2, -0.1], [-0.35, 0.3]] {
-                let found = section.at(slope).value;
+                let found = section.at::<true>(slope).value;
                 for (found, expected) in found.iter().zip(exact.parts(slope)) {
                     assert!(
                         (found - expected).abs() < 2e-4 * calm.max(expected),

@@ -260,7 +260,10 @@ impl<'a, const N: usize> Drawn<'a, N> {
     #[inline(always)]
     fn returned(&self, slope: [Dual<N>; 2], factor: impl FnOnce() -> Dual<N>) -> [Dual<N>; 3] {
         let point = slope.map(|s| s.value);
-        let at = self.cross_section.at(point);
+        let at = match N {
+            0 => self.cross_section.at::<false>(point),
+            _ => self.cross_section.at::<true>(point),
+        };
         let part = |n: usize| {
             let mut part = Dual::constant(at.value[n]);
             for (by, along) in at.slope[n].into_iter().zip(&slope) {

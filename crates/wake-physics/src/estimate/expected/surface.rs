@@ -4,7 +4,7 @@ use super::bright::BrightWaves;
 use super::cross_section::{CrossSection, Facets, OUTER};
 use super::frozen::{Frozen, averaged, with_ships_of};
 use super::surroundings::{Slopes, Surroundings};
-use super::waves::{Change, Linear, Seen, WakeSums, difference, sums};
+use super::waves::{Change, Linear, Nodes, Seen, WakeSums, difference, sums};
 use crate::estimate::value::Value;
 use crate::kelvin::fade_at;
 use crate::models::Models;
@@ -85,22 +85,22 @@ impl<'a> Surface<'a> {
         if frozen.plan.uses(Term::Kelvin) {
             for (n, wake) in models.wakes.iter().enumerate() {
                 let seen = (wake, &models.transfer);
+                let nodes = Nodes {
+                    plan: &frozen.plan.wakes[n],
+                    modulating: &frozen.modulating[n],
+                    fields: &frozen.fields,
+                    tolerance: frozen.tolerance,
+                };
                 let changes: Vec<Change<'_>> = match n {
                     0 => moved.iter().map(Moved::change).collect(),
                     _ => Vec::new(),
                 };
-                wakes.push(sums(
-                    &mut workspace,
-                    (seen, &frozen.plan.wakes[n]),
-                    (&frozen.fields, &changes),
-                    &frozen.raster,
-                    (frozen.tolerance, &frozen.modulating[n]),
-                ));
+                wakes.push(sums(&mut workspace, seen, &nodes, &changes, &frozen.raster));
             }
         }
         let around = |scene: &Scene, models: &Models| {
             let memory = &mut Workspace::default();
-            Surroundings::new(memory, (scene, models), &frozen.plan, &frozen.raster)
+            Surroundings::new(memory, scene, models, &frozen.plan, &frozen.raster)
         };
         let surroundings = around(scene, models);
         let none = surroundings.each().iter().all(Option::is_none);

@@ -29,7 +29,8 @@ pub(super) const FIELDS: usize = 4;
 impl Surroundings {
     pub(super) fn new(
         workspace: &mut Workspace,
-        (scene, models): (&Scene, &Models),
+        scene: &Scene,
+        models: &Models,
         plan: &Plan,
         raster: &Raster,
     ) -> Self {

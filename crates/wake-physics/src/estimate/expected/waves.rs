@@ -151,16 +151,32 @@ enum Part {
     Strength(Value),
 }
 
+/// Waves that are frozen, and the fields that are summed of them.
+pub(super) struct Nodes<'a> {
+    pub(super) plan: &'a WakePlan,
+    /// Waves that modulate.
+    pub(super) modulating: &'a [bool],
+    pub(super) fields: &'a [Linear],
+    /// Of the sums.
+    pub(super) tolerance: f64,
+}
+
 /// Sums of a wake on a raster.
 ///
 /// - `changes`: values with derivatives; none of a wake that no value changes
 pub(super) fn sums(
     workspace: &mut Workspace,
-    (seen, plan): (Seen<'_>, &WakePlan),
-    (fields, changes): (&[Linear], &[Change<'_>]),
+    seen: Seen<'_>,
+    nodes: &Nodes<'_>,
+    changes: &[Change<'_>],
     raster: &Raster,
-    (tolerance, modulating): (f64, &[bool]),
 ) -> WakeSums {
+    let Nodes {
+        plan,
+        modulating,
+        fields,
+        tolerance,
+    } = *nodes;
     let of = |seen| Strengths::new(seen, plan, fields, Some(modulating));
     let here = of(seen);
     let changed: Vec<(Value, [Option<Strengths>; 4], f64)> = changes
@@ -226,7 +242,8 @@ pub(super) fn sums(
     };
     nufft::sum_strengths(
         workspace,
-        ([&waves.kx, &waves.ky], sets),
+        [&waves.kx, &waves.ky],
+        sets,
         raster,
         tolerance,
         take,
