@@ -127,14 +127,16 @@ impl Ascent<'_> {
         last: bool,
     ) -> Result<Point> {
         let texture = self.textures.of(&scene, self.parameters, path.farther)?;
-        let near = self.observed.near_by(
-            self.parameters,
-            &factors,
-            mean,
-            &path.directions,
-            &texture,
-            last,
-        );
+        let (parameters, directions) = (self.parameters, &path.directions);
+        let near = self
+            .observed
+            .near_by(parameters, &factors, mean, directions, &texture);
+        let near = match last {
+            true => self
+                .observed
+                .with_variance(near, parameters, &factors, directions, &texture),
+            false => near,
+        };
         Ok(Point {
             log_posterior: near.log_likelihood + self.log_prior(&factors),
             scene,

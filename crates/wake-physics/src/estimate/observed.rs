@@ -152,14 +152,11 @@ impl Observed {
     ) -> Near {
         let directions = self.towards(parameters, expected, &texture.noise);
         let mean = &expected.intensity;
-        self.near_by(
-            parameters,
-            factors,
-            mean,
-            &directions,
-            texture,
-            with_variance,
-        )
+        let near = self.near_by(parameters, factors, mean, &directions, texture);
+        match with_variance {
+            true => self.with_variance(near, parameters, factors, &directions, texture),
+            false => near,
+        }
     }
 
     /// The same with the directions of a scene nearby.
@@ -170,38 +167,57 @@ impl Observed {
         mean: &Field,
         directions: &Directions,
         texture: &Texture,
-        with_variance: bool,
     ) -> Near {
-        let (torus, taper) = (&self.torus, &self.taper);
-        let Directions { spectra, spread } = directions;
-        let covariance = texture.noise.covariance(factors.texture);
-        let slopes = texture.slopes(parameters, factors.texture);
-        let sums = Sums {
-            torus,
-            taper,
-            spectra,
-            power: self.power(&covariance),
-            by: slopes
-                .par_iter()
-                .map(|s| s.as_ref().map(|s| taper.power(torus, s)))
-                .collect(),
-        };
+        let spread = &directions.spread;
+        let sums = self.sums(parameters, factors, directions, texture);
         let gain = factors.gain as f32;
-        let left = torus.spectrum(&self.residual_over(gain, mean, spread));
+        let left = self.torus.spectrum(&self.residual_over(gain, mean, spread));
         let scales = mean.values.iter().zip(&spread.values).map(|(m, s)| m * s);
         let (information, of_power) = sums.information();
         let scale = sums.scale();
-        let mut near = Near {
+        Near {
             score: sums.score(&left),
             log_likelihood: self.log_likelihood(scale, &left, &sums.power, gain, scales),
             information,
             of_power,
             rings: self.rings(scale, &left, &sums.power),
-        };
-        if with_variance {
-            near.information.variance = sums.variance(&covariance);
         }
+    }
+
+    /// With the variance of the score by the covariance between all pixels.
+    pub(super) fn with_variance(
+        &self,
+        mut near: Near,
+        parameters: &[Parameter],
+        factors: &Factors,
+        directions: &Directions,
+        texture: &Texture,
+    ) -> Near {
+        let sums = self.sums(parameters, factors, directions, texture);
+        near.information.variance = sums.variance(&texture.noise.covariance(factors.texture));
         near
+    }
+
+    /// What score and information are sums of.
+    fn sums<'a>(
+        &'a self,
+        parameters: &[Parameter],
+        factors: &Factors,
+        directions: &'a Directions,
+        texture: &Texture,
+    ) -> Sums<'a> {
+        let (torus, taper) = (&self.torus, &self.taper);
+        let slopes = texture.slopes(parameters, factors.texture);
+        Sums {
+            torus,
+            taper,
+            spectra: &directions.spectra,
+            power: self.power(&texture.noise.covariance(factors.texture)),
+            by: slopes
+                .par_iter()
+                .map(|s| s.as_ref().map(|s| taper.power(torus, s)))
+                .collect(),
+        }
     }
 
     /// ln L alone, likewise.

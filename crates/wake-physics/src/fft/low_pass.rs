@@ -23,6 +23,12 @@ impl Band {
     }
 }
 
+/// A filtered field, up to its last transform.
+pub(crate) struct Filtered {
+    lines: Vec<Complex32>,
+    window: Window,
+}
+
 /// Filters fields of one size and keeps every `step`-th pixel of a window.
 ///
 /// ```text
@@ -107,41 +113,27 @@ impl LowPass {
         }
     }
 
-    /// Filters a field of `rows` rows that `fill` writes one by one, and points between its pixels.
-    ///
-    /// `take` is given each kept row, filtered, and that row of `out`.
-    ///
-    /// # Shapes
+    /// Filters a field of `rows` rows that `fill` writes one by one, and points between its pixels: the kept rows of its band, for
+    /// [`Self::kept_rows`].
     ///
     /// - `fill(row, values)`: `values` has the columns of the FFT, all zero
-    /// - `out`: `[keep[0], keep[1]]`, row after row
     ///
     /// # Panics
     ///
-    /// If there are more rows than the FFT has, or `out` has another length.
-    pub(crate) fn run<T: Send>(
+    /// If there are more rows than the FFT has.
+    pub(crate) fn filtered(
         &self,
         rows: usize,
         fill: impl Fn(usize, &mut [Complex32]) + Sync,
         points: &[Point],
         window: &Window,
-        out: &mut [T],
-        take: impl Fn(&[Complex32], &mut [T]) + Sync,
-    ) {
-        let [keep_rows, keep_columns] = window.keep;
+    ) -> Filtered {
         assert!(rows <= self.sizes[0], "more rows than planned");
-        assert_eq!(
-            out.len(),
-            keep_rows * keep_columns,
-            "output of another size"
-        );
-        if out.is_empty() {
-            return;
-        }
         let blocks = self.rows_to_band(rows, fill);
-        let lines = self.columns_of_band(&blocks, points, window);
-        drop(blocks);
-        self.band_to_rows(&lines, window, out, take);
+        Filtered {
+            lines: self.columns_of_band(&blocks, points, window),
+            window: *window,
+        }
     }
 
     /// First pass: transforms each row and keeps its band, `[block][band][BLOCK]`.
@@ -218,14 +210,31 @@ impl LowPass {
     }
 
     /// Last pass: sums the band of each kept row.
-    fn band_to_rows<T: Send>(
+    ///
+    /// `take` is given each of them, and that row of `out`.
+    ///
+    /// # Shapes
+    ///
+    /// - `out`: `[keep[0], keep[1]]`, row after row
+    ///
+    /// # Panics
+    ///
+    /// If `out` has another length.
+    pub(crate) fn kept_rows<T: Send>(
         &self,
-        lines: &[Complex32],
-        window: &Window,
+        Filtered { lines, window }: &Filtered,
         out: &mut [T],
         take: impl Fn(&[Complex32], &mut [T]) + Sync,
     ) {
         let [keep_rows, keep_columns] = window.keep;
+        assert_eq!(
+            out.len(),
+            keep_rows * keep_columns,
+            "output of another size"
+        );
+        if out.is_empty() {
+            return;
+        }
         let short = self.sizes[1] / self.step;
         let synthesis = &self.transforms[1][1];
         let shift = self.shifts(1, window.start[1]);
@@ -415,14 +424,11 @@ mod tests {
                 keep: size.map(|n| ((n - n / 5) / step).max(1)),
             };
             let mut out = vec![Complex32::ZERO; window.keep[0] * window.keep[1]];
-            plan.run(
-                size[0],
-                |i, row| row[..size[1]].copy_from_slice(&field[i * size[1]..][..size[1]]),
-                &points,
-                &window,
-                &mut out,
-                |from, to| to.copy_from_slice(from),
-            );
+            let fill = |i: usize, row: &mut [Complex32]| {
+                row[..size[1]].copy_from_slice(&field[i * size[1]..][..size[1]]);
+            };
+            let filtered = plan.filtered(size[0], fill, &points, &window);
+            plan.kept_rows(&filtered, &mut out, |from, to| to.copy_from_slice(from));
             let expected = direct(&plan, &field, size[1], &points, &window);
             let rms = (expected.iter().map(Complex64::norm_sqr).sum::<f64>()
                 / expected.len() as f64)

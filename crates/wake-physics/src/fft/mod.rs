@@ -16,7 +16,7 @@
 
 mod low_pass;
 
-pub(crate) use low_pass::{Band, LowPass, Point, Window};
+pub(crate) use low_pass::{Band, Filtered, LowPass, Point, Window};
 
 use crate::workspace::{Shelf, Workspace};
 use num_complex::{Complex, Complex32};

@@ -235,7 +235,11 @@ impl<'a> Background<'a> {
                 (rays, self.dark_line(band, edge))
             });
             let (rays, local) = tangent.as_ref().map_or((&rays, &band), |(r, b)| (r, b));
-            let row = self.row(wake, distance, windows, rays, local, profile.as_ref());
+            let dark = DarkNearby {
+                line: local,
+                short: profile.as_ref(),
+            };
+            let row = self.row(wake, distance, windows, rays, &dark);
             let end = distance + 0.5 * step + 2.0 * half_length;
             let independent = WINDOW as f64 / self.correlated.sqrt();
             let seen = |square: f64| independent * square.sqrt() >= THRESHOLD * self.noise;
@@ -338,12 +342,11 @@ impl<'a> Background<'a> {
         distance: f64,
         [first, last]: [f64; 2],
         rays: &[ImagedRay],
-        band: &DarkLine,
-        short: Option<&Profile>,
+        dark: &DarkNearby<'_>,
     ) -> Row {
         let width = WINDOW as f64 * self.raster.spacing;
         let from_midship = distance + 0.5 * wake.hull.length();
-        let half_band = band.half_width(distance);
+        let half_band = dark.line.half_width(distance);
         let windows = (last - first) as usize + 1;
         let place = |ray: &ImagedRay| {
             let place = (ray.tangent * from_midship / width).round();
@@ -369,7 +372,7 @@ impl<'a> Background<'a> {
             if !self.holds(wake.track.on_sea([-from_midship, off])) {
                 continue;
             }
-            let [dark, short, both] = band.mean_squares(distance, off, width, short);
+            let [dark, short, both] = dark.line.mean_squares(distance, off, width, dark.short);
             let all = waves + both;
             row.largest = [row.largest[0].max(waves + short), row.largest[1].max(dark)];
             row.wedge = [row.wedge[0] + all, row.wedge[1] + 1.0];
@@ -430,6 +433,12 @@ fn bunched(phase: f64) -> f64 {
         return 1.0;
     }
     (2.0 * libm::j1(c) / c).powi(2)
+}
+
+/// The dark line at a distance, and the waves that are missing in it.
+struct DarkNearby<'a> {
+    line: &'a DarkLine,
+    short: Option<&'a Profile>,
 }
 
 /// The windows of one row.

@@ -9,7 +9,7 @@
 //! Sea, noise and ships pass through the same filter. A point of cross-section σ is √σ/Δ in one cell of E, Δ the spacing;
 //! its image integrates to σ.
 
-use crate::fft::{self, LowPass};
+use crate::fft::{self, Filtered, LowPass};
 use crate::numeric::vector::{cos_sin, ln_f32, vectorized};
 use crate::random::{Stream, generator};
 use crate::raster::{Field, Raster};
@@ -165,14 +165,8 @@ impl ImpulseResponse {
                 *to = from.re;
             }
         };
-        filter.run(
-            raster.rows,
-            fill,
-            &points,
-            &view.window,
-            &mut out.values,
-            take,
-        );
+        let filtered = filter.filtered(raster.rows, fill, &points, &view.window);
+        filter.kept_rows(&filtered, &mut out.values, take);
         out
     }
 
@@ -189,8 +183,10 @@ impl ImpulseResponse {
         seed: u64,
     ) -> Vec<Complex32> {
         let mut out = vec![Complex32::ZERO; image.len()];
-        let look = |from: &[Complex32], to: &mut [Complex32]| to.copy_from_slice(from);
-        self.looks(sources, image, seed, 0..1, &mut out, |_| look);
+        let view = View::new(sources, image);
+        let filter = self.filter(&view, sources);
+        let look = look(&filter, &view, sources, seed, 0);
+        filter.kept_rows(&look, &mut out, |from, to| to.copy_from_slice(from));
         out
     }
 
@@ -207,49 +203,24 @@ impl ImpulseResponse {
     pub fn multilook(&self, sources: &Reflectivity<'_>, image: &Raster, looks: &Looks) -> Field {
         let weights = look_weights(looks.equivalent);
         let mut out = Field::constant(image, 0.0);
-        let numbers = 0..weights.len() as u64;
-        self.looks(sources, image, looks.seed, numbers, &mut out.values, |n| {
-            let weight = weights[n as usize] as f32;
-            move |from: &[Complex32], to: &mut [f32]| {
+        let view = View::new(sources, image);
+        let filter = self.filter(&view, sources);
+        for (n, weight) in weights.into_iter().enumerate() {
+            let look = look(&filter, &view, sources, looks.seed, n as u64);
+            let weight = weight as f32;
+            filter.kept_rows(&look, &mut out.values, |from, to| {
                 for (to, from) in to.iter_mut().zip(from) {
                     *to += weight * from.norm_sqr();
                 }
-            }
-        });
+            });
+        }
         out
     }
 
-    /// Hands the rows of each look to what `take` makes for it.
-    fn looks<T: Send, F: Fn(&[Complex32], &mut [T]) + Sync>(
-        &self,
-        sources: &Reflectivity<'_>,
-        image: &Raster,
-        seed: u64,
-        numbers: std::ops::Range<u64>,
-        out: &mut [T],
-        take: impl Fn(u64) -> F,
-    ) {
-        let view = View::new(sources, image);
-        let raster = sources.raster;
-        let filter = LowPass::new(view.sizes, view.step, self.bands(&view, raster.spacing));
-        for look in numbers {
-            let first = look * LOOK_LINES;
-            let mut phases = generator(seed, Stream::Points, look);
-            let points: Vec<_> = sources
-                .points
-                .iter()
-                .map(|p| {
-                    let [cos, sin] = cos_sin((phases.next_u64() >> 32) as u32);
-                    let amplitude = view.power(p).sqrt() as f32;
-                    let amplitude = Complex32::new(amplitude * cos, amplitude * sin);
-                    view.point(raster, p.position, amplitude)
-                })
-                .collect();
-            let fill = |i: usize, row: &mut [Complex32]| {
-                rough_row(view.row(sources, i), seed, first + i as u64, row);
-            };
-            filter.run(raster.rows, fill, &points, &view.window, out, take(look));
-        }
+    /// What a look passes.
+    fn filter(&self, view: &View, sources: &Reflectivity<'_>) -> LowPass {
+        let bands = self.bands(view, sources.raster.spacing);
+        LowPass::new(view.sizes, view.step, bands)
     }
 
     /// Weights of rows and columns.
@@ -327,6 +298,33 @@ impl View {
             amplitude,
         }
     }
+}
+
+/// One look: rough surface and points with the phases of its number.
+fn look(
+    filter: &LowPass,
+    view: &View,
+    sources: &Reflectivity<'_>,
+    seed: u64,
+    number: u64,
+) -> Filtered {
+    let raster = sources.raster;
+    let first = number * LOOK_LINES;
+    let mut phases = generator(seed, Stream::Points, number);
+    let points: Vec<_> = sources
+        .points
+        .iter()
+        .map(|p| {
+            let [cos, sin] = cos_sin((phases.next_u64() >> 32) as u32);
+            let amplitude = view.power(p).sqrt() as f32;
+            let amplitude = Complex32::new(amplitude * cos, amplitude * sin);
+            view.point(raster, p.position, amplitude)
+        })
+        .collect();
+    let fill = |i: usize, row: &mut [Complex32]| {
+        rough_row(view.row(sources, i), seed, first + i as u64, row);
+    };
+    filter.filtered(raster.rows, fill, &points, &view.window)
 }
 
 /// Weights of looks, with sum 1, so that 1/Σw² is `equivalent`.

@@ -200,7 +200,7 @@ impl SmoothSum {
             for j in reaching.clone() {
                 let source = source(i, j);
                 let column = j as i64 + self.offset[1] - first as i64;
-                self.add(by, [i as i64, column], &source, &mut taps, width, lines);
+                self.add(by, [i as i64, column], &source, &mut taps, lines);
             }
         }
     }
@@ -212,7 +212,6 @@ impl SmoothSum {
         [row, column]: [i64; 2],
         source: &Source<N>,
         taps: &mut Taps,
-        width: usize,
         lines: &mut [f64],
     ) {
         let step = self.steps.step as f64;
@@ -227,6 +226,7 @@ impl SmoothSum {
             return;
         };
         let parts = 1 + by.len();
+        let width = lines.len() / (parts * self.count);
         let leaning = self.lean > 0;
         let at = -source.left.value;
         let nearest = if leaning { at.round() as i64 } else { 0 };
@@ -292,9 +292,9 @@ impl Taps {
         let offset = start - centre;
         let [values, places, widths] = &mut self.values;
         let mut sums = [0.0; 3];
-        for n in 0..count {
+        for (n, value) in values.iter_mut().enumerate() {
             let d = n as f64 + offset;
-            values[n] = crate::numeric::vector::exp(-d * d * scale);
+            *value = crate::numeric::vector::exp(-d * d * scale);
         }
         if !BY {
             let norm = 1.0 / values.iter().sum::<f64>();

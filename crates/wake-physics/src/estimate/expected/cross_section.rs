@@ -127,7 +127,7 @@ impl CrossSection {
         }
         let [[u, du], [v, dv]] = weights;
         let mut at = At::default();
-        for j in 0..4 {
+        for (j, (v, dv)) in v.into_iter().zip(dv).enumerate() {
             let start = (first_cell[1] + j) * SIDE + first_cell[0];
             let line = self.parts[start..].first_chunk::<4>();
             let (mut sum, mut slope) = ([0.0; PARTS], [0.0; PARTS]);
@@ -138,21 +138,21 @@ impl CrossSection {
                 }
             }
             for n in 0..PARTS {
-                at.value[n] += v[j] * sum[n];
-                at.slope[n][0] += per * v[j] * slope[n];
-                at.slope[n][1] += per * dv[j] * sum[n];
+                at.value[n] += v * sum[n];
+                at.slope[n][0] += per * v * slope[n];
+                at.slope[n][1] += per * dv * sum[n];
             }
         }
         if !BY || self.by_outer.is_empty() {
             return at;
         }
         let mut by_outer = [0.0; BY_OUTER];
-        for j in 0..4 {
+        for (j, v) in v.into_iter().enumerate() {
             let start = (first_cell[1] + j) * SIDE + first_cell[0];
             let line = self.by_outer[start..].first_chunk::<4>();
             for (i, c) in line.into_iter().flatten().enumerate() {
                 for (sum, c) in by_outer.iter_mut().zip(c) {
-                    *sum += v[j] * u[i] * c;
+                    *sum += v * u[i] * c;
                 }
             }
         }
