@@ -25,6 +25,12 @@ pub(super) struct DarkLine {
     smear: f64,
 }
 
+/// The dark line at a distance, and the waves that are missing in it.
+pub(super) struct DarkNearby<'a> {
+    pub(super) line: &'a DarkLine,
+    pub(super) short: Option<&'a Profile>,
+}
+
 impl DarkLine {
     /// As an image shows it.
     ///

@@ -1,8 +1,8 @@
 //! How far a wake is seen, and how clearly: its expected contrast against sea and speckle, without an image.
 
-use super::dark_line::DarkLine;
+use super::dark_line::{DarkLine, DarkNearby};
 use super::rows::rows_in;
-use super::short_waves::{Profile, ShortWaves};
+use super::short_waves::ShortWaves;
 use crate::effects::Effects;
 use crate::kelvin::{KelvinWake, Ray};
 use crate::linear::over_mean;
@@ -433,12 +433,6 @@ fn bunched(phase: f64) -> f64 {
         return 1.0;
     }
     (2.0 * libm::j1(c) / c).powi(2)
-}
-
-/// The dark line at a distance, and the waves that are missing in it.
-struct DarkNearby<'a> {
-    line: &'a DarkLine,
-    short: Option<&'a Profile>,
 }
 
 /// The windows of one row.

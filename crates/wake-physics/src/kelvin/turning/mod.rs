@@ -63,6 +63,9 @@ pub(crate) struct RingWork {
     pub(crate) terms: f64,
 }
 
+/// Terms of the sum over m that are left out, over the share of weak waves and the largest term (chosen).
+const WEAK: f64 = 1e-3;
+
 /// Rings whose transforms are planned at once: a plan takes as much memory as the waves of its ring.
 const PLANNED_AT_ONCE: usize = 64;
 
@@ -242,14 +245,20 @@ impl Rings {
         let mut values = vec![Complex64::ZERO; count];
         let turned = omega * self.radius / wake.speed;
         let bessel = bessel_functions(k * self.radius);
-        let fall = self.fall(k);
-        let window = |m: f64| self.window(wake, fall, m - turned);
-        for (m, &value) in bessel.iter().enumerate() {
-            values[m % count] += window(m as f64) * value;
-            if m > 0 {
-                let odd = if m % 2 == 1 { -value } else { value };
-                values[(count - m % count) % count] += window(-(m as f64)) * odd;
-            }
+        let window = Onsets::new(self, wake, k);
+        // Far from ωR/U, ŵ is weak.
+        let width = window.width((WEAK * self.least).max(1e-12));
+        let first = (turned - width).max(0.0).ceil() as usize;
+        let mut spectrum = window.from(first as f64 - turned, 1.0);
+        let ahead = bessel.iter().enumerate().skip(first);
+        for (m, &value) in ahead.take_while(|(m, _)| *m as f64 <= turned + width) {
+            values[m % count] += spectrum.next() * value;
+        }
+        let mut spectrum = window.from(-1.0 - turned, -1.0);
+        let below = bessel.iter().enumerate().skip(1);
+        for (m, &value) in below.take_while(|(m, _)| *m as f64 <= width - turned) {
+            let odd = if m % 2 == 1 { -value } else { value };
+            values[(count - m % count) % count] += spectrum.next() * odd;
         }
         circle.sum(&mut values);
         let along = (omega / wake.speed).min(k);
@@ -270,16 +279,72 @@ impl Rings {
         let steady = rise((k / self.longest - LONG[0]) / (LONG[1] - LONG[0]));
         [middle, 2.0 * middle + (to - from - 2.0 * middle) * steady]
     }
+}
 
-    /// ŵ(q): w rises along the hull, as a straight wake fades there, and falls over the onset.
-    fn window(&self, wake: &KelvinWake, fall: [f64; 2], q: f64) -> Complex64 {
-        let [middle, width] = fall.map(|s| s / self.radius);
-        let hull = wake.hull.length() / self.radius;
-        if q.abs() < 1e-6 {
-            return Complex64::new(middle, 0.0);
+/// w rises along the hull, as a straight wake fades there, and falls over the onset of a wave: angles of the middle of the fall, and half the widths
+/// of fall and rise.
+#[derive(Clone, Copy)]
+struct Onsets {
+    angles: [f64; 3],
+}
+
+impl Onsets {
+    fn new(rings: &Rings, wake: &KelvinWake, k: f64) -> Self {
+        let [middle, width] = rings.fall(k);
+        let angles = [middle, 0.5 * width, 0.5 * wake.hull.length()];
+        Self {
+            angles: angles.map(|s| s / rings.radius),
         }
-        let fall = Complex64::cis(q * middle) * step_spectrum(q * width);
-        (fall - step_spectrum(q * hull)) / Complex64::new(0.0, q)
+    }
+
+    /// |q| beyond which ŵ is below a share of its largest value: each of its two steps is at most 15 (1 + 3/z + 3/z²)/z³, z = q times half the width.
+    fn width(&self, share: f64) -> f64 {
+        let [middle, fall, rise] = self.angles;
+        let bound = |q: f64| {
+            let step = |z: f64| (15.0 * (1.0 + 3.0 / z + 3.0 / (z * z)) / z.powi(3)).min(1.0);
+            (step(q * fall) + step(q * rise)) / q
+        };
+        let mut q = 1.0 / middle;
+        while bound(q) > share * middle {
+            q *= 1.1;
+        }
+        q
+    }
+
+    /// ŵ(q), ŵ(q + by), …, whose phases follow by rotation.
+    fn from(self, q: f64, by: f64) -> Spectrum {
+        Spectrum {
+            of: self,
+            q,
+            by,
+            phases: self.angles.map(|angle| Complex64::cis(q * angle)),
+            turns: self.angles.map(|angle| Complex64::cis(by * angle)),
+        }
+    }
+}
+
+/// ŵ at equal distances.
+struct Spectrum {
+    of: Onsets,
+    q: f64,
+    by: f64,
+    phases: [Complex64; 3],
+    turns: [Complex64; 3],
+}
+
+impl Spectrum {
+    fn next(&mut self) -> Complex64 {
+        let (q, [middle, fall, rise]) = (self.q, self.phases);
+        let [at, fall_width, rise_width] = self.of.angles;
+        self.q += self.by;
+        for (phase, turn) in self.phases.iter_mut().zip(self.turns) {
+            *phase *= turn;
+        }
+        if q.abs() < 1e-6 {
+            return Complex64::new(at, 0.0);
+        }
+        let fall = middle * step_spectrum(q * fall_width, fall);
+        (fall - step_spectrum(q * rise_width, rise)) / Complex64::new(0.0, q)
     }
 }
 
@@ -300,15 +365,15 @@ fn group_share(wake: &KelvinWake, wavenumber: f64) -> f64 {
 /// ```text
 /// 15 j₂(z)/z²,     z = q/2
 /// ```
-fn step_spectrum(q: f64) -> f64 {
-    let z = 0.5 * q;
+///
+/// - `phase`: e^{iz}
+fn step_spectrum(z: f64, phase: Complex64) -> f64 {
     let square = z * z;
     if square < 0.1 {
         // The series of j₂, whose closed form cancels here.
         return 1.0 - square / 14.0 * (1.0 - square / 36.0 * (1.0 - square / 66.0));
     }
-    let (sin, cos) = z.sin_cos();
-    15.0 * ((3.0 / square - 1.0) * sin / z - 3.0 * cos / square) / square
+    15.0 * ((3.0 / square - 1.0) * phase.im / z - 3.0 * phase.re / square) / square
 }
 
 /// J₀(z), J₁(z) … until they are below rounding, z at least 0.

@@ -187,7 +187,8 @@ fn the_window_is_the_transform_of_its_steps() {
             30.0 * (s * (1.0 - s)).powi(2) * (q * t).cos()
         });
         // The series of small arguments ends at z⁸/(14·36·66·104): 3e-11 at its largest.
-        assert!((step_spectrum(q) - sum).abs() < 1e-10, "{q}");
+        let found = step_spectrum(0.5 * q, Complex64::cis(0.5 * q));
+        assert!((found - sum).abs() < 1e-10, "{q}");
     }
 }
 
@@ -279,4 +280,39 @@ fn waves_that_are_kept_are_foreseen() {
     };
     let work = many.work(&wake);
     assert_eq!(work.kept, work.nodes);
+}
+
+/// Rotated phases are those of sines and cosines, up to some roundings a step.
+#[test]
+fn spectra_at_equal_distances_are_those_of_each() {
+    let wake = boat(20.0, 300.0);
+    let rings = Rings::of(&wake, &raster(), 1e-3).unwrap();
+    let window = Onsets::new(&rings, &wake, 0.4);
+    for by in [1.0, -1.0] {
+        let mut all = window.from(-7.3, by);
+        for m in 0..3000 {
+            let alone = window.from(-7.3 + by * f64::from(m), by).next();
+            assert!((all.next() - alone).norm() < 1e-12, "{m}");
+        }
+    }
+}
+
+/// What is left out of the sum over m is weak.
+#[test]
+fn the_window_is_weak_beyond_its_width() {
+    let wake = boat(20.0, 300.0);
+    let rings = Rings::of(&wake, &raster(), 1e-3).unwrap();
+    for k in [0.02, 0.4, 1.5] {
+        let window = Onsets::new(&rings, &wake, k);
+        let at = |q: f64| window.from(q, 1.0).next().norm();
+        for share in [1e-3, 1e-6] {
+            let width = window.width(share);
+            let beyond = (0..4000).map(|n| at(width * (1.0 + 1e-3 * f64::from(n))));
+            let largest = beyond.fold(0.0, f64::max);
+            assert!(largest <= share * at(0.0), "{k} {share}: {largest:e}");
+            // Not much less far it is not.
+            let inside = (0..4000).map(|n| at(0.4 * width * (1.0 + 1e-4 * f64::from(n))));
+            assert!(inside.fold(0.0, f64::max) > share * at(0.0), "{k} {share}");
+        }
+    }
 }
