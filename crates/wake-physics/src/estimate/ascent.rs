@@ -38,7 +38,7 @@ pub(super) struct Until {
     pub(super) steps: usize,
     /// Length of the last step, in standard deviations of the information.
     pub(super) small: f64,
-    /// How many times the wind may differ more than usual from that of a texture: [`Textures::of`].
+    /// Largest distance between the winds of scene and texture: [`Textures::of`].
     pub(super) farther: f64,
 }
 
@@ -70,7 +70,7 @@ struct Step {
 /// Frozen plan of an ascent, with what its last points needed.
 struct Path {
     image: ExpectedImage,
-    /// How many times the wind may differ more than usual from that of a texture.
+    /// Largest distance between the winds of scene and texture.
     farther: f64,
     /// Derivatives of the mean image at a point before.
     directions: Directions,

@@ -6,7 +6,7 @@ use super::torus::{Spectrum, Torus};
 use crate::raster::Field;
 use rayon::prelude::*;
 
-/// What an image tells of the parameters.
+/// Information of an image about the parameters.
 #[derive(Debug, Clone)]
 pub(super) struct Information {
     /// Expected slope J of the score.
@@ -15,7 +15,7 @@ pub(super) struct Information {
     pub(super) variance: Matrix,
 }
 
-/// What score and information are sums of.
+/// Terms of score and information.
 pub(super) struct Sums<'a> {
     pub(super) torus: &'a Torus,
     pub(super) taper: &'a Taper,

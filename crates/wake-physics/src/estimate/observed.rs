@@ -198,7 +198,7 @@ impl Observed {
         near
     }
 
-    /// What score and information are sums of.
+    /// Terms of score and information.
     fn sums<'a>(
         &'a self,
         parameters: &[Parameter],

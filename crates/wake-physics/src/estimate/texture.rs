@@ -46,13 +46,13 @@ impl Texture {
         })
     }
 
-    /// Whether it has derivatives by the wind.
+    /// True with derivatives by those of the parameters that belong to the wind.
     fn has_slopes(&self, parameters: &[Parameter]) -> bool {
         let known = |parameter: &Parameter| self.slopes.iter().any(|s| s.0 == *parameter);
         parameters.iter().filter(|p| is_of_wind(p)).all(known)
     }
 
-    /// How far the wind of a scene is: relative change of its speed, and change of its direction \[deg\].
+    /// Distance of the wind of a scene: relative change of the speed, and change of the direction \[deg\].
     fn to(&self, scene: &Scene) -> [f64; 2] {
         let [speed, toward] = wind_of(scene);
         let turned = (toward - self.wind[1] + 180.0).rem_euclid(360.0) - 180.0;
@@ -109,14 +109,14 @@ fn is_of_wind(parameter: &Parameter) -> bool {
 /// some 0.2 %, at most 0.3 %.
 const NEAR: [f64; 2] = [0.02, 2.0];
 
-/// Textures of the seas that were looked at.
+/// Textures of all seas so far.
 #[derive(Debug, Default)]
 pub(super) struct Textures(Mutex<Vec<Arc<Texture>>>);
 
 impl Textures {
     /// The texture of the sea of a scene, from that of a sea nearby if there is one.
     ///
-    /// - `farther`: how many times the wind may differ more than usual
+    /// - `farther`: largest distance of the wind, in units of [`NEAR`]
     pub(super) fn of(
         &self,
         scene: &Scene,

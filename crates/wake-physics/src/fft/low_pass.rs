@@ -129,6 +129,12 @@ impl LowPass {
         window: &Window,
     ) -> Filtered {
         assert!(rows <= self.sizes[0], "more rows than planned");
+        if window.keep.contains(&0) {
+            return Filtered {
+                lines: Vec::new(),
+                window: *window,
+            };
+        }
         let blocks = self.rows_to_band(rows, fill);
         Filtered {
             lines: self.columns_of_band(&blocks, points, window),

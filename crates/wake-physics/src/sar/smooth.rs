@@ -26,7 +26,7 @@ const ROUNDED: f64 = 1.0 / 32.0;
 /// Largest share of a source's power that the kernel may put in the wrong place.
 const TOLERANCE: f64 = 1e-6;
 
-/// Columns of a block for one sum, and at least for more; the sums of a block stay in the cache.
+/// Columns of a block without and with derivatives: its sums stay in the cache.
 const BLOCK: [usize; 2] = [48, 24];
 
 /// A source: what it returns, and where that is imaged.

@@ -40,7 +40,7 @@ pub(crate) struct DeviceRow {
     pub(crate) max_error: Option<f64>,
     /// Root mean square difference, of its root mean square.
     pub(crate) rms_error: Option<f64>,
-    /// Why there are no numbers.
+    /// Reason for missing numbers.
     pub(crate) failure: Option<String>,
 }
 
@@ -50,7 +50,7 @@ pub(crate) struct CheckRow {
     pub(crate) stage: &'static str,
     pub(crate) check: &'static str,
     pub(crate) device: String,
-    /// Why it does not pass.
+    /// Reason for a failed check.
     pub(crate) failure: Option<String>,
 }
 
@@ -95,7 +95,7 @@ pub(crate) fn measure(
     Ok(rows)
 }
 
-/// What the self-checks of all crates say on a device.
+/// Self-checks of all crates on a device.
 pub(crate) fn checks(name: &str) -> Outcome<Vec<CheckRow>> {
     let device = device_named(name)?;
     type Check = fn(&Device) -> Result<(), String>;
@@ -125,7 +125,7 @@ pub(crate) fn checks(name: &str) -> Outcome<Vec<CheckRow>> {
     Ok(list.iter().map(row).collect())
 }
 
-/// What a call gave and how long it took.
+/// Numbers and seconds of a call.
 struct Timed {
     first: f64,
     seconds: f64,
