@@ -79,9 +79,21 @@ impl Kernel {
     /// φ at `out.len()` ≤ [`WIDEST`] lattice points: the first at `distance`, each one farther on.
     ///
     /// The power series of I₀ has positive terms only; term k is (β²(1 − z²)/4)^k/(k!)².
+    #[inline(always)]
     pub(crate) fn values(&self, distance: f64, out: &mut [f64]) {
-        let mut powers = [0.0; WIDEST];
-        let mut terms = [(-self.beta).exp(); WIDEST];
+        match out.len() {
+            ..=4 => self.side_by_side::<4>(distance, out),
+            5..=8 => self.side_by_side::<8>(distance, out),
+            9..=12 => self.side_by_side::<12>(distance, out),
+            _ => self.side_by_side::<WIDEST>(distance, out),
+        }
+    }
+
+    /// [`Self::values`] of at most `N` points, side by side in vectors.
+    #[inline(always)]
+    fn side_by_side<const N: usize>(&self, distance: f64, out: &mut [f64]) {
+        let mut powers = [0.0; N];
+        let mut terms = [(-self.beta).exp(); N];
         let mut sums = terms;
         for (i, power) in powers.iter_mut().enumerate().take(out.len()) {
             let z = 2.0 * (distance + i as f64) / self.width as f64;
@@ -90,7 +102,7 @@ impl Kernel {
         let count = (1.4 * self.beta) as usize + 12;
         for k in 1..count {
             let square = 1.0 / (k * k) as f64;
-            for i in 0..WIDEST {
+            for i in 0..N {
                 terms[i] *= powers[i] * square;
                 sums[i] += terms[i];
             }

@@ -201,12 +201,14 @@ impl Part {
             .with_min_len(MANY)
             .map(|n| Complex64::cis(kx[n] * x + ky[n] * y))
             .collect();
-        for s in &mut strengths {
-            s.iter_mut().zip(&phases).for_each(|(s, p)| *s *= p);
-        }
+        strengths.par_iter_mut().for_each(|strengths| {
+            strengths.iter_mut().zip(&phases).for_each(|(s, p)| *s *= p);
+        });
         let step = raster.spacing / TAU;
         Self {
             cycles: (0..kx.len())
+                .into_par_iter()
+                .with_min_len(MANY)
                 .map(|n| [ky[n] * step, kx[n] * step])
                 .collect(),
             strengths,
@@ -231,6 +233,8 @@ impl Part {
             )
         };
         (0..first.len())
+            .into_par_iter()
+            .with_min_len(MANY)
             .map(|n| {
                 let (c, d) = (first[n], second.map_or(Complex64::ZERO, |s| s[n]));
                 let i = Complex64::i();
@@ -276,12 +280,14 @@ impl<'a> CentredSums<'a> {
     fn sized(mut self, count: usize) -> Self {
         let mut totals = vec![[0.0; 2]; count];
         self.each_part(|part| {
-            for (total, strengths) in totals.iter_mut().zip(&part.strengths) {
+            let sums = totals.par_iter_mut().zip(&part.strengths);
+            sums.for_each(|(total, strengths)| {
                 for strength in strengths {
-                    total[0] += strength.norm();
-                    total[1] += strength.norm_sqr();
+                    let square = strength.norm_sqr();
+                    total[0] += square.sqrt();
+                    total[1] += square;
                 }
-            }
+            });
         });
         let size = |[sum, squares]: [f64; 2]| Size {
             sum,

@@ -9,6 +9,12 @@ use rayon::prelude::*;
 /// Lines of the transposed lattice that one task owns.
 const LINES: usize = 16;
 
+/// Places that one task looks at.
+const TOGETHER: usize = 256;
+
+/// Places that are sorted by all threads; of fewer, one is as fast.
+const MANY: usize = 1 << 19;
+
 /// Where each wave and its mirror image (wavenumber −k) touch the lattice, and with which weights.
 ///
 /// Sorted by line, so that a task finds the waves that touch its own lines.
@@ -43,33 +49,44 @@ impl<T: Real> Footprints<T> {
     /// `waves` are wavenumbers in lattice steps (along y, along x).
     pub(crate) fn new(waves: &[[f64; 2]], kernel: &Kernel, lattice: [usize; 2]) -> Self {
         let width = kernel.width;
-        let mut places: Vec<Place> = (0..waves.len() as u32)
-            .flat_map(|wave| [false, true].map(|mirrored| (wave, mirrored)))
-            .map(|(wave, mirrored)| {
-                let [row, column] = [0, 1].map(|axis| {
-                    let g = signed(waves[wave as usize][axis], mirrored);
-                    first_point(g, width).rem_euclid(lattice[axis] as i64) as u32
-                });
-                Place {
-                    column,
-                    row,
-                    wave,
-                    mirrored,
-                }
-            })
-            .collect();
-        places.sort_unstable_by_key(|p| (p.column, p.row));
+        let place = |n: usize| {
+            let (wave, mirrored) = (n / 2, n % 2 == 1);
+            let [row, column] = [0, 1].map(|axis| {
+                let g = signed(waves[wave][axis], mirrored);
+                first_point(g, width).rem_euclid(lattice[axis] as i64) as u32
+            });
+            Place {
+                column,
+                row,
+                wave: wave as u32,
+                mirrored,
+            }
+        };
+        let all = (0..2 * waves.len()).into_par_iter().with_min_len(TOGETHER);
+        let mut places: Vec<Place> = all.map(place).collect();
+        let key = |place: &Place| (place.column, place.row);
+        if places.len() < MANY {
+            places.sort_unstable_by_key(key);
+        } else {
+            places.par_sort_unstable_by_key(key);
+        }
         let mut weights = vec![T::zero(); 2 * width * places.len()];
         weights
-            .par_chunks_mut(2 * width)
-            .zip(&places)
-            .with_min_len(256)
-            .for_each(|(out, place)| {
-                let [along_y, along_x] =
-                    waves[place.wave as usize].map(|g| signed(g, place.mirrored));
-                let (x, y) = out.split_at_mut(width);
-                fill(x, along_x, kernel);
-                fill(y, along_y, kernel);
+            .par_chunks_mut(2 * width * TOGETHER)
+            .zip(places.par_chunks(TOGETHER))
+            .for_each(|(weights, places)| {
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for (out, place) in weights.chunks_exact_mut(2 * width).zip(places) {
+                            let [along_y, along_x] =
+                                waves[place.wave as usize].map(|g| signed(g, place.mirrored));
+                            let (x, y) = out.split_at_mut(width);
+                            fill(x, along_x, kernel);
+                            fill(y, along_y, kernel);
+                        }
+                    },
+                );
             });
         Self {
             width,
@@ -193,6 +210,7 @@ fn first_point(g: f64, width: usize) -> i64 {
 }
 
 /// Kernel weights around g, with the sign (−1)^index that moves the field's origin to the middle.
+#[inline(always)]
 fn fill<T: Real>(out: &mut [T], g: f64, kernel: &Kernel) {
     let first = first_point(g, kernel.width);
     let mut values = [0.0; WIDEST];

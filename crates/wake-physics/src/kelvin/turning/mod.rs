@@ -22,23 +22,20 @@
 //! summed with all others: they are the local rise of water around the hull, and without them the sum over k would end
 //! sharply where they begin.
 
+mod sent;
+
 use super::KelvinWake;
-use crate::dispersion::{angular_frequency, group_speed};
+use crate::dispersion::angular_frequency;
 use crate::fft::{Circle, fast_length};
 use crate::raster::Raster;
 use crate::waves::PlaneWaves;
 use num_complex::Complex64;
 use rayon::prelude::*;
+use sent::Sent;
 use std::f64::consts::{PI, TAU};
-
-/// Steps along the track in which the waves that reach a raster are looked for.
-const STEPS: usize = 400;
 
 /// Samples beyond those that the largest phase asks for: the tails of what is summed.
 const GUARD: f64 = 1.15;
-
-/// Wavelengths of the longest steady wave over which the oldest waves set in: chosen.
-const ONSET: f64 = 3.0;
 
 /// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp: chosen.
 const LONG: [f64; 2] = [0.6, 1.0];
@@ -79,10 +76,8 @@ pub(super) struct Rings {
     /// Wavenumber between rings [rad/m].
     pub(super) step: f64,
     pub(super) count: usize,
-    /// Wavenumber of the longest steady wave [rad/m].
-    longest: f64,
-    /// Distances run between which the oldest waves set in \[m\].
-    onset: [f64; 2],
+    /// The waves that reach the raster.
+    sent: Sent,
     /// Largest phase over k \[m\].
     reach: f64,
     /// Waves weaker than this share of the root mean square are left out.
@@ -96,43 +91,18 @@ impl Rings {
         if wake.speed <= 0.0 {
             return None;
         }
-        let steady = wake.steady_waves();
-        let longest = steady.at(steady.first()).wavenumber;
-        let largest = raster.nyquist_wavenumber();
-        if longest >= largest {
-            return None;
-        }
-        let [x, y] = [raster.columns, raster.rows].map(|n| 0.5 * (n.max(1) - 1) as f64);
-        let middle = [
-            raster.x(0) + x * raster.spacing,
-            raster.y(0) - y * raster.spacing,
-        ];
-        let half = x.hypot(y) * raster.spacing;
-        // Waves sent a distance s ago lie on a circle around a point of the heading that they were sent at.
-        let share = 0.5 * group_share(wake, longest.max(1e-6 * largest));
-        let sent = |s: f64| {
-            let there = wake.track.at(-s);
-            let centre = [0, 1].map(|a| there.position[a] + share * s * there.forward[a]);
-            (centre[0] - middle[0]).hypot(centre[1] - middle[1])
-        };
-        let run = PI * radius;
-        let at = |n: usize| run * n as f64 / STEPS as f64;
-        let reaches = |s: f64| sent(s) <= half + share * s + run / STEPS as f64;
-        let oldest = (0..=STEPS).rev().map(at).find(|&s| reaches(s))?;
-        let wavelength = TAU / longest.max(1e-3 * largest);
-        let ramp = (ONSET * wavelength).max(0.1 * oldest).min(0.5 * run);
-        let end = (oldest + ramp).min(run);
-        let passed = (0..=STEPS).map(at).take_while(|&s| s <= end);
-        let farthest = passed.map(|s| sent(s) + share * s).fold(0.0, f64::max);
-        let reach = GUARD * (farthest + half) + wavelength;
+        let sent = Sent::of(wake, raster, radius)?;
+        let [longest, largest] = sent.wavenumbers;
+        let [rows, columns] = [raster.rows, raster.columns].map(|n| n.max(1) - 1);
+        let half = 0.5 * raster.spacing * (rows as f64).hypot(columns as f64);
+        let reach = GUARD * (sent.farthest + half) + TAU / longest.max(1e-3 * largest);
         let count = (largest * reach / TAU).ceil() as usize;
         Some(Self {
             radius,
             side,
             step: largest / count as f64,
             count,
-            longest,
-            onset: [end - ramp, end],
+            sent,
             reach,
             least: tolerance,
         })
@@ -274,9 +244,9 @@ impl Rings {
     /// Waves longer than any steady one are not sent on the way, but a sharp onset would send them ahead of all others: theirs
     /// is as wide as the time since allows.
     fn fall(&self, k: f64) -> [f64; 2] {
-        let [from, to] = self.onset;
+        let [from, to] = self.sent.onset(k);
         let middle = 0.5 * (from + to);
-        let steady = rise((k / self.longest - LONG[0]) / (LONG[1] - LONG[0]));
+        let steady = rise((k / self.sent.wavenumbers[0] - LONG[0]) / (LONG[1] - LONG[0]));
         [middle, 2.0 * middle + (to - from - 2.0 * middle) * steady]
     }
 }
@@ -344,7 +314,7 @@ impl Spectrum {
             return Complex64::new(at, 0.0);
         }
         let fall = middle * step_spectrum(q * fall_width, fall);
-        (fall - step_spectrum(q * rise_width, rise)) / Complex64::new(0.0, q)
+        (fall - step_spectrum(q * rise_width, rise)) * Complex64::new(0.0, -1.0 / q)
     }
 }
 
@@ -352,12 +322,6 @@ impl Spectrum {
 fn rise(s: f64) -> f64 {
     let s = if s.is_nan() { 1.0 } else { s.clamp(0.0, 1.0) };
     s * s * s * (10.0 + s * (6.0 * s - 15.0))
-}
-
-/// Largest group over phase speed of the waves from a wavenumber on.
-fn group_share(wake: &KelvinWake, wavenumber: f64) -> f64 {
-    let omega = angular_frequency(wavenumber, wake.depth);
-    group_speed(wavenumber, wake.depth) * wavenumber / omega
 }
 
 /// Spectrum of the slope of the smooth step s³ (10 − 15 s + 6 s²) of width 1 around 0, 30 ∫ s²(1 − s)² e^{iqt} dt.

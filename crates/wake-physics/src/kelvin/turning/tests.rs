@@ -192,28 +192,6 @@ fn the_window_is_the_transform_of_its_steps() {
     }
 }
 
-/// A wide turn is straight as far as the raster sees. The waves that a ship in its middle sent a distance s ago lie on a
-/// circle of radius s/4 around a point 3s/4 astern (half of that at the group's half of the phase speed): those of 2h ago are
-/// the last that reach a corner at the distance h, and three wavelengths later none are sent.
-#[test]
-fn only_waves_that_reach_the_raster_are_sent() {
-    let wake = KelvinWake {
-        track: Track::turning([0.0, 0.0], 20.0, 0.0, 2000f64.recip()),
-        ..boat(20.0, 2000.0)
-    };
-    let plan = Rings::of(&wake, &raster(), 1e-3).unwrap();
-    let half = 90.0 * f64::sqrt(2.0);
-    // A step of the search is looked beyond, and one is its resolution; the turn bends 290 m by 21 m, 1 m more.
-    let step = PI * 2000.0 / STEPS as f64;
-    let [from, to] = plan.onset;
-    assert!(
-        from > 2.0 * half - 1.0 && from < 2.0 * (half + step) + 1.0,
-        "{from}"
-    );
-    let wavelength = TAU * wake.speed.powi(2) / crate::constants::GRAVITY;
-    assert!((to - from - ONSET * wavelength).abs() < 1e-9, "{to}");
-}
-
 /// The plan counts all waves of the rings, those beyond the cusp apart; waves weaker than their share of the root mean square
 /// are left out, and no others.
 #[test]
