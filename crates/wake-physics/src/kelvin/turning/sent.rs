@@ -5,8 +5,9 @@ use crate::dispersion::{angular_frequency, group_speed};
 use crate::raster::Raster;
 use std::f64::consts::{PI, TAU};
 
-/// Steps along the track in which the waves that reach a raster are looked for.
-const STEPS: usize = 400;
+/// Steps along the track in which the waves that reach a raster are looked for, over half its diagonal, and over the distance
+/// run where that is longer: chosen.
+const STEPS: [f64; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
 /// Wavenumbers at which they are looked for.
 const KNOTS: usize = 9;
@@ -41,11 +42,17 @@ impl Sent {
         ];
         let half = x.hypot(y) * raster.spacing;
         let run = PI * radius;
-        let at = |n: usize| run * n as f64 / STEPS as f64;
-        let ways: [[f64; 2]; KNOTS] = std::array::from_fn(|knot| {
+        let wavenumber = |knot: usize| {
             let above = knot as f64 / (KNOTS - 1) as f64 * (largest - longest);
-            steady_way(wake, (longest + above).max(1e-6 * largest))
-        });
+            (longest + above).max(1e-3 * largest)
+        };
+        let wavelength = TAU / wavenumber(0);
+        // Distances run, and the steps to them. A turn of any radius takes a few hundred.
+        let step = |s: f64| (STEPS[0] * half.max(wavelength)).max(STEPS[1] * s);
+        let next = |&[s, _]: &[f64; 2]| (s < run).then(|| [(s + step(s)).min(run), step(s)]);
+        let passed: Vec<[f64; 2]> = std::iter::successors(Some([0.0, step(0.0)]), next).collect();
+        let ways: [[f64; 2]; KNOTS] =
+            std::array::from_fn(|knot| steady_way(wake, wavenumber(knot)));
         // Distances, to port and to starboard, at which the waves are now that were sent a distance s ago.
         let away = |s: f64, [ahead, aside]: [f64; 2]| {
             let there = wake.track.at(-s);
@@ -58,26 +65,30 @@ impl Sent {
                 place[0].hypot(place[1])
             })
         };
-        let reaches = |s: f64, way: [f64; 2]| {
-            let [port, starboard] = away(s, way);
-            port.min(starboard) <= half + at(1)
-        };
-        let oldest = ways.map(|way| (0..=STEPS).rev().map(at).find(|&s| reaches(s, way)));
+        let oldest = ways.map(|way| {
+            let reaches = |&&[s, step]: &&[f64; 2]| {
+                let [port, starboard] = away(s, way);
+                port.min(starboard) <= half + step
+            };
+            passed.iter().rev().find(reaches).map(|&[s, _]| s)
+        });
         if oldest.iter().all(Option::is_none) {
             return None;
         }
-        let wavelength = TAU / longest.max(1e-3 * largest);
         let onsets: [[f64; 2]; KNOTS] = std::array::from_fn(|knot| {
             // Between two knots the later of them holds.
             let around = &oldest[knot.saturating_sub(1)..(knot + 2).min(KNOTS)];
             let oldest = around.iter().flatten().copied().fold(0.0, f64::max);
+            // A wave is sent over a stretch of the track: the cube root of λs² at the cusp, where it is longest.
+            let sent_over = (oldest * oldest * TAU / wavenumber(knot)).cbrt();
+            let oldest = (oldest + sent_over).min(run);
             let ramp = (ONSET * wavelength).max(0.1 * oldest).min(0.5 * run);
             let end = (oldest + ramp).min(run);
             [end - ramp, end]
         });
         let farthest = ways.iter().zip(&onsets).flat_map(|(&way, &[_, end])| {
-            let passed = (0..=STEPS).map(at).take_while(move |&s| s <= end);
-            passed.flat_map(move |s| away(s, way))
+            let sent = passed.iter().map(move |&[s, _]| s.min(end));
+            sent.flat_map(move |s| away(s, way))
         });
         Some(Self {
             wavenumbers: [longest, largest],
@@ -111,6 +122,25 @@ mod tests {
     use crate::hull::Hull;
     use crate::track::Track;
 
+    /// Turns so wide that they are straight have the waves of each other, found in a few steps.
+    #[test]
+    fn of_wide_turns_the_waves_of_a_straight_track_are_sent() {
+        let raster = Raster::image(91, 91, 2.0);
+        let sent = [1e6f64, 1e9].map(|radius| {
+            let wake = KelvinWake {
+                hull: Hull::wigley(20.0, 4.0, 1.5),
+                speed: 5.0,
+                track: Track::turning([10.0, 20.0], 20.0, 0.0, radius.recip()),
+                depth: f64::INFINITY,
+                filter_depth: 4.0,
+                steepness: None,
+            };
+            Sent::of(&wake, &raster, radius).unwrap()
+        });
+        assert!((sent[0].farthest / sent[1].farthest - 1.0).abs() < 1e-3);
+        assert!(sent[0].farthest < 500.0, "{}", sent[0].farthest);
+    }
+
     /// A wide turn is straight as far as the raster sees. On deep water with c² = cos² θ = k₀/k the wave k that a ship in its
     /// middle sent a distance s ago lies √((1 − c²/2)² + c²(1 − c²)/4) s away: at the distance h of a corner it is the last
     /// that reaches the raster, and three wavelengths later none are sent.
@@ -129,7 +159,7 @@ mod tests {
         let sent = Sent::of(&wake, &raster, radius).unwrap();
         let half = 90.0 * f64::sqrt(2.0);
         // A step of the search is looked beyond, and one is its resolution; the turn bends 290 m by 21 m, 1 m more.
-        let step = PI * radius / STEPS as f64;
+        let step = STEPS[0] * half;
         let [longest, largest] = sent.wavenumbers;
         for knot in [0, 3, KNOTS - 1] {
             let k = |knot: usize| longest + (largest - longest) * knot as f64 / (KNOTS - 1) as f64;
@@ -137,8 +167,11 @@ mod tests {
             let square = longest / k(knot.saturating_sub(1));
             let away = (1.0 - 0.5 * square).hypot(0.5 * (square * (1.0 - square)).sqrt());
             let [from, to] = sent.onset(k(knot));
+            // They are sent over a stretch of the track.
+            let with_stretch = |s: f64| s + (s * s * TAU / k(knot)).cbrt();
+            let [least, most] = [half / away - 1.0, (half + step) / away + step + 1.0];
             assert!(
-                from > half / away - 1.0 && from < (half + step) / away + step + 1.0,
+                from > with_stretch(least) && from < with_stretch(most),
                 "{knot}: {from}"
             );
             let wavelength = TAU * wake.speed.powi(2) / crate::constants::GRAVITY;
