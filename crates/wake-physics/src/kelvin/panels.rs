@@ -145,11 +145,10 @@ impl KelvinWake {
         };
         let cusp = self.steady_waves().at(CUSP_ANGLE.tan().asinh()).wavenumber;
         let [transverse_nodes, divergent_nodes] = rings.nodes(cusp);
-        let largest = rings.count as f64 * rings.step;
         WakePlan {
             transverse_nodes,
             divergent_nodes,
-            wavenumbers: [0.5 * rings.step, largest],
+            wavenumbers: rings.wavenumbers(),
             error_bound: RING_SHARE * tolerance,
             rings: Some(rings),
             ..WakePlan::default()

@@ -34,9 +34,6 @@ use rayon::prelude::*;
 use sent::Sent;
 use std::f64::consts::{PI, TAU};
 
-/// Samples beyond those that the largest phase asks for: the tails of what is summed.
-const GUARD: f64 = 1.15;
-
 /// Wavenumbers, over that of the longest steady wave, between which the onset becomes sharp: chosen.
 const LONG: [f64; 2] = [0.6, 1.0];
 
@@ -44,7 +41,7 @@ const LONG: [f64; 2] = [0.6, 1.0];
 const MOST_COUNTED: usize = 1 << 14;
 
 /// Rings from which the number of waves that are kept is foreseen, and waves that are looked at for it at most: chosen.
-const LOOKED_AT: usize = 12;
+const LOOKED_AT: usize = 16;
 const MOST_LOOKED_AT: f64 = 2e6;
 
 /// Waves of ships that turn, as counted before they are computed.
@@ -73,14 +70,9 @@ pub(super) struct Rings {
     radius: f64,
     /// 1 to starboard, −1 to port.
     side: f64,
-    /// Wavenumber between rings [rad/m].
-    pub(super) step: f64,
-    pub(super) count: usize,
     /// The waves that reach the raster.
     sent: Sent,
-    /// Largest phase over k \[m\].
-    reach: f64,
-    /// Waves weaker than this share of the root mean square are left out.
+    /// Waves weaker than this share of the root mean square are left out, by energy.
     least: f64,
 }
 
@@ -92,95 +84,120 @@ impl Rings {
             return None;
         }
         let sent = Sent::of(wake, raster, radius)?;
-        let [longest, largest] = sent.wavenumbers;
-        let [rows, columns] = [raster.rows, raster.columns].map(|n| n.max(1) - 1);
-        let half = 0.5 * raster.spacing * (rows as f64).hypot(columns as f64);
-        let reach = GUARD * (sent.farthest + half) + TAU / longest.max(1e-3 * largest);
-        let count = (largest * reach / TAU).ceil() as usize;
         Some(Self {
             radius,
             side,
-            step: largest / count as f64,
-            count,
             sent,
-            reach,
             least: tolerance,
         })
     }
 
-    /// Wavenumber of a ring [rad/m].
-    fn wavenumber(&self, ring: usize) -> f64 {
-        (ring as f64 + 0.5) * self.step
+    /// Smallest and largest wavenumber [rad/m].
+    pub(super) fn wavenumbers(&self) -> [f64; 2] {
+        [self.sent.wavenumber(0), self.sent.largest()]
     }
 
     /// Directions of a ring.
     fn directions(&self, ring: usize) -> usize {
-        let phase = self.wavenumber(ring) * self.reach;
+        let k = self.sent.wavenumber(ring);
+        let phase = k * self.sent.reach(k);
         // Tails of the Bessel functions beyond their argument fall over a few cube roots of it.
         fast_length((phase + 10.0 * phase.cbrt() + 32.0).ceil() as usize)
     }
 
+    /// Rings of which one is counted, and how many it stands for: rings change little from one to the next, so of very many
+    /// only some are looked at.
+    fn counted(&self) -> impl Iterator<Item = [usize; 2]> {
+        let rings = self.sent.rings();
+        let every = rings.div_ceil(MOST_COUNTED).max(1);
+        (0..rings).step_by(every).map(move |first| {
+            let some = every.min(rings - first);
+            [first + some / 2, some]
+        })
+    }
+
     /// Waves of all rings up to a wavenumber, and beyond it, before the weak ones are left out.
     pub(super) fn nodes(&self, cusp: f64) -> [usize; 2] {
-        // Rings change little from one to the next: of very many only some are counted, each for its neighbours.
-        let every = self.count.div_ceil(MOST_COUNTED).max(1);
         let mut nodes = [0; 2];
-        for first in (0..self.count).step_by(every) {
-            let some = every.min(self.count - first);
-            let ring = first + some / 2;
-            nodes[usize::from(self.wavenumber(ring) >= cusp)] += some * self.directions(ring);
+        for [ring, some] in self.counted() {
+            nodes[usize::from(self.sent.wavenumber(ring) >= cusp)] += some * self.directions(ring);
         }
         nodes
     }
 
     /// What the rings take to compute.
     pub(super) fn work(&self, wake: &KelvinWake) -> RingWork {
-        let [count, mean] = [self.count as f64, 0.5 * self.step * self.count as f64];
         let nodes = self.nodes(f64::INFINITY)[0] as f64;
         let kept = (self.kept_share(wake, nodes) * nodes).ceil();
+        let wavenumbers = self
+            .counted()
+            .map(|[ring, some]| some as f64 * self.sent.wavenumber(ring));
         RingWork {
             nodes,
             most_nodes: nodes,
             kept,
             most_kept: kept,
-            terms: 2.0 * count * mean * self.radius,
+            terms: 2.0 * self.radius * wavenumbers.sum::<f64>(),
         }
     }
 
     /// Share of the waves that are not weak, from a few rings; all of them where even a few are too many to look at.
     fn kept_share(&self, wake: &KelvinWake, nodes: f64) -> f64 {
-        let every = self.count.div_ceil(LOOKED_AT).max(1);
-        let rings: Vec<usize> = (every / 2..self.count).step_by(every).collect();
+        let count = self.sent.rings();
+        let every = count.div_ceil(LOOKED_AT).max(1);
+        let rings: Vec<usize> = (every / 2..count).step_by(every).collect();
         if nodes / every as f64 > MOST_LOOKED_AT || rings.is_empty() {
             return 1.0;
         }
-        let rings = self.amplitudes_of(wake, &rings);
-        let squares = || rings.iter().flatten().map(Complex64::norm_sqr);
-        let count = squares().count().max(1) as f64;
-        let least = self.least.powi(2) * squares().sum::<f64>() / count;
-        squares().filter(|&square| square > least).count() as f64 / count
+        let energies: Vec<f64> = rings
+            .iter()
+            .zip(self.amplitudes_of(wake, &rings))
+            .flat_map(|(&ring, amplitudes)| {
+                let energy = self.energy(ring);
+                amplitudes.into_iter().map(energy)
+            })
+            .collect();
+        let least = self.least_energy(&energies);
+        energies.iter().filter(|&&energy| energy > least).count() as f64 / energies.len() as f64
+    }
+
+    /// Energy of a wave of a ring, but for a factor: its share of all water, which is the larger the less of the plane of
+    /// wavenumbers it stands for.
+    fn energy(&self, ring: usize) -> impl Fn(Complex64) -> f64 + use<> {
+        let reach = self.sent.reach(self.sent.wavenumber(ring));
+        move |amplitude| amplitude.norm_sqr() * reach * reach
+    }
+
+    /// Energy below which a wave is weak.
+    fn least_energy(&self, energies: &[f64]) -> f64 {
+        self.least.powi(2) * energies.iter().sum::<f64>() / energies.len().max(1) as f64
     }
 
     /// The waves.
     pub(super) fn waves(&self, wake: &KelvinWake) -> PlaneWaves {
-        let rings: Vec<Vec<Complex64>> = (0..self.count)
+        let count = self.sent.rings();
+        let rings: Vec<Vec<Complex64>> = (0..count)
             .step_by(PLANNED_AT_ONCE)
             .flat_map(|first| {
-                let some = first..(first + PLANNED_AT_ONCE).min(self.count);
+                let some = first..(first + PLANNED_AT_ONCE).min(count);
                 self.amplitudes_of(wake, &some.collect::<Vec<_>>())
             })
             .collect();
-        let amplitudes = || rings.iter().flatten().map(Complex64::norm_sqr);
-        let count = rings.iter().map(Vec::len).sum::<usize>().max(1);
-        let least = self.least.powi(2) * amplitudes().sum::<f64>() / count as f64;
-        let mut out = PlaneWaves::with_capacity(amplitudes().filter(|&a| a > least).count());
+        let energies: Vec<f64> = rings
+            .iter()
+            .enumerate()
+            .flat_map(|(ring, amplitudes)| amplitudes.iter().copied().map(self.energy(ring)))
+            .collect();
+        let least = self.least_energy(&energies);
+        let mut out = PlaneWaves::with_capacity(energies.iter().filter(|&&e| e > least).count());
+        let mut energies = energies.into_iter();
         let centre = self.centre(wake);
         for (ring, amplitudes) in rings.into_iter().enumerate() {
-            let k = self.wavenumber(ring);
+            let k = self.sent.wavenumber(ring);
             let omega = angular_frequency(k, wake.depth);
             let turn = TAU / amplitudes.len() as f64;
-            for (n, amplitude) in amplitudes.iter().enumerate() {
-                if amplitude.norm_sqr() > least {
+            for (n, (amplitude, energy)) in amplitudes.iter().zip(&mut energies).enumerate() {
+                if energy > least {
                     let (sin, cos) = (turn * n as f64).sin_cos();
                     // Against the clock from the heading is to port.
                     let k = wake.track.turned([k * cos, -self.side * k * sin]);
@@ -209,7 +226,7 @@ impl Rings {
 
     /// k dk dβ B R/(2πU) Σₘ Jₘ(kR) ŵ(m − ωR/U) e^{imβ} of the directions β of a ring.
     fn amplitudes(&self, wake: &KelvinWake, ring: usize, circle: &Circle) -> Vec<Complex64> {
-        let k = self.wavenumber(ring);
+        let k = self.sent.wavenumber(ring);
         let omega = angular_frequency(k, wake.depth);
         let count = circle.len();
         let mut values = vec![Complex64::ZERO; count];
@@ -232,7 +249,7 @@ impl Rings {
         }
         circle.sum(&mut values);
         let along = (omega / wake.speed).min(k);
-        let area = k * self.step * TAU / count as f64;
+        let area = k * TAU / self.sent.reach(k) * TAU / count as f64;
         // B R/(2πU), B = (U/π) · source.
         let strength = wake.source(along, k, area * self.radius / (TAU * PI));
         values.iter_mut().for_each(|value| *value *= strength);
@@ -246,7 +263,7 @@ impl Rings {
     fn fall(&self, k: f64) -> [f64; 2] {
         let [from, to] = self.sent.onset(k);
         let middle = 0.5 * (from + to);
-        let steady = rise((k / self.sent.wavenumbers[0] - LONG[0]) / (LONG[1] - LONG[0]));
+        let steady = rise((k / self.sent.longest - LONG[0]) / (LONG[1] - LONG[0]));
         [middle, 2.0 * middle + (to - from - 2.0 * middle) * steady]
     }
 }

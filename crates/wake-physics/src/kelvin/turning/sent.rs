@@ -1,6 +1,7 @@
-//! Which steady waves of a turning ship reach a raster, and from how far they come.
+//! Which steady waves of a turning ship reach a raster, from how far they come, and which of them are summed.
 
 use super::super::KelvinWake;
+use crate::constants::GRAVITY;
 use crate::dispersion::{angular_frequency, group_speed};
 use crate::raster::Raster;
 use std::f64::consts::{PI, TAU};
@@ -10,20 +11,35 @@ use std::f64::consts::{PI, TAU};
 const STEPS: [f64; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
 /// Wavenumbers at which they are looked for.
-const KNOTS: usize = 9;
+const KNOTS: usize = 12;
 
-/// Wavelengths of the longest steady wave over which the oldest waves set in: chosen.
-const ONSET: f64 = 3.0;
+/// Wavelengths over which the oldest waves set in, on deep water and where all waves are as fast: there waves of the onset
+/// stay near those of the wake. Chosen.
+const ONSET: [f64; 2] = [3.0, 10.0];
 
-/// The waves that reach a raster, by wavenumber from that of the longest steady wave to the largest of the raster.
+/// Longest waves that are told apart, over those of deep water: a ship faster than the waves of a shallow sea has steady waves
+/// of any length. Chosen.
+const LONGEST: f64 = 20.0;
+
+/// Samples beyond those that the largest phase asks for: the tails of what is summed.
+const GUARD: f64 = 1.15;
+
+/// The waves that reach a raster, by wavenumber.
+///
+/// Waves that come from a distance ℓ have phases that change by ℓ dk: they are summed in steps of 2π/ℓ(k), which are shorter
+/// for the long waves that come from far away than for short ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sent {
-    /// Wavenumber of the longest steady wave, and the largest of the raster [rad/m].
-    pub(super) wavenumbers: [f64; 2],
-    /// Distances run between which the oldest waves set in, at equally spaced wavenumbers \[m\].
+    /// Wavenumber of the longest steady wave [rad/m].
+    pub(super) longest: f64,
+    /// Wavenumbers at which the rest is known, growing to the largest of the raster [rad/m].
+    knots: [f64; KNOTS],
+    /// Distances run between which the oldest waves set in \[m\].
     onsets: [[f64; 2]; KNOTS],
-    /// Largest distance of a wave that is sent from the middle of the raster \[m\].
-    pub(super) farthest: f64,
+    /// Largest phase over k \[m\].
+    reaches: [f64; KNOTS],
+    /// Rings of waves below each knot.
+    below: [f64; KNOTS],
 }
 
 impl Sent {
@@ -42,17 +58,16 @@ impl Sent {
         ];
         let half = x.hypot(y) * raster.spacing;
         let run = PI * radius;
-        let wavenumber = |knot: usize| {
-            let above = knot as f64 / (KNOTS - 1) as f64 * (largest - longest);
-            (longest + above).max(1e-3 * largest)
-        };
-        let wavelength = TAU / wavenumber(0);
+        let told_apart = GRAVITY / (LONGEST * wake.speed.powi(2));
+        let first = longest.max(told_apart).min(0.5 * (longest + largest));
+        let knots: [f64; KNOTS] = std::array::from_fn(|knot| {
+            first * (largest / first).powf(knot as f64 / (KNOTS - 1) as f64)
+        });
         // Distances run, and the steps to them. A turn of any radius takes a few hundred.
-        let step = |s: f64| (STEPS[0] * half.max(wavelength)).max(STEPS[1] * s);
+        let step = |s: f64| (STEPS[0] * half.max(TAU / largest)).max(STEPS[1] * s);
         let next = |&[s, _]: &[f64; 2]| (s < run).then(|| [(s + step(s)).min(run), step(s)]);
         let passed: Vec<[f64; 2]> = std::iter::successors(Some([0.0, step(0.0)]), next).collect();
-        let ways: [[f64; 2]; KNOTS] =
-            std::array::from_fn(|knot| steady_way(wake, wavenumber(knot)));
+        let ways = knots.map(|k| steady_way(wake, k));
         // Distances, to port and to starboard, at which the waves are now that were sent a distance s ago.
         let away = |s: f64, [ahead, aside]: [f64; 2]| {
             let there = wake.track.at(-s);
@@ -75,36 +90,104 @@ impl Sent {
         if oldest.iter().all(Option::is_none) {
             return None;
         }
+        // Between two knots the later, or farther, of them holds.
+        let largest_around = |values: [f64; KNOTS]| -> [f64; KNOTS] {
+            std::array::from_fn(|knot| {
+                let around = &values[knot.saturating_sub(1)..(knot + 2).min(KNOTS)];
+                around.iter().copied().fold(0.0, f64::max)
+            })
+        };
+        let oldest = largest_around(oldest.map(Option::unwrap_or_default));
         let onsets: [[f64; 2]; KNOTS] = std::array::from_fn(|knot| {
-            // Between two knots the later of them holds.
-            let around = &oldest[knot.saturating_sub(1)..(knot + 2).min(KNOTS)];
-            let oldest = around.iter().flatten().copied().fold(0.0, f64::max);
+            let (oldest, length) = (oldest[knot], TAU / knots[knot]);
             // A wave is sent over a stretch of the track: the cube root of λs² at the cusp, where it is longest.
-            let sent_over = (oldest * oldest * TAU / wavenumber(knot)).cbrt();
-            let oldest = (oldest + sent_over).min(run);
-            let ramp = (ONSET * wavelength).max(0.1 * oldest).min(0.5 * run);
+            let oldest = (oldest + (oldest * oldest * length).cbrt()).min(run);
+            let ramp = (onset_lengths(wake, knots[knot]) * length)
+                .max(0.1 * oldest)
+                .min(0.5 * run);
             let end = (oldest + ramp).min(run);
             [end - ramp, end]
         });
-        let farthest = ways.iter().zip(&onsets).flat_map(|(&way, &[_, end])| {
-            let sent = passed.iter().map(move |&[s, _]| s.min(end));
-            sent.flat_map(move |s| away(s, way))
-        });
-        Some(Self {
-            wavenumbers: [longest, largest],
+        let reaches = largest_around(std::array::from_fn(|knot| {
+            let [_, end] = onsets[knot];
+            let sent = passed
+                .iter()
+                .flat_map(|&[s, _]| away(s.min(end), ways[knot]));
+            GUARD * (sent.fold(0.0, f64::max) + half) + TAU / knots[knot]
+        }));
+        let mut sent = Self {
+            longest,
+            knots,
             onsets,
-            farthest: farthest.fold(0.0, f64::max),
-        })
+            reaches,
+            below: [0.0; KNOTS],
+        };
+        sent.below[0] = knots[0] * reaches[0] / TAU;
+        for knot in 1..KNOTS {
+            let mean = 0.5 * (reaches[knot - 1] + reaches[knot]);
+            let rings = mean * (knots[knot] - knots[knot - 1]) / TAU;
+            sent.below[knot] = sent.below[knot - 1] + rings;
+        }
+        // A whole number of rings.
+        let more = sent.below[KNOTS - 1].ceil() / sent.below[KNOTS - 1];
+        sent.below = sent.below.map(|rings| more * rings);
+        sent.reaches = sent.reaches.map(|reach| more * reach);
+        Some(sent)
+    }
+
+    /// The same waves in more rings.
+    #[cfg(test)]
+    pub(super) fn finer(mut self, times: f64) -> Self {
+        self.below = self.below.map(|rings| times * rings);
+        self.reaches = self.reaches.map(|reach| times * reach);
+        self
+    }
+
+    /// Largest wavenumber of the raster [rad/m].
+    pub(super) fn largest(&self) -> f64 {
+        self.knots[KNOTS - 1]
+    }
+
+    /// Number of rings.
+    pub(super) fn rings(&self) -> usize {
+        self.below[KNOTS - 1].round() as usize
+    }
+
+    /// Wavenumber of a ring, the middle of its step [rad/m].
+    pub(super) fn wavenumber(&self, ring: usize) -> f64 {
+        let rings = ring as f64 + 0.5;
+        let knot = self.below.partition_point(|&below| below <= rings);
+        if knot == 0 {
+            return rings * TAU / self.reaches[0];
+        }
+        // The reach changes evenly from knot to knot, so the rings between them are those of a parabola.
+        let before = knot.min(KNOTS - 1) - 1;
+        let [reach, next] = [self.reaches[before], self.reaches[before + 1]];
+        let slope = (next - reach) / (self.knots[before + 1] - self.knots[before]);
+        let phase = TAU * (rings - self.below[before]);
+        let root = (reach * reach + 2.0 * slope * phase).max(0.0).sqrt();
+        self.knots[before] + 2.0 * phase / (reach + root)
+    }
+
+    /// Largest phase of the waves k, over k \[m\].
+    pub(super) fn reach(&self, k: f64) -> f64 {
+        let (knot, part) = self.place(k);
+        self.reaches[knot] + part * (self.reaches[knot + 1] - self.reaches[knot])
     }
 
     /// Distances run between which the oldest waves k set in \[m\]; those of the longest steady wave for longer ones.
     pub(super) fn onset(&self, k: f64) -> [f64; 2] {
-        let [longest, largest] = self.wavenumbers;
-        let last = (KNOTS - 1) as f64;
-        let at = (last * (k - longest) / (largest - longest)).clamp(0.0, last);
-        let knot = (at as usize).min(KNOTS - 2);
+        let (knot, part) = self.place(k);
         let [before, after] = [self.onsets[knot], self.onsets[knot + 1]];
-        [0, 1].map(|n| before[n] + (at - knot as f64) * (after[n] - before[n]))
+        [0, 1].map(|n| before[n] + part * (after[n] - before[n]))
+    }
+
+    /// The knot before a wavenumber, and the part of the way to the next.
+    fn place(&self, k: f64) -> (usize, f64) {
+        let after = self.knots.partition_point(|&knot| knot <= k);
+        let knot = after.clamp(1, KNOTS - 1) - 1;
+        let [before, next] = [self.knots[knot], self.knots[knot + 1]];
+        (knot, ((k - before) / (next - before)).clamp(0.0, 1.0))
     }
 }
 
@@ -116,29 +199,38 @@ fn steady_way(wake: &KelvinWake, k: f64) -> [f64; 2] {
     [group * cos, group * (1.0 - cos * cos).sqrt()]
 }
 
+/// Wavelengths over which the oldest waves k set in, by group over phase speed: ½ on deep water, 1 on shallow.
+fn onset_lengths(wake: &KelvinWake, k: f64) -> f64 {
+    let share = group_speed(k, wake.depth) * k / angular_frequency(k, wake.depth);
+    ONSET[0] + (ONSET[1] - ONSET[0]) * (2.0 * share - 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::hull::Hull;
     use crate::track::Track;
 
+    fn boat(position: [f64; 2], radius: f64) -> KelvinWake {
+        KelvinWake {
+            hull: Hull::wigley(20.0, 4.0, 1.5),
+            speed: 5.0,
+            track: Track::turning(position, 20.0, 0.0, radius.recip()),
+            depth: f64::INFINITY,
+            filter_depth: 4.0,
+            steepness: None,
+        }
+    }
+
     /// Turns so wide that they are straight have the waves of each other, found in a few steps.
     #[test]
     fn of_wide_turns_the_waves_of_a_straight_track_are_sent() {
         let raster = Raster::image(91, 91, 2.0);
-        let sent = [1e6f64, 1e9].map(|radius| {
-            let wake = KelvinWake {
-                hull: Hull::wigley(20.0, 4.0, 1.5),
-                speed: 5.0,
-                track: Track::turning([10.0, 20.0], 20.0, 0.0, radius.recip()),
-                depth: f64::INFINITY,
-                filter_depth: 4.0,
-                steepness: None,
-            };
-            Sent::of(&wake, &raster, radius).unwrap()
-        });
-        assert!((sent[0].farthest / sent[1].farthest - 1.0).abs() < 1e-3);
-        assert!(sent[0].farthest < 500.0, "{}", sent[0].farthest);
+        let sent = [1e6f64, 1e9]
+            .map(|radius| Sent::of(&boat([10.0, 20.0], radius), &raster, radius).unwrap());
+        for (a, b) in sent[0].reaches.iter().zip(sent[1].reaches) {
+            assert!((a / b - 1.0).abs() < 1e-3 && b < 800.0, "{a} {b}");
+        }
     }
 
     /// A wide turn is straight as far as the raster sees. On deep water with c² = cos² θ = k₀/k the wave k that a ship in its
@@ -147,51 +239,62 @@ mod tests {
     #[test]
     fn only_waves_that_reach_the_raster_are_sent() {
         let radius = 2000.0f64;
-        let wake = KelvinWake {
-            hull: Hull::wigley(20.0, 4.0, 1.5),
-            speed: 5.0,
-            track: Track::turning([0.0, 0.0], 20.0, 0.0, radius.recip()),
-            depth: f64::INFINITY,
-            filter_depth: 4.0,
-            steepness: None,
-        };
         let raster = Raster::image(91, 91, 2.0);
-        let sent = Sent::of(&wake, &raster, radius).unwrap();
+        let sent = Sent::of(&boat([0.0, 0.0], radius), &raster, radius).unwrap();
         let half = 90.0 * f64::sqrt(2.0);
         // A step of the search is looked beyond, and one is its resolution; the turn bends 290 m by 21 m, 1 m more.
         let step = STEPS[0] * half;
-        let [longest, largest] = sent.wavenumbers;
+        assert!((sent.longest - GRAVITY / 25.0).abs() < 1e-9 * sent.longest);
         for knot in [0, 3, KNOTS - 1] {
-            let k = |knot: usize| longest + (largest - longest) * knot as f64 / (KNOTS - 1) as f64;
+            let k = sent.knots[knot];
             // Shorter waves stay behind less: of the knots around, the one before is the latest.
-            let square = longest / k(knot.saturating_sub(1));
+            let square = sent.longest / sent.knots[knot.saturating_sub(1)];
             let away = (1.0 - 0.5 * square).hypot(0.5 * (square * (1.0 - square)).sqrt());
-            let [from, to] = sent.onset(k(knot));
+            let [from, to] = sent.onset(k);
             // They are sent over a stretch of the track.
-            let with_stretch = |s: f64| s + (s * s * TAU / k(knot)).cbrt();
+            let with_stretch = |s: f64| s + (s * s * TAU / k).cbrt();
             let [least, most] = [half / away - 1.0, (half + step) / away + step + 1.0];
             assert!(
                 from > with_stretch(least) && from < with_stretch(most),
                 "{knot}: {from}"
             );
-            let wavelength = TAU * wake.speed.powi(2) / crate::constants::GRAVITY;
-            assert!((to - from - ONSET * wavelength).abs() < 1e-9, "{to}");
+            let ramp = (ONSET[0] * TAU / k).max(0.1 * from);
+            assert!(
+                (to - from - ramp).abs() < 1e-9,
+                "{knot}: {from} {to} {ramp}"
+            );
+            // None are farther away than their sources.
+            assert!(sent.reach(k) < GUARD * (to + half) + TAU / sent.longest + 1.0);
         }
-        // The last of the longest waves are half as far away as their source; none are farther than the last sources.
-        let [_, to] = sent.onset(longest);
-        assert!(sent.farthest > 0.49 * to && sent.farthest < to);
+    }
+
+    /// Rings are a reach apart in phase, 2π dk⁻¹, and fill the wavenumbers of the raster.
+    #[test]
+    fn rings_are_as_far_apart_as_their_reach_asks_for() {
+        let raster = Raster::image(91, 91, 2.0);
+        // A ship faster than the waves of its sea, whose long waves come from far away.
+        let shallow = KelvinWake {
+            depth: 1.6,
+            ..boat([20.0, 40.0], 1e5)
+        };
+        for (wake, uneven) in [(boat([20.0, 40.0], 300.0), 1.0), (shallow, 3.0)] {
+            let sent = Sent::of(&wake, &raster, wake.track.turn().unwrap().0).unwrap();
+            assert!(sent.reach(0.0) > uneven * sent.reach(sent.largest()));
+            let mut end = 0.0;
+            for ring in 0..sent.rings() {
+                let k = sent.wavenumber(ring);
+                let step = TAU / sent.reach(k);
+                // The middle of a step begins where the last one ended, to the second order of the change.
+                assert!((k - end - 0.5 * step).abs() < 0.02 * step, "{ring}: {k}");
+                end = k + 0.5 * step;
+            }
+            assert!((end / sent.largest() - 1.0).abs() < 1e-3);
+        }
     }
 
     #[test]
     fn waves_that_pass_the_raster_by_are_none() {
-        let wake = |position| KelvinWake {
-            hull: Hull::wigley(20.0, 4.0, 1.5),
-            speed: 5.0,
-            track: Track::turning(position, 20.0, 0.0, 1e-2),
-            depth: f64::INFINITY,
-            filter_depth: 4.0,
-            steepness: None,
-        };
+        let wake = |position| boat(position, 100.0);
         let raster = Raster::image(91, 91, 2.0);
         assert!(Sent::of(&wake([0.0, 0.0]), &raster, 100.0).is_some());
         assert!(Sent::of(&wake([2000.0, 0.0]), &raster, 100.0).is_none());

@@ -145,6 +145,54 @@ fn on_a_wide_turn_the_wake_is_that_of_a_straight_track() {
     assert!(far[0] > 3.0 * far[1], "{far:?}");
 }
 
+/// On shallow water too, by a ship faster than its longest waves, which are sent behind it at the angle of Mach.
+#[test]
+fn on_shallow_water_the_wake_of_a_wide_turn_is_that_of_a_straight_track() {
+    let shallow = |track| KelvinWake {
+        track,
+        depth: 1.6,
+        ..boat(20.0, 1.0)
+    };
+    let raster = Raster::image(91, 91, 2.0);
+    let all: Vec<[usize; 2]> = (0..9)
+        .flat_map(|i| (0..9).map(move |j| [10 * i, 10 * j]))
+        .collect();
+    let transfer = Transfer {
+        depth: 1.6,
+        incidence: 0.5,
+        relaxation_rate: 1.0,
+        action_slope: 4.5,
+    };
+    let elevation = |wake: &KelvinWake, tolerance: f64| {
+        let waves = wake.waves(&wake.plan(&raster, tolerance));
+        (
+            waves.len(),
+            harmonic_sum(&waves, &transfer, &[Quantity::Elevation], &raster, &all).remove(0),
+        )
+    };
+    let straight = shallow(Track::new([20.0, 40.0], 20.0, 0.0));
+    let (_, expected) = elevation(&straight, 1e-4);
+    let astern: Vec<usize> = (0..all.len())
+        .filter(|&n| {
+            let [i, j] = all[n];
+            straight.track.seen_from_ship([raster.x(j), raster.y(i)])[0] < -60.0
+        })
+        .collect();
+    // The sharp end of the band is summed by other rules, as on deep water; waves come from 500 m ago, where the narrower turn
+    // is 1 m off to the side, and change by 0.15 of a radian a metre.
+    for radius in [1e5, 1e6] {
+        let turning = shallow(Track::turning([20.0, 40.0], 20.0, 0.0, f64::recip(radius)));
+        let (count, found) = elevation(&turning, 1e-3);
+        let pick = |values: &[f64]| -> Vec<f64> { astern.iter().map(|&n| values[n]).collect() };
+        let far = largest(&pick(&found), &pick(&expected));
+        let off = 0.15 * 0.5 * 500f64.powi(2) / radius;
+        assert!(
+            far < 3.0 * (off + 0.036) && count < 100_000,
+            "{radius}: {far:e} {count}"
+        );
+    }
+}
+
 /// To port as to starboard, mirrored; and whatever the heading.
 #[test]
 fn mirrored_and_turned_ships_have_mirrored_and_turned_wakes() {
@@ -207,7 +255,11 @@ fn weak_waves_are_left_out_and_counted_before() {
     let divergent = (0..waves.len()).filter(beyond).count();
     assert_eq!(all.nodes(cusp), [waves.len() - divergent, divergent]);
     assert!(divergent > 0 && divergent < waves.len());
-    let squares: Vec<f64> = waves.amplitude.iter().map(Complex64::norm_sqr).collect();
+    let energy = |n: usize| {
+        let reach = all.sent.reach(waves.kx[n].hypot(waves.ky[n]));
+        waves.amplitude[n].norm_sqr() * reach * reach
+    };
+    let squares: Vec<f64> = (0..waves.len()).map(energy).collect();
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     for least in [1e-3, 0.5] {
         let strong = squares
@@ -215,8 +267,9 @@ fn weak_waves_are_left_out_and_counted_before() {
             .filter(|&&s| s > least * least * mean)
             .count();
         let kept = Rings { least, ..all }.waves(&wake).len();
+        // Rounded wavenumbers may put a wave on the other side.
         assert!(
-            kept == strong && kept < waves.len(),
+            kept.abs_diff(strong) <= 2 && kept < waves.len(),
             "{least}: {kept} {strong}"
         );
     }
@@ -241,21 +294,21 @@ fn waves_that_are_kept_are_foreseen() {
         );
         assert!(work.nodes >= work.kept && work.most_kept == work.kept && work.terms > 0.0);
     }
-    let fine = Rings {
-        count: 10 * MOST_COUNTED,
-        step: 1e-6,
-        ..Rings::of(&wake, &raster(), 1e-3).unwrap()
+    let rings = Rings::of(&wake, &raster(), 1e-3).unwrap();
+    let finer = |times: f64| Rings {
+        sent: rings.sent.finer(times),
+        ..rings
     };
-    let one_by_one: usize = (0..fine.count).map(|ring| fine.directions(ring)).sum();
+    let fine = finer(10.0 * MOST_COUNTED as f64 / rings.sent.rings() as f64);
+    let one_by_one: usize = (0..fine.sent.rings())
+        .map(|ring| fine.directions(ring))
+        .sum();
     let counted = fine.nodes(f64::INFINITY)[0] as f64;
     assert!(
         (counted / one_by_one as f64 - 1.0).abs() < 1e-3,
         "{counted} {one_by_one}"
     );
-    let many = Rings {
-        count: 1 << 20,
-        ..Rings::of(&wake, &raster(), 1e-3).unwrap()
-    };
+    let many = finer(1e6 / rings.sent.rings() as f64);
     let work = many.work(&wake);
     assert_eq!(work.kept, work.nodes);
 }
