@@ -1,4 +1,4 @@
-//! `wake train detector`: the network learns from images made on the fly.
+//! `wake train detector`: the network learns from images made on the fly, or of a data set.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ pub(crate) const DEFAULTS: &[(&str, &str)] = &[
     ("out", "out/detector"),
 ];
 
-/// Train the detector on images made on the fly.
+/// Train the detector on images made on the fly, or of a data set.
 #[derive(Args)]
 pub(crate) struct Options {
     /// Recipe of the training images
@@ -28,8 +28,11 @@ pub(crate) struct Options {
     /// Number of different images, repeated in turn; by default all are different
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(16..=1_000_000))]
     distinct: Option<u32>,
-    /// Folder of labelled images (with labels.json) to train on instead of a recipe
+    /// Folder of a data set of `wake dataset` to train on instead of a recipe: 256 x 256 pixels
     #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct"])]
+    data: Option<PathBuf>,
+    /// Folder of labelled images (with labels.json) to train on instead of a recipe
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["recipe", "distinct", "data"])]
     labelled: Option<PathBuf>,
     /// Labelled image to leave out
     #[arg(long, value_name = "NAME", requires = "labelled")]
@@ -57,6 +60,7 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
             without: options.without.clone(),
             count: options.tiles.map(|count| count as usize),
         }),
+        data: options.data.clone(),
         distinct: options.distinct.map(|count| count as usize),
         weights: options.weights.clone(),
         options: options.place.paced(&options.pace, &options.thrift)?,

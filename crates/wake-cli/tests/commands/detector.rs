@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use image::{GrayImage, ImageBuffer, Luma};
 use serde_json::Value;
 
-use super::{done, files, names, program, refused_by, text};
+use super::{done, files, names, program, refused_by, refused_into, text};
 
 /// A dark line of 300 pixels toward the right on noise, begun by a bright spot, in grey from 0 to 1.
 fn wake(size: u32) -> impl Fn(u32, u32) -> f32 {
@@ -195,6 +195,55 @@ fn a_training_run_goes_on_where_it_was() {
     let image = eight_bits(&folder.path().join("a.png"), 100);
     let weights = out.join(weights);
     detections(folder.path(), &[text(&image), "--weights", text(&weights)]);
+}
+
+/// A step on the training pairs of a data set; the run of another set is not gone on with.
+#[test]
+fn a_data_set_is_trained_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sets = ["3", "4"].map(|seed| {
+        let set = folder.path().join(seed);
+        done(
+            "dataset",
+            &["--count", "2", "--val-share", "0", "--seed", seed],
+            &set,
+        );
+        set
+    });
+    let out = folder.path().join("run");
+    let step = |data: &Path, steps: &'static str| {
+        let data = text(data).to_owned();
+        [
+            "detector", "--data", &data, "--batch", "2", "--steps", steps, "--every", "1",
+        ]
+        .map(str::to_owned)
+    };
+    let one = step(&sets[0], "1");
+    done("train", &one.each_ref().map(String::as_str), &out);
+    assert!(out.join("detector.safetensors").is_file());
+    let run = std::fs::read_to_string(out.join("run.json")).expect("a run");
+    assert!(
+        run.contains("\"pairs\":2") || run.contains("\"pairs\": 2"),
+        "{run}"
+    );
+    let other = step(&sets[1], "2");
+    let other = [&other.each_ref().map(String::as_str)[..], &["--resume"]].concat();
+    refused_into("train", &other, &["set.seed", "3", "4"], &out);
+    // A set and a recipe at once, and images of another size.
+    let both = ["detector", "--data", "set", "--recipe", "painted"];
+    refused_by("train", &both, &["--data", "--recipe"]);
+    let small = folder.path().join("small");
+    let pixels = ["--set", "scene.grid.rows=64"];
+    done(
+        "dataset",
+        &[&["--count", "1", "--val-share", "0"], &pixels[..]].concat(),
+        &small,
+    );
+    refused_by(
+        "train",
+        &["detector", "--data", text(&small)],
+        &["grid.rows", "64", "256"],
+    );
 }
 
 /// Runs the program in a folder, with its standard output somewhere else.

@@ -1,12 +1,13 @@
-//! The detector: trained on images made on the fly, scored on images whose wakes are known.
+//! The detector: trained on images made on the fly or read from a folder, scored on images whose wakes are known.
 //!
 //! ```text
-//! recipe ─► source of pairs ─► samples: images with their wakes ─► targets: maps ─► loss ─► network
+//! recipe or data set ─► source of pairs ─► samples: images with their wakes ─► targets: maps ─► loss ─► network
 //! ```
 
 pub mod judging;
 
 mod cluttered;
+mod data;
 mod draw;
 mod labelled;
 mod painted;

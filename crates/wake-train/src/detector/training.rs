@@ -11,6 +11,7 @@ use wake_dataset::{Pair, Source};
 use wake_nn::weights::{Layout, Precision, load, save_as};
 use whole_files::fingerprint;
 
+use super::data::TrainingData;
 use super::draw::Draw;
 use super::labelled::{self, LabelledImages};
 use super::recipes::ImageRecipe;
@@ -110,13 +111,15 @@ impl Task<Network> for DetectorTask {
     }
 }
 
-/// Training of a detector on images made on the fly.
+/// Training of a detector on images made on the fly, or of a data set.
 #[derive(Debug, Clone, Default)]
 pub struct DetectorTraining {
     /// Recipe of the images.
     pub recipe: ImageRecipe,
     /// Labelled images instead of those of the recipe.
     pub labelled: Option<LabelledImages>,
+    /// Folder of a data set of `wake dataset`, whose training pairs are learnt from instead of a recipe.
+    pub data: Option<PathBuf>,
     /// Different images, which come again when all were seen; `None`: all are different.
     pub distinct: Option<usize>,
     /// Weights to begin with; `None`: random ones.
@@ -133,14 +136,19 @@ impl DetectorTraining {
     /// # Errors
     ///
     /// As [`RunOptions::validate`]; [`wake_nn::Error::InvalidOption`] for a folder of another run;
+    /// [`wake_dataset::Error::Dataset`] and [`wake_nn::Error::OutOfRange`] for a data set that cannot be learnt from;
     /// [`wake_detector::Error::WrongMaps`] for first weights as [`Detector::load`](wake_detector::Detector::load).
     pub fn train(&self, out: &Path, progress: &dyn Fn(Progress)) -> Result<()> {
         let options = &self.options;
-        let constants = self.constants()?;
+        let data = self.data.as_deref();
+        let data = data.map(|folder| TrainingData::open(folder, options.seed, SIZE));
+        let data = data.transpose()?;
+        let constants = self.constants(data.as_ref())?;
         let device = options.device();
-        let source: Arc<dyn Source> = match &self.labelled {
-            Some(images) => Arc::new(labelled::source(images, options.seed, SIZE)?),
-            None => self.recipe.source(options.seed, SIZE, &device)?,
+        let source: Arc<dyn Source> = match (&self.labelled, data) {
+            (Some(images), _) => Arc::new(labelled::source(images, options.seed, SIZE)?),
+            (None, Some(data)) => Arc::new(data),
+            (None, None) => self.recipe.source(options.seed, SIZE, &device)?,
         };
         let source: Arc<dyn Source> = match self.distinct {
             Some(count) => Arc::new(Repeated::new(source, count)),
@@ -182,7 +190,7 @@ impl DetectorTraining {
     }
 
     /// The run, checked before anything is made.
-    fn constants(&self) -> Result<RunOptions> {
+    fn constants(&self, data: Option<&TrainingData>) -> Result<RunOptions> {
         let mut constants = self.options.run(&DEFAULTS, Value::Null);
         let trainer = &mut constants.trainer;
         trainer.rate.warmup = trainer.rate.warmup.min(trainer.rate.steps);
@@ -194,6 +202,9 @@ impl DetectorTraining {
         constants.identity = json!({
             "recipe": self.recipe.name(), "distinct": self.distinct, "weights": weights,
         });
+        if let Some(data) = data {
+            constants.identity["data"] = data.identity();
+        }
         if let Some(LabelledImages { without, count, .. }) = &self.labelled {
             constants.identity["labelled"] = json!({"without": without, "count": count});
         }
