@@ -259,8 +259,9 @@ mod tests {
                 "{knot}: {from}"
             );
             let ramp = (ONSET[0] * TAU / k).max(0.1 * from);
+            // Surface tension makes the group faster by (k/370 m⁻¹)², at most 2e-5 of it: five times that in the onset.
             assert!(
-                (to - from - ramp).abs() < 1e-9,
+                (to - from - ramp).abs() < 1e-4 * ramp,
                 "{knot}: {from} {to} {ramp}"
             );
             // None are farther away than their sources.
