@@ -17,8 +17,8 @@ const KNOTS: usize = 12;
 /// stay near those of the wake. Chosen.
 const ONSET: [f64; 2] = [3.0, 10.0];
 
-/// Longest waves that are told apart, over those of deep water: a ship faster than the waves of a shallow sea has steady waves
-/// of any length. Chosen.
+/// Largest wavelength with a reach and an onset of its own, over that of the longest steady wave on deep water. A ship faster
+/// than the waves of a shallow sea has steady waves of any length. Chosen.
 const LONGEST: f64 = 20.0;
 
 /// Samples beyond those that the largest phase asks for: the tails of what is summed.
@@ -58,8 +58,8 @@ impl Sent {
         ];
         let half = x.hypot(y) * raster.spacing;
         let run = PI * radius;
-        let told_apart = GRAVITY / (LONGEST * wake.speed.powi(2));
-        let first = longest.max(told_apart).min(0.5 * (longest + largest));
+        let least = GRAVITY / (LONGEST * wake.speed.powi(2));
+        let first = longest.max(least).min(0.5 * (longest + largest));
         let knots: [f64; KNOTS] = std::array::from_fn(|knot| {
             first * (largest / first).powf(knot as f64 / (KNOTS - 1) as f64)
         });
