@@ -149,28 +149,27 @@ impl Rings {
         if nodes / every as f64 > MOST_LOOKED_AT || rings.is_empty() {
             return 1.0;
         }
-        let energies: Vec<f64> = rings
-            .iter()
-            .zip(self.amplitudes_of(wake, &rings))
-            .flat_map(|(&ring, amplitudes)| {
-                let energy = self.energy(ring);
-                amplitudes.into_iter().map(energy)
-            })
-            .collect();
-        let least = self.least_energy(&energies);
-        energies.iter().filter(|&&energy| energy > least).count() as f64 / energies.len() as f64
+        let amplitudes = self.amplitudes_of(wake, &rings);
+        let energies = || {
+            let pairs = rings.iter().zip(&amplitudes);
+            pairs.flat_map(|(&ring, amplitudes)| amplitudes.iter().map(self.energy(ring)))
+        };
+        let (count, least) = self.least_energy(energies());
+        energies().filter(|&energy| energy > least).count() as f64 / count as f64
     }
 
     /// Energy of a wave of a ring, but for a factor: its share of all water, which is the larger the less of the plane of
     /// wavenumbers it stands for.
-    fn energy(&self, ring: usize) -> impl Fn(Complex64) -> f64 + use<> {
+    fn energy(&self, ring: usize) -> impl Fn(&Complex64) -> f64 + use<> {
         let reach = self.sent.reach(self.sent.wavenumber(ring));
         move |amplitude| amplitude.norm_sqr() * reach * reach
     }
 
-    /// Energy below which a wave is weak.
-    fn least_energy(&self, energies: &[f64]) -> f64 {
-        self.least.powi(2) * energies.iter().sum::<f64>() / energies.len().max(1) as f64
+    /// Number of waves, and energy below which one is weak.
+    fn least_energy(&self, energies: impl Iterator<Item = f64>) -> (usize, f64) {
+        let (count, sum) =
+            energies.fold((0, 0.0), |(count, sum), energy| (count + 1, sum + energy));
+        (count, self.least.powi(2) * sum / count.max(1) as f64)
     }
 
     /// The waves.
@@ -183,21 +182,20 @@ impl Rings {
                 self.amplitudes_of(wake, &some.collect::<Vec<_>>())
             })
             .collect();
-        let energies: Vec<f64> = rings
-            .iter()
-            .enumerate()
-            .flat_map(|(ring, amplitudes)| amplitudes.iter().copied().map(self.energy(ring)))
-            .collect();
-        let least = self.least_energy(&energies);
-        let mut out = PlaneWaves::with_capacity(energies.iter().filter(|&&e| e > least).count());
-        let mut energies = energies.into_iter();
+        let energies = || {
+            let pairs = rings.iter().enumerate();
+            pairs.flat_map(|(ring, amplitudes)| amplitudes.iter().map(self.energy(ring)))
+        };
+        let (_, least) = self.least_energy(energies());
+        let mut out = PlaneWaves::with_capacity(energies().filter(|&e| e > least).count());
         let centre = self.centre(wake);
-        for (ring, amplitudes) in rings.into_iter().enumerate() {
+        for (ring, amplitudes) in rings.iter().enumerate() {
+            let energy = self.energy(ring);
             let k = self.sent.wavenumber(ring);
             let omega = angular_frequency(k, wake.depth);
             let turn = TAU / amplitudes.len() as f64;
-            for (n, (amplitude, energy)) in amplitudes.iter().zip(&mut energies).enumerate() {
-                if energy > least {
+            for (n, amplitude) in amplitudes.iter().enumerate() {
+                if energy(amplitude) > least {
                     let (sin, cos) = (turn * n as f64).sin_cos();
                     // Against the clock from the heading is to port.
                     let k = wake.track.turned([k * cos, -self.side * k * sin]);

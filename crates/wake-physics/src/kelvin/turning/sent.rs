@@ -208,17 +208,12 @@ fn onset_lengths(wake: &KelvinWake, k: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hull::Hull;
     use crate::track::Track;
 
     fn boat(position: [f64; 2], radius: f64) -> KelvinWake {
         KelvinWake {
-            hull: Hull::wigley(20.0, 4.0, 1.5),
-            speed: 5.0,
             track: Track::turning(position, 20.0, 0.0, radius.recip()),
-            depth: f64::INFINITY,
-            filter_depth: 4.0,
-            steepness: None,
+            ..super::super::tests::boat(20.0, radius)
         }
     }
 

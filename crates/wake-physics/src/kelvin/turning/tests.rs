@@ -6,7 +6,7 @@ use crate::track::Track;
 use crate::waves::{Quantity, Transfer, harmonic_sum};
 
 /// A boat of 5 m/s, transverse waves of 16 m; the filter leaves 0.2 % at the end of the band of 2 m pixels.
-fn boat(heading: f64, radius: f64) -> KelvinWake {
+pub(super) fn boat(heading: f64, radius: f64) -> KelvinWake {
     KelvinWake {
         hull: Hull::wigley(20.0, 4.0, 1.5),
         speed: 5.0,
