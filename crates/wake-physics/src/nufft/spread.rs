@@ -241,16 +241,16 @@ mod tests {
         let strengths: Vec<[Complex<f64>; 2]> = (0..count)
             .map(|n| [0.3, 0.9].map(|by| Complex::new(turn(n, by * 0.4142), turn(n, by * 0.7321))))
             .collect();
-        let sum = |parts: &[std::ops::Range<usize>]| {
+        let sum = |ends: &[usize]| {
             let mut sums = vec![Complex::new(0.0, 0.0); lattice[0] * lattice[1]];
-            for part in parts {
+            for part in ends.windows(2).map(|ends| ends[0]..ends[1]) {
                 let footprints = Footprints::<f64>::new(&waves[part.clone()], &kernel, lattice);
-                footprints.spread(&strengths[part.clone()], &mut sums, Before::Waves);
+                footprints.spread(&strengths[part], &mut sums, Before::Waves);
             }
             sums
         };
-        let half = count / 2;
-        let [whole, parts] = [&[0..count][..], &[0..half, half..count]].map(sum);
+        let whole = sum(&[0, count]);
+        let parts = sum(&[0, count / 2, count]);
         let largest = whole.iter().map(|v| v.norm()).fold(0.0, f64::max);
         for (a, b) in whole.iter().zip(&parts) {
             assert!((a - b).norm() < 1e-10 * largest, "{a} {b}");
