@@ -8,6 +8,8 @@ use super::shuffle::shuffled;
 use crate::error::Result;
 use image::ImageFormat;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+use wake_physics::labels::Labels;
 use wake_physics::{Scene, labels_of};
 
 /// A finite data set in a folder that [`write`](super::write) made.
@@ -16,6 +18,8 @@ pub struct Folder {
     path: PathBuf,
     manifest: Manifest,
     rows: Rows,
+    /// Labels of the pairs that were read: they take longer than an image to read, and every epoch needs them.
+    labels: Arc<[OnceLock<Labels>]>,
 }
 
 impl Folder {
@@ -43,6 +47,7 @@ impl Folder {
         Ok(Self {
             path: path.to_owned(),
             manifest,
+            labels: rows.iter().map(|_| OnceLock::new()).collect(),
             rows,
         })
     }
@@ -101,6 +106,7 @@ impl Folder {
     /// [`Error::Dataset`](crate::Error::Dataset) if there is no such pair, or its image is another one than was written.
     pub fn pair(&self, position: u64) -> Result<Pair> {
         let (index, row) = self.row(position)?;
+        let labels = &self.labels[position as usize];
         let grid = &self.manifest.recipe.scene.grid;
         let path = self.path.join(&row.file_name);
         let bytes = row.image_bytes(&path, position as usize + 1)?;
@@ -108,7 +114,7 @@ impl Folder {
             index: *index,
             image: decoded(&path, &bytes, [grid.rows, grid.columns])?,
             prompt: row.text.clone(),
-            labels: labels_of(&row.scene),
+            labels: labels.get_or_init(|| labels_of(&row.scene)).clone(),
             scene: row.scene.clone(),
             amplitudes: row.amplitudes,
         })

@@ -2,22 +2,42 @@
 
 use crate::error::{Error, Result};
 use rayon::ThreadPoolBuilder;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::collections::VecDeque;
+use std::fmt;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-/// Results that one thread may have ready before they are asked for.
-const READY: usize = 4;
+/// Items a thread that are worked on or ready before they are asked for.
+const READY: u64 = 4;
+
+/// An item, and where its result goes.
+type Job<T> = (u64, Sender<Result<T>>);
+
+type Queue<T> = Arc<Mutex<Receiver<Job<T>>>>;
 
 /// The results of `work` on some items, in the order of the items, computed ahead on other threads.
 ///
-/// Thread k of n takes items k, k + n, k + 2n, … and puts its results into a short queue of its own; reading the queues
-/// in turn gives the order of the items. Each thread works in a pool of one thread, so that n of them use n cores.
-#[derive(Debug)]
+/// A thread that is free takes the next item, so that one slow item holds up no other thread until [`READY`] items a
+/// thread are waiting behind it. Each thread works in a pool of one thread, so that n of them use n cores.
 pub(super) struct Ordered<T> {
-    queues: Vec<Receiver<Result<T>>>,
-    threads: Vec<Option<JoinHandle<()>>>,
-    next: usize,
+    items: Box<dyn Iterator<Item = u64> + Send>,
+    /// To the threads; `None` once nobody asks any more.
+    jobs: Option<Sender<Job<T>>>,
+    /// Items that no thread has taken.
+    queue: Queue<T>,
+    /// Results to come, in order.
+    results: VecDeque<Receiver<Result<T>>>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl<T> fmt::Debug for Ordered<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Ordered")
+            .field("threads", &self.threads.len())
+            .field("under_way", &self.results.len())
+            .finish_non_exhaustive()
+    }
 }
 
 impl<T: Send + 'static> Ordered<T> {
@@ -25,25 +45,23 @@ impl<T: Send + 'static> Ordered<T> {
     ///
     /// # Errors
     ///
-    /// [`wake_nn::Error::Io`] if the system gives no thread.
-    pub(super) fn new<I>(
-        items: I,
+    /// [`Error::Threads`] if the system gives no thread.
+    pub(super) fn new(
+        items: impl Iterator<Item = u64> + Send + 'static,
         threads: usize,
         work: impl Fn(u64) -> Result<T> + Send + Sync + 'static,
-    ) -> Result<Self>
-    where
-        I: Iterator<Item = u64> + Clone + Send + 'static,
-    {
-        let (work, threads) = (Arc::new(work), threads.max(1));
+    ) -> Result<Self> {
+        let (jobs, queue) = channel::<Job<T>>();
+        let (work, queue) = (Arc::new(work), Arc::new(Mutex::new(queue)));
         let mut ordered = Self {
-            queues: Vec::new(),
+            items: Box::new(items),
+            jobs: Some(jobs),
+            queue: Arc::clone(&queue),
+            results: VecDeque::new(),
             threads: Vec::new(),
-            next: 0,
         };
-        for k in 0..threads {
-            let (sender, queue) = sync_channel(READY);
-            let share = items.clone().skip(k).step_by(threads);
-            let work = Arc::clone(&work);
+        for k in 0..threads.max(1) {
+            let (work, queue) = (Arc::clone(&work), Arc::clone(&queue));
             let pool = ThreadPoolBuilder::new()
                 .num_threads(1)
                 .build()
@@ -51,25 +69,55 @@ impl<T: Send + 'static> Ordered<T> {
             let thread = std::thread::Builder::new()
                 .name(format!("simulate-{k}"))
                 .spawn(move || {
-                    for item in share {
-                        if sender.send(pool.install(|| work(item))).is_err() {
-                            break;
-                        }
+                    while let Some((item, result)) = next_job(&queue) {
+                        // A result that nobody waits for is dropped.
+                        let _ = result.send(pool.install(|| work(item)));
                     }
                 })
                 .map_err(no_thread)?;
-            ordered.queues.push(queue);
-            ordered.threads.push(Some(thread));
+            ordered.threads.push(thread);
         }
+        ordered.work_ahead();
         Ok(ordered)
     }
+
+    /// Hands out items until enough are on their way.
+    fn work_ahead(&mut self) {
+        let ahead = READY as usize * self.threads.len();
+        while let Some(jobs) = &self.jobs
+            && self.results.len() < ahead
+            && let Some(item) = self.items.next()
+        {
+            let (sender, result) = channel();
+            self.results.push_back(result);
+            // Without a thread that listens, the receiver finds out.
+            let _ = jobs.send((item, sender));
+        }
+    }
+}
+
+/// The next item; `None` when there will be no other.
+fn next_job<T>(queue: &Queue<T>) -> Option<Job<T>> {
+    let queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
+    queue.recv().ok()
 }
 
 fn no_thread(source: std::io::Error) -> Error {
     Error::Threads { source }
 }
 
-impl<T> Iterator for Ordered<T> {
+impl<T> Ordered<T> {
+    /// Lets every thread finish what it is at, without another item; the panic of one that panicked.
+    fn stop(&mut self) -> std::thread::Result<()> {
+        self.results.clear();
+        self.jobs = None;
+        while next_job(&self.queue).is_some() {}
+        let ends: Vec<_> = self.threads.drain(..).map(JoinHandle::join).collect();
+        ends.into_iter().collect()
+    }
+}
+
+impl<T: Send + 'static> Iterator for Ordered<T> {
     type Item = Result<T>;
 
     /// The next result; `None` after the last one.
@@ -78,30 +126,21 @@ impl<T> Iterator for Ordered<T> {
     ///
     /// With the panic of `work`, if it panicked.
     fn next(&mut self) -> Option<Self::Item> {
-        let k = self.next;
-        match self.queues.get(k)?.recv() {
-            Ok(result) => {
-                self.next = (k + 1) % self.queues.len();
-                Some(result)
-            }
-            Err(_) => {
-                if let Some(Err(panic)) = self.threads[k].take().map(JoinHandle::join) {
-                    std::panic::resume_unwind(panic);
-                }
-                None
-            }
+        let result = self.results.pop_front()?.recv();
+        if result.is_err()
+            && let Err(panic) = self.stop()
+        {
+            std::panic::resume_unwind(panic);
         }
+        self.work_ahead();
+        result.ok()
     }
 }
 
 impl<T> Drop for Ordered<T> {
-    /// Lets every thread finish what it is at.
     fn drop(&mut self) {
-        self.queues.clear();
-        for thread in self.threads.iter_mut().filter_map(Option::take) {
-            // A panic was meant for `next`; nobody asks any more.
-            drop(thread.join());
-        }
+        // A panic was meant for `next`; nobody asks any more.
+        drop(self.stop());
     }
 }
 
@@ -122,6 +161,29 @@ mod tests {
             assert_eq!(squares, (3..60).map(|n| n * n).collect::<Vec<_>>());
         }
         assert_eq!(Ordered::new(0..0, 3, Ok).unwrap().count(), 0);
+    }
+
+    /// While one thread is at a slow item, the other makes all that may be under way.
+    #[test]
+    fn a_slow_item_holds_up_no_other_thread() {
+        let (made, seventh) = channel();
+        let (made, seventh) = (Mutex::new(made), Mutex::new(seventh));
+        let work = move |n| {
+            match n {
+                0 => {
+                    let waiting = seventh.lock().unwrap();
+                    waiting.recv_timeout(Duration::from_secs(60)).unwrap();
+                }
+                7 => made.lock().unwrap().send(()).unwrap(),
+                _ => {}
+            }
+            Ok(n)
+        };
+        let results = Ordered::new(0..20, 2, work).unwrap();
+        assert_eq!(
+            results.map(Result::unwrap).collect::<Vec<_>>(),
+            (0..20).collect::<Vec<_>>()
+        );
     }
 
     #[test]
@@ -170,7 +232,7 @@ mod tests {
         );
         std::thread::sleep(Duration::from_millis(20));
         drop(endless);
-        // Ten taken; of each thread a full queue and one result that found no room.
-        assert!(count.load(Ordering::Relaxed) <= 10 + 2 * (READY as u64 + 1));
+        // Ten taken, and those that were on their way.
+        assert!(count.load(Ordering::Relaxed) <= 10 + 2 * READY);
     }
 }

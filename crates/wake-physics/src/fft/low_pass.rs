@@ -1,6 +1,7 @@
 //! A separable low-pass filter of a complex field, sampled at every n-th pixel.
 
 use super::fast_length;
+use crate::numeric::vector::vectorized;
 use num_complex::Complex32;
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
@@ -186,15 +187,16 @@ impl LowPass {
         let count = self.bands[1].0.len();
         let keep = window.keep[0];
         let shift = self.shifts(0, window.start[0]);
-        let points: Vec<PointSpectrum> = points.iter().map(|p| self.spectrum(p)).collect();
+        let points: Vec<_> = points.par_iter().map(|p| self.spectrum(p)).collect();
         let mut lines = vec![Complex32::ZERO; count * keep];
         lines.par_chunks_mut(keep).enumerate().for_each_init(
             || {
                 let short = vec![Complex32::ZERO; rows / self.step];
                 let scratch = [scratch(analysis), scratch(synthesis)];
-                (vec![Complex32::ZERO; rows], short, scratch)
+                let sums = [(); 2].map(|()| vec![0.0; self.bands[0].0.len()]);
+                (vec![Complex32::ZERO; rows], sums, short, scratch)
             },
-            |(line, short, scratch), (b, kept)| {
+            |(line, sums, short, scratch), (b, kept)| {
                 line.fill(Complex32::ZERO);
                 for (rows, block) in line
                     .chunks_mut(BLOCK)
@@ -204,7 +206,7 @@ impl LowPass {
                     rows.copy_from_slice(values);
                 }
                 analysis.process_with_scratch(line, &mut scratch[0]);
-                self.add_points(b, &points, line);
+                self.add_points(b, &points, line, sums);
                 fold(line, &shift, short);
                 synthesis.process_with_scratch(short, &mut scratch[1]);
                 for (kept, value) in kept.iter_mut().zip(&*short) {
@@ -299,32 +301,63 @@ impl LowPass {
         };
         let columns = turns(1).zip(&self.bands[1].0);
         PointSpectrum {
-            rows: turns(0).collect(),
+            rows: turns(0).map(|t| (t.re, t.im)).unzip(),
             columns: columns.map(|(t, &w)| point.amplitude * w * t).collect(),
         }
     }
 
     /// Adds the spectra of the points to line `b` of the band.
-    fn add_points(&self, b: usize, points: &[PointSpectrum], line: &mut [Complex32]) {
-        let count = self.bands[0].0.len();
-        let [below, above] = entries(count, self.sizes[0]);
-        let split = below.len();
-        for point in points {
-            let amplitude = point.columns[b];
-            let mut add = |entries: Range<usize>, factors: &[Complex32]| {
-                for (value, factor) in line[entries].iter_mut().zip(factors) {
-                    *value += amplitude * factor;
-                }
-            };
-            add(below.clone(), &point.rows[..split]);
-            add(above.clone(), &point.rows[split..]);
+    ///
+    /// - `sums`: room for the real and the imaginary parts of the band
+    fn add_points(
+        &self,
+        b: usize,
+        points: &[PointSpectrum],
+        line: &mut [Complex32],
+        sums: &mut [Vec<f32>; 2],
+    ) {
+        if points.is_empty() {
+            return;
         }
+        let [below, above] = entries(self.bands[0].0.len(), self.sizes[0]);
+        let [re, im] = sums;
+        let places = || below.clone().chain(above.clone());
+        for ((re, im), at) in re.iter_mut().zip(im.iter_mut()).zip(places()) {
+            (*re, *im) = (line[at].re, line[at].im);
+        }
+        vectorized(
+            #[inline(always)]
+            || {
+                for PointSpectrum { rows, columns } in points {
+                    add_multiple(re, im, columns[b], rows);
+                }
+            },
+        );
+        for ((re, im), at) in re.iter().zip(im.iter()).zip(places()) {
+            line[at] = Complex32::new(*re, *im);
+        }
+    }
+}
+
+/// Adds a multiple of complex values, their real and imaginary parts apart so that the loop vectorises.
+#[inline(always)]
+fn add_multiple(
+    sum_re: &mut [f32],
+    sum_im: &mut [f32],
+    factor: Complex32,
+    (re, im): &(Vec<f32>, Vec<f32>),
+) {
+    let sums = sum_re.iter_mut().zip(sum_im);
+    for ((sum_re, sum_im), (re, im)) in sums.zip(re.iter().zip(im)) {
+        *sum_re += factor.re * re - factor.im * im;
+        *sum_im += factor.re * im + factor.im * re;
     }
 }
 
 /// Factors of the frequencies of the bands of rows and of columns.
 struct PointSpectrum {
-    rows: Vec<Complex32>,
+    /// Real parts, and imaginary parts.
+    rows: (Vec<f32>, Vec<f32>),
     columns: Vec<Complex32>,
 }
 
