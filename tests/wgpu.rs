@@ -48,6 +48,14 @@ fn smallest(class: &str) -> (PathBuf, Golden) {
     (path, golden)
 }
 
+/// By its name the default device is there; the hundredth GPU is not, which is an error before anything uses it.
+#[test]
+fn a_gpu_that_is_not_there_is_an_error() {
+    assert_eq!(wake_nn::device_named("wgpu").unwrap(), device());
+    let error = wake_nn::device_named("wgpu:99").unwrap_err().to_string();
+    assert!(error.contains("'wgpu:99' on this machine"), "{error}");
+}
+
 #[test]
 fn the_u_net_agrees_with_torch() {
     let device = device();

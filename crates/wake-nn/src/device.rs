@@ -1,6 +1,10 @@
 //! Devices by the names that a command line or a settings file gives them.
 
 use burn::tensor::Device;
+#[cfg(feature = "wgpu")]
+use burn::tensor::DeviceKind;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+use burn::tensor::DeviceType;
 
 use crate::error::{Error, Result};
 
@@ -19,8 +23,7 @@ const BACKENDS: &[&str] = &[
 /// The device of a name: `flex`, `ndarray`, `wgpu` or `cuda`, where that feature is on.
 ///
 /// A GPU's number may follow, as in `cuda:1`: CUDA's own number, or that of a discrete GPU for `wgpu`. Without a
-/// number, `cuda` is `cuda:0` and `wgpu` is the GPU that burn chooses. Whether the GPU is there shows when it is
-/// first used.
+/// number, `cuda` is `cuda:0` and `wgpu` is the GPU that burn chooses.
 ///
 /// ```
 /// let device = wake_nn::device_named("flex")?;
@@ -29,7 +32,7 @@ const BACKENDS: &[&str] = &[
 ///
 /// # Errors
 ///
-/// [`Error::UnknownDevice`] with the names that this build knows.
+/// [`Error::UnknownDevice`] with the names that this build knows; [`Error::NoDevice`] if this machine has no such GPU.
 pub fn device_named(name: &str) -> Result<Device> {
     let unknown = || Error::UnknownDevice {
         name: name.to_owned(),
@@ -46,12 +49,40 @@ pub fn device_named(name: &str) -> Result<Device> {
         #[allow(deprecated, reason = "kept until burn drops it")]
         ("ndarray", None | Some(0)) => Ok(Device::ndarray()),
         #[cfg(feature = "wgpu")]
-        ("wgpu", None) => Ok(Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)),
+        ("wgpu", None) => {
+            let found = Device::enumerate(DeviceType::Wgpu);
+            there(name, found.len(), !found.is_empty())?;
+            Ok(Device::wgpu(DeviceKind::DefaultDevice))
+        }
         #[cfg(feature = "wgpu")]
-        ("wgpu", Some(number)) => Ok(Device::wgpu(burn::tensor::DeviceKind::DiscreteGpu(number))),
+        ("wgpu", Some(number)) => {
+            let device = Device::wgpu(DeviceKind::DiscreteGpu(number));
+            let found = Device::enumerate(DeviceType::Wgpu);
+            there(name, found.len(), found.iter().any(|one| *one == device))?;
+            Ok(device)
+        }
         #[cfg(feature = "cuda")]
-        ("cuda", number) => Ok(Device::cuda(number.unwrap_or(0))),
+        ("cuda", number) => {
+            let device = Device::cuda(number.unwrap_or(0));
+            let found = Device::enumerate(DeviceType::Cuda);
+            there(name, found.len(), found.iter().any(|one| *one == device))?;
+            Ok(device)
+        }
         _ => Err(unknown()),
+    }
+}
+
+/// An error where this machine lacks a GPU: to use it would panic.
+///
+/// - `found`: devices that the backend has here
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+fn there(name: &str, found: usize, is_there: bool) -> Result<()> {
+    match is_there {
+        true => Ok(()),
+        false => Err(Error::NoDevice {
+            name: name.to_owned(),
+            found,
+        }),
     }
 }
 

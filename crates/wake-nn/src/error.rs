@@ -107,6 +107,17 @@ pub enum Error {
         compiled: Vec<&'static str>,
     },
 
+    /// The backend is compiled in, but this machine lacks the device.
+    #[error(
+        "there is no device '{}' on this machine, where its backend finds {found}; install the driver, or use flex",
+        quoted(name)
+    )]
+    NoDevice {
+        name: String,
+        /// Devices that the backend finds.
+        found: usize,
+    },
+
     /// A model's numbers have overflowed, or are none.
     #[error("{what} holds numbers that are not finite: the weights do not fit, or are damaged")]
     NotFinite { what: String },
@@ -272,8 +283,12 @@ mod tests {
                 mismatch: Box::new(mismatch),
             },
             Error::UnknownDevice {
-                name: foreign,
+                name: foreign.clone(),
                 compiled: vec!["flex"],
+            },
+            Error::NoDevice {
+                name: foreign,
+                found: 0,
             },
         ];
         for error in errors {

@@ -114,6 +114,7 @@ impl From<wake_nn::Error> for Fault {
             #[cfg(feature = "models")]
             E::UnsupportedPrecision { .. }
             | E::UnknownDevice { .. }
+            | E::NoDevice { .. }
             | E::NotFinite { .. }
             | E::WrongNumbers { .. } => ModelError::new_err(text),
             _ => WeightsError::new_err(text),

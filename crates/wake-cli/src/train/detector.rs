@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use wake_train::detector::{DetectorTraining, ImageRecipe, LabelledImages};
+use wake_train::detector::{DetectorTraining, ImageRecipe, LabelledImages, TrainingImages};
 
 use super::options::{Pace, Place, Thrift};
 use super::screen::Screen;
@@ -51,17 +51,28 @@ pub(crate) struct Options {
     thrift: Thrift,
 }
 
+impl Options {
+    /// What is learnt from; the options exclude one another.
+    fn images(&self) -> TrainingImages {
+        match (&self.labelled, &self.data) {
+            (Some(folder), _) => TrainingImages::Labelled(LabelledImages {
+                folder: folder.clone(),
+                without: self.without.clone(),
+                count: self.tiles.map(|count| count as usize),
+            }),
+            (None, Some(folder)) => TrainingImages::Data(folder.clone()),
+            (None, None) => TrainingImages::Recipe {
+                recipe: self.recipe,
+                distinct: self.distinct.map(|count| count as usize),
+            },
+        }
+    }
+}
+
 /// Trains, and writes `detector.safetensors` (averaged weights) and what every run leaves in its folder.
 pub(crate) fn run(options: &Options) -> Outcome<()> {
     let training = DetectorTraining {
-        recipe: options.recipe,
-        labelled: options.labelled.as_ref().map(|folder| LabelledImages {
-            folder: folder.clone(),
-            without: options.without.clone(),
-            count: options.tiles.map(|count| count as usize),
-        }),
-        data: options.data.clone(),
-        distinct: options.distinct.map(|count| count as usize),
+        images: options.images(),
         weights: options.weights.clone(),
         options: options.place.paced(&options.pace, &options.thrift)?,
     };

@@ -24,4 +24,4 @@ pub use recipes::ImageRecipe;
 pub use repeated::Repeated;
 pub use sample::Sample;
 pub use targets::FOUND;
-pub use training::{DetectorBatch, DetectorTask, DetectorTraining};
+pub use training::{DetectorBatch, DetectorTask, DetectorTraining, TrainingImages};

@@ -111,17 +111,36 @@ impl Task<Network> for DetectorTask {
     }
 }
 
-/// Training of a detector on images made on the fly, or of a data set.
+/// What a detector learns from.
+#[derive(Debug, Clone)]
+pub enum TrainingImages {
+    /// Images made on the fly.
+    Recipe {
+        /// Recipe of the images.
+        recipe: ImageRecipe,
+        /// Different images, which come again when all were seen; `None`: all are different.
+        distinct: Option<usize>,
+    },
+    /// The training pairs of a folder that `wake dataset` made.
+    Data(PathBuf),
+    /// A few labelled images.
+    Labelled(LabelledImages),
+}
+
+impl Default for TrainingImages {
+    fn default() -> Self {
+        Self::Recipe {
+            recipe: ImageRecipe::default(),
+            distinct: None,
+        }
+    }
+}
+
+/// Training of a detector.
 #[derive(Debug, Clone, Default)]
 pub struct DetectorTraining {
-    /// Recipe of the images.
-    pub recipe: ImageRecipe,
-    /// Labelled images instead of those of the recipe.
-    pub labelled: Option<LabelledImages>,
-    /// Folder of a data set of `wake dataset`, whose training pairs are learnt from instead of a recipe.
-    pub data: Option<PathBuf>,
-    /// Different images, which come again when all were seen; `None`: all are different.
-    pub distinct: Option<usize>,
+    /// What it learns from.
+    pub images: TrainingImages,
     /// Weights to begin with; `None`: random ones.
     pub weights: Option<PathBuf>,
     /// Options of the run.
@@ -140,20 +159,9 @@ impl DetectorTraining {
     /// [`wake_detector::Error::WrongMaps`] for first weights as [`Detector::load`](wake_detector::Detector::load).
     pub fn train(&self, out: &Path, progress: &dyn Fn(Progress)) -> Result<()> {
         let options = &self.options;
-        let data = self.data.as_deref();
-        let data = data.map(|folder| TrainingData::open(folder, options.seed, SIZE));
-        let data = data.transpose()?;
-        let constants = self.constants(data.as_ref())?;
-        let device = options.device();
-        let source: Arc<dyn Source> = match (&self.labelled, data) {
-            (Some(images), _) => Arc::new(labelled::source(images, options.seed, SIZE)?),
-            (None, Some(data)) => Arc::new(data),
-            (None, None) => self.recipe.source(options.seed, SIZE, &device)?,
-        };
-        let source: Arc<dyn Source> = match self.distinct {
-            Some(count) => Arc::new(Repeated::new(source, count)),
-            None => source,
-        };
+        let mut constants = self.constants()?;
+        let (source, images) = self.images.source(options)?;
+        constants.identity["images"] = images;
         let task = DetectorTask::new(source, options.seed);
         let devices = options.learning_devices()?;
         let begun = match &self.weights {
@@ -190,7 +198,7 @@ impl DetectorTraining {
     }
 
     /// The run, checked before anything is made.
-    fn constants(&self, data: Option<&TrainingData>) -> Result<RunOptions> {
+    fn constants(&self) -> Result<RunOptions> {
         let mut constants = self.options.run(&DEFAULTS, Value::Null);
         let trainer = &mut constants.trainer;
         trainer.rate.warmup = trainer.rate.warmup.min(trainer.rate.steps);
@@ -199,15 +207,35 @@ impl DetectorTraining {
         trainer.ema_decay = 0.995;
         constants.validate(self.options.devices.len())?;
         let weights = self.weights.as_deref().map(fingerprint).transpose()?;
-        constants.identity = json!({
-            "recipe": self.recipe.name(), "distinct": self.distinct, "weights": weights,
-        });
-        if let Some(data) = data {
-            constants.identity["data"] = data.identity();
-        }
-        if let Some(LabelledImages { without, count, .. }) = &self.labelled {
-            constants.identity["labelled"] = json!({"without": without, "count": count});
-        }
+        constants.identity = json!({"weights": weights});
         Ok(constants)
+    }
+}
+
+impl TrainingImages {
+    /// The pairs, and what a run notes of them.
+    fn source(&self, options: &StageOptions) -> Result<(Arc<dyn Source>, Value)> {
+        let seed = options.seed;
+        Ok(match self {
+            Self::Recipe { recipe, distinct } => {
+                let source = recipe.source(seed, SIZE, &options.device())?;
+                let source: Arc<dyn Source> = match distinct {
+                    Some(count) => Arc::new(Repeated::new(source, *count)),
+                    None => source,
+                };
+                let noted = json!({"recipe": recipe.name(), "distinct": distinct});
+                (source, noted)
+            }
+            Self::Data(folder) => {
+                let data = TrainingData::open(folder, seed, SIZE)?;
+                let noted = json!({"data": data.identity()});
+                (Arc::new(data), noted)
+            }
+            Self::Labelled(images) => {
+                let LabelledImages { without, count, .. } = images;
+                let noted = json!({"labelled": {"without": without, "count": count}});
+                (Arc::new(labelled::source(images, seed, SIZE)?), noted)
+            }
+        })
     }
 }
