@@ -24,15 +24,19 @@ const BESIDE: [i32; 2] = [7, 16];
 /// The line begins behind the ship, after a quarter of its length within these bounds \[pixels\]: the echo may lie on the first part,
 /// and the waves beside the ship displace what is seen of it.
 const BEHIND: [f32; 2] = [10.0, 40.0];
-/// No more of it is looked at \[pixels\].
-const LONGEST: f32 = 240.0;
-/// A contrast of fewer standard deviations is none.
-const CLEAR: f64 = 4.0;
+/// Ends of the part of the line that is fitted \[pixels\]: the part that stands out most tells the axis. Longer parts tell it better, shorter
+/// ones that of a line that fades or bends.
+const ENDS: [i32; 4] = [120, 240, 480, 720];
+const LONGEST: f32 = 720.0;
+/// A contrast of fewer standard deviations is none: the largest of all places, turns and ends reaches four in a sea without wakes.
+const CLEAR: f64 = 5.0;
 /// Pixels brighter than the median of all around by this factor are of an echo.
 const ECHO: f64 = 5.0;
 /// How far the line may lie from where it was found, and by which angle it may be turned: pixels and degrees, in steps.
-const ASIDE: i32 = 8;
-const TURN: [f32; 2] = [2.5, 0.5];
+const ASIDE: i32 = 10;
+const TURN: [f32; 2] = [8.0, 0.5];
+/// Distance from the axis as found to the axis turned, as a share of the distance from the tip: more than the sine of the largest turn.
+const SPREAD: f32 = 0.15;
 /// Lines parallel to a wake are summed up to this distance from it \[pixels\].
 const FARTHEST: i32 = ASIDE + BESIDE[1];
 /// A bright line counts less by this factor where a dark one is near it.
@@ -73,8 +77,8 @@ impl Contrast {
 impl Surroundings {
     /// Reads the pixels around a wake; `None` where they cannot be read.
     pub(crate) fn of(product: &Product, wake: &Wake) -> Option<Self> {
-        let margin = FARTHEST as f32 + 0.1 * LONGEST;
-        let ends = [wake.at(0.0), wake.at(wake.length.min(LONGEST))];
+        let margin = FARTHEST as f32 + SPREAD * LONGEST;
+        let ends = [wake.at(0.0), wake.at(LONGEST)];
         let size = [product.size().1, product.size().0];
         let [columns, rows] = [0, 1].map(|axis| {
             let [a, b] = [ends[0][axis], ends[1][axis]];
@@ -128,32 +132,37 @@ impl Surroundings {
         (power <= self.brightest).then_some(power)
     }
 
-    /// Sums along the lines parallel to a wake, from [`FARTHEST`] pixels to its left to as many to its right, beginning behind the
-    /// ship.
-    fn lines(&self, wake: &Wake) -> Vec<Sums> {
+    /// Sums along the lines parallel to a wake, from [`FARTHEST`] pixels to its left to as many to its right, from behind the
+    /// ship to each of [`ENDS`].
+    fn lines(&self, wake: &Wake) -> [Vec<Sums>; ENDS.len()] {
         let [right, down] = wake.direction();
-        let length = wake.length.min(LONGEST);
-        let behind = (0.25 * length).clamp(BEHIND[0], BEHIND[1]);
-        let steps = (length - behind).max(0.0) as i32;
-        let line = |across: i32| {
+        let behind = (0.25 * wake.length).clamp(BEHIND[0], BEHIND[1]);
+        let mut lines = ENDS.map(|_| Vec::with_capacity(2 * FARTHEST as usize + 1));
+        for across in -FARTHEST..=FARTHEST {
             let mut sums = Sums::default();
-            for step in 0..steps {
-                let [x, y] = wake.at(behind + step as f32);
-                let at = [x - across as f32 * down, y + across as f32 * right];
-                if let Some(power) = self.power(at) {
-                    sums.add(power);
+            let mut from = behind as i32;
+            for (lines, end) in lines.iter_mut().zip(ENDS) {
+                for along in from..end {
+                    let [x, y] = wake.at(along as f32);
+                    let at = [x - across as f32 * down, y + across as f32 * right];
+                    if let Some(power) = self.power(at) {
+                        sums.add(power);
+                    }
                 }
+                from = end;
+                lines.push(sums);
             }
-            sums
-        };
-        (-FARTHEST..=FARTHEST).map(line).collect()
+        }
+        lines
     }
 
     /// The wake with its axis on the line that stands out most near where it was found; as it was, where none does.
     ///
     /// The dark line is the axis, though a bright edge beside it may stand out more.
     pub(crate) fn refined(&self, wake: &Wake) -> (Wake, Option<Contrast>) {
-        let as_found = contrast(&self.lines(wake), 0);
+        let lines = self.lines(wake);
+        let as_found = lines.iter().filter_map(|lines| contrast(lines, 0));
+        let as_found = as_found.max_by(|a, b| a.deviations.abs().total_cmp(&b.deviations.abs()));
         let mut best: Option<(f64, Wake, Contrast)> = None;
         let turns = (TURN[0] / TURN[1]) as i32;
         for turn in -turns..=turns {
@@ -163,8 +172,9 @@ impl Surroundings {
             };
             let lines = self.lines(&turned);
             let [right, down] = turned.direction();
-            for aside in -ASIDE..=ASIDE {
-                let Some(found) = contrast(&lines, aside) else {
+            let places = (-ASIDE..=ASIDE).flat_map(|aside| lines.iter().map(move |l| (aside, l)));
+            for (aside, lines) in places {
+                let Some(found) = contrast(lines, aside) else {
                     continue;
                 };
                 let weight = if found.deviations < 0.0 { 1.0 } else { BRIGHT };
@@ -230,4 +240,113 @@ fn contrast(lines: &[Sums], aside: i32) -> Option<Contrast> {
         ratio,
         deviations: (ratio - 1.0) / deviation,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::rngs::StdRng;
+    use rand::{RngExt, SeedableRng};
+
+    const SIDE: usize = 900;
+
+    /// Sea of four looks, two pixels to a cell of resolution, times the brightness at each place.
+    fn sea(seed: u64, brightness: impl Fn([f32; 2]) -> f32) -> Surroundings {
+        let mut random = StdRng::seed_from_u64(seed);
+        let mut look = || -(1.0 - random.random::<f32>()).ln() / 4.0;
+        let cells: Vec<f32> = (0..SIDE * SIDE / 4)
+            .map(|_| (0..4).map(|_| look()).sum())
+            .collect();
+        let value = |n: usize| {
+            let (row, column) = (n / SIDE, n % SIDE);
+            cells[row / 2 * (SIDE / 2) + column / 2] * brightness([column as f32, row as f32])
+        };
+        Surroundings {
+            window: Window {
+                lines: SIDE,
+                pixels: SIDE,
+                values: (0..SIDE * SIDE).map(value).collect(),
+                ..Window::default()
+            },
+            rows: 0..SIDE,
+            columns: 0..SIDE,
+            of_amplitudes: false,
+            brightest: ECHO,
+        }
+    }
+
+    fn wake(tip: [f32; 2], axis_deg: f32, length: f32) -> Wake {
+        Wake {
+            tip,
+            axis_deg,
+            half_angle_deg: 10.0,
+            length,
+            snr: f32::INFINITY,
+            contrast_db: None,
+        }
+    }
+
+    /// Distance of a place from the axis of a wake, and whether it is astern of the tip.
+    fn off(wake: &Wake, [x, y]: [f32; 2]) -> (f32, bool) {
+        let [right, down] = wake.direction();
+        let from = [x - wake.tip[0], y - wake.tip[1]];
+        (
+            (from[1] * right - from[0] * down).abs(),
+            from[0] * right + from[1] * down > 0.0,
+        )
+    }
+
+    fn on(wake: &Wake, at: [f32; 2]) -> bool {
+        let (across, astern) = off(wake, at);
+        astern && across < 2.5
+    }
+
+    /// A short detection, six degrees off and four pixels aside, beside the wake that it crosses: its axis becomes that of the dark line, to half a
+    /// step of the angle and the line's half-width.
+    #[test]
+    fn the_axis_is_that_of_the_long_line() {
+        let truth = wake([150.0, 120.0], 130.0, 720.0);
+        let other = wake([60.0, 150.0], 95.0, 720.0);
+        let pixels = sea(5, |at| {
+            if on(&truth, at) || on(&other, at) {
+                0.75
+            } else {
+                1.0
+            }
+        });
+        let found = wake([147.0, 123.0], 136.0, 50.0);
+        let (line, contrast) = pixels.refined(&found);
+        assert_eq!(contrast.map(Contrast::kind), Some(Kind::DarkLine));
+        assert!((line.axis_deg - 130.0).abs() <= 0.5, "{line:?}");
+        assert!(off(&truth, line.tip).0 < 2.5, "{line:?}");
+        assert!((line.length - 50.0).abs() < 1e-6);
+    }
+
+    /// The track of a ship that turns, of 2,000 pixels' radius, is followed along its first part: no more than half the turn over 240 pixels off.
+    #[test]
+    fn the_axis_of_a_bent_line_is_that_of_its_first_part() {
+        let centre = [150.0, 120.0 + 2000.0];
+        let pixels = sea(6, |[x, y]| {
+            let radius = (x - centre[0]).hypot(y - centre[1]);
+            let dark = x > 150.0 && (radius - 2000.0).abs() < 2.5;
+            if dark { 0.7 } else { 1.0 }
+        });
+        let (line, contrast) = pixels.refined(&wake([150.0, 120.0], 90.0, 200.0));
+        assert_eq!(contrast.map(Contrast::kind), Some(Kind::DarkLine));
+        // 240 pixels turn by 6.9 degrees.
+        let turned = line.axis_deg - 90.0;
+        assert!((-0.5..4.0).contains(&turned), "{line:?}");
+    }
+
+    /// Where there is only sea, a detection stays where it is.
+    #[test]
+    fn without_a_line_nothing_moves() {
+        for seed in 0..4 {
+            let pixels = sea(seed, |_| 1.0);
+            let found = wake([300.0, 300.0], 45.0 + 90.0 * seed as f32, 100.0);
+            let (line, contrast) = pixels.refined(&found);
+            assert_eq!(line, found);
+            assert_eq!(contrast.map(Contrast::kind), Some(Kind::Arms));
+        }
+    }
 }

@@ -18,6 +18,8 @@ pub(crate) struct Seen {
 
 /// The tip of a wake moves no farther along its axis, to where the echo says that the stern is \[pixels\].
 const FARTHEST: f64 = 60.0;
+/// The length that the detector measured is that of a line turned by at most this angle \[degrees\].
+const MEASURED: f32 = 3.0;
 /// Echoes closer than this are one \[pixels\], and wakes that lead to it one if their axes differ by less \[degrees\].
 const SAME_ECHO: f64 = 6.0;
 const SAME_AXIS: f32 = 30.0;
@@ -28,21 +30,24 @@ const OFF: f32 = 12.0;
 const SPREAD: f32 = 0.03;
 const TURNED: f32 = 8.0;
 /// A line without an echo that ends this close to the tip of a surer wake leads to that ship, not from another one \[pixels\], if its axis
-/// differs by less \[degrees\]: arms seen together with what lies ahead of the bow.
+/// differs by less \[degrees\]: arms, 19.5 degrees off the axis, seen together with what lies ahead of the bow.
 const AT_TIP: f32 = 25.0;
-const AHEAD: f32 = 15.0;
+const AHEAD: f32 = 23.0;
 
 impl Seen {
     pub(crate) fn of(product: &Product, one: &Detection) -> Self {
-        // The detector sees the wake as a whole, and knows its direction best; where the line lies beside the ship, pixels do.
         let (line, measured) = match Surroundings::of(product, &one.wake) {
             Some(pixels) => pixels.refined(&one.wake),
             None => (one.wake, None),
         };
         let is_clear = measured.is_some_and(|contrast| contrast.kind() != Kind::Arms);
         let echo = echo(product, &line, is_clear);
+        let mut detection = *one;
+        if turn(&one.wake, &line) > MEASURED {
+            detection.extent = None;
+        }
         Self {
-            detection: *one,
+            detection,
             wake: placed(&one.wake, &line, echo.and_then(|echo| echo.ship)),
             measured,
             echo,
@@ -65,11 +70,11 @@ impl Seen {
 
     /// Whether another detection, which is less sure, is of the same wake.
     fn is_again(&self, other: &Self) -> bool {
-        let turn = (other.wake.axis_deg - self.wake.axis_deg + 180.0).rem_euclid(360.0) - 180.0;
+        let turn = turn(&self.wake, &other.wake);
         match (&self.echo, &other.echo) {
             (Some(a), Some(b)) => {
                 let away = (a.line - b.line).hypot(a.pixel - b.pixel);
-                away < SAME_ECHO && turn.abs() < SAME_AXIS
+                away < SAME_ECHO && turn < SAME_AXIS
             }
             (_, Some(_)) => false,
             (_, None) => {
@@ -78,20 +83,26 @@ impl Seen {
                 let (along, across) = (x * right + y * down, y * right - x * down);
                 let astern = (0.0..ASTERN).contains(&along)
                     && across.abs() < OFF + SPREAD * along
-                    && turn.abs() < TURNED;
+                    && turn < TURNED;
                 let end = other.wake.at(other.wake.length);
                 let from_tip = (end[0] - self.wake.tip[0]).hypot(end[1] - self.wake.tip[1]);
-                astern || (from_tip < AT_TIP && turn.abs() < AHEAD)
+                astern || (from_tip < AT_TIP && turn < AHEAD)
             }
         }
     }
 }
 
+/// Angle between the axes of two wakes \[degrees\].
+fn turn(a: &Wake, b: &Wake) -> f32 {
+    ((b.axis_deg - a.axis_deg + 180.0).rem_euclid(360.0) - 180.0).abs()
+}
+
 /// A wake that was found, on its line as the pixels have it, and beginning at the stern of the ship where its echo says where
-/// that is; its end stays.
+/// that is; its length changes by as much.
 fn placed(found: &Wake, line: &Wake, ship: Option<ShipOnAxis>) -> Wake {
     let mut placed = Wake {
         tip: line.tip,
+        axis_deg: line.axis_deg,
         ..*found
     };
     let Some(ship) = ship else { return placed };
