@@ -79,15 +79,15 @@ fn picture(path: &Path, bounds: &[f64]) -> Outcome<()> {
             .caption(format!("{}, {} m", sensor.0, sensor.1), ("sans-serif", 15))
             .x_label_area_size(34)
             .y_label_area_size(36)
-            .build_cartesian_2d(-22.5..202.5, 2.0..12.0)?;
+            .build_cartesian_2d(-0.5..HEADINGS.len() as f64 - 0.5, 2.0..12.0)?;
         chart
             .configure_mesh()
             .disable_mesh()
-            .x_labels(10)
+            .x_labels(HEADINGS.len())
             .y_labels(6)
-            .x_label_formatter(&|heading| match heading % 45.0 {
-                0.0 => format!("{heading:.0}"),
-                _ => String::new(),
+            .x_label_formatter(&|column| {
+                let heading = HEADINGS.get(column.round().max(0.0) as usize);
+                heading.map_or(String::new(), |heading| format!("{heading:.0}"))
             })
             .y_label_formatter(&|wind| format!("{wind:.0}"))
             .x_desc("heading [deg]")
@@ -96,24 +96,21 @@ fn picture(path: &Path, bounds: &[f64]) -> Outcome<()> {
         let cells = bounds.iter().enumerate();
         let cells: Vec<(f64, f64, f64)> = cells
             .map(|(n, &bound)| {
-                (
-                    HEADINGS[n % HEADINGS.len()],
-                    WINDS[n / HEADINGS.len()],
-                    bound,
-                )
+                let column = (n % HEADINGS.len()) as f64;
+                (column, WINDS[n / HEADINGS.len()], bound)
             })
             .collect();
-        chart.draw_series(cells.iter().map(|&(heading, wind, bound)| {
-            let corners = [(heading - 22.5, wind - 1.0), (heading + 22.5, wind + 1.0)];
+        chart.draw_series(cells.iter().map(|&(column, wind, bound)| {
+            let corners = [(column - 0.5, wind - 1.0), (column + 0.5, wind + 1.0)];
             Rectangle::new(corners, colour(bound).filled())
         }))?;
-        chart.draw_series(cells.iter().map(|&(heading, wind, bound)| {
+        chart.draw_series(cells.iter().map(|&(column, wind, bound)| {
             let style = ("sans-serif", 11).into_font().color(&ink(bound));
             let anchored = style.pos(plotters::style::text_anchor::Pos::new(
                 plotters::style::text_anchor::HPos::Center,
                 plotters::style::text_anchor::VPos::Center,
             ));
-            Text::new(number(bound), (heading, wind), anchored)
+            Text::new(number(bound), (column, wind), anchored)
         }))?;
     }
     if let Some(last) = panels.last() {
@@ -189,6 +186,10 @@ mod tests {
             assert!(drawn.contains(sensor), "{sensor}");
         }
         assert!(drawn.contains("0.001") && drawn.contains("0.17"));
+        for heading in ["0", "45", "90", "135", "180"] {
+            let labels = drawn.matches(&format!("\n{heading}\n")).count();
+            assert_eq!(labels, SENSORS.len(), "{heading}");
+        }
     }
 
     /// Scenes of all cells are valid.
