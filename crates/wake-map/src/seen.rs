@@ -23,8 +23,8 @@ const MEASURED: f32 = 3.0;
 /// Echoes closer than this are one \[pixels\], and wakes that lead to it one if their axes differ by less \[degrees\].
 const SAME_ECHO: f64 = 6.0;
 const SAME_AXIS: f32 = 30.0;
-/// A wake without an echo is the later part of a surer one whose axis it lies on: so far astern of the tip, so far off the axis, and
-/// by this share of the distance farther \[pixels\], and turned by less \[degrees\].
+/// A wake without an echo is the later part of a surer one whose axis it lies on, also if tip and end are taken for each other: so far astern
+/// of the tip, so far off the axis, and by this share of the distance farther \[pixels\], and turned by less \[degrees\].
 const ASTERN: f32 = 600.0;
 const OFF: f32 = 12.0;
 const SPREAD: f32 = 0.03;
@@ -83,7 +83,7 @@ impl Seen {
                 let (along, across) = (x * right + y * down, y * right - x * down);
                 let astern = (0.0..ASTERN).contains(&along)
                     && across.abs() < OFF + SPREAD * along
-                    && turn < TURNED;
+                    && turn.min(180.0 - turn) < TURNED;
                 let end = other.wake.at(other.wake.length);
                 let from_tip = (end[0] - self.wake.tip[0]).hypot(end[1] - self.wake.tip[1]);
                 astern || (from_tip < AT_TIP && turn < AHEAD)
@@ -127,9 +127,10 @@ pub(crate) fn one_a_ship(seen: Vec<Seen>) -> Vec<Seen> {
             Some(surer) => {
                 let wake = &mut surer.wake;
                 let [right, down] = wake.direction();
-                let [x, y] = one.wake.at(one.wake.length);
-                let end = (x - wake.tip[0]) * right + (y - wake.tip[1]) * down;
-                wake.length = wake.length.max(end.min(ASTERN));
+                for [x, y] in [one.wake.tip, one.wake.at(one.wake.length)] {
+                    let along = (x - wake.tip[0]) * right + (y - wake.tip[1]) * down;
+                    wake.length = wake.length.max(along.min(ASTERN));
+                }
             }
         }
     }
@@ -171,7 +172,7 @@ mod tests {
         }
     }
 
-    /// A wake to the right from (500, 500): a detection of its later part makes it longer, one that leads to its echo and one
+    /// A wake to the right from (500, 500): a detection of its later part makes it longer, one of it in reverse, one that leads to its echo and one
     /// that ends at its tip go; a wake beside it, one across it, and one with an echo of its own are of other ships.
     #[test]
     fn a_ship_has_one_wake() {
@@ -179,6 +180,7 @@ mod tests {
         let first = seen(0.9, [500.0, 500.0], 90.0, echo);
         let later = seen(0.5, [760.0, 512.0], 93.0, None);
         let again = seen(0.4, [510.0, 503.0], 78.0, Some([506.0, 558.0]));
+        let reversed = seen(0.45, [700.0, 505.0], 266.0, None);
         let ahead = seen(0.35, [402.0, 505.0], 95.0, None);
         let others = [
             seen(0.8, [760.0, 560.0], 90.0, None),
@@ -187,7 +189,7 @@ mod tests {
             seen(0.3, [510.0, 503.0], 200.0, echo),
             seen(0.2, [440.0, 500.0], 90.0, None),
         ];
-        let mut all = vec![first, later, again, ahead];
+        let mut all = vec![first, later, again, ahead, reversed];
         all.extend(others);
         all.sort_by(|a, b| b.detection.score.total_cmp(&a.detection.score));
         let kept = one_a_ship(all);
