@@ -75,7 +75,7 @@ fn estimates_are_compared_with_the_truth() {
     ];
     let printed = done("evaluate", &arguments, &out);
     assert!(
-        printed.contains("paper's ranges") && printed.contains("1 images"),
+        printed.contains("paper's ranges") && printed.contains("| paper | 1 | "),
         "{printed}"
     );
     assert_eq!(names(&out), ["estimates.jsonl", "report.json", "report.md"]);

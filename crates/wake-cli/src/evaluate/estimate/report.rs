@@ -217,9 +217,11 @@ impl Figures {
         let _ = writeln!(text, "\n## {}\n\n{}.", self.set, sentence(self.about));
         let has_table = self.identifiable >= FEWEST && !self.rows.is_empty();
         if has_table {
-            text.push_str(
-                "\n| value | median error | 90th percentile | within 1, 2, 3 deviations | squared error over bound | deviation over bound | ranks |\n\
-                 | --- | --- | --- | --- | --- | --- | --- |\n",
+            let _ = writeln!(
+                text,
+                "\n| {} | median error | 90th percentile | within 1, 2, 3 deviations | squared error over bound | deviation over bound | ranks |\n\
+                 | --- | --- | --- | --- | --- | --- | --- |",
+                self.set
             );
         }
         for row in self.rows.iter().filter(|_| has_table) {
@@ -242,7 +244,11 @@ impl Figures {
             );
         }
         if self.rows.len() > 1 && self.images >= FEWEST {
-            text.push_str("\n| beside | given | median error | 90th percentile |\n| --- | --- | --- | --- |\n");
+            let _ = writeln!(
+                text,
+                "\n| {}, without the estimate | given | median error | 90th percentile |\n| --- | --- | --- | --- |",
+                self.set
+            );
             let beside = [
                 ("heading, `measure`", &self.measured[0], "deg"),
                 ("speed, `measure`", &self.measured[1], "m/s"),
