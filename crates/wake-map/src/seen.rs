@@ -42,12 +42,8 @@ impl Seen {
         };
         let is_clear = measured.is_some_and(|contrast| contrast.kind() != Kind::Arms);
         let echo = echo(product, &line, is_clear);
-        let mut detection = *one;
-        if turn(&one.wake, &line) > MEASURED {
-            detection.extent = None;
-        }
         Self {
-            detection,
+            detection: measured_along(*one, &line),
             wake: placed(&one.wake, &line, echo.and_then(|echo| echo.ship)),
             measured,
             echo,
@@ -90,6 +86,14 @@ impl Seen {
             }
         }
     }
+}
+
+/// A detection without its measured length, if the line is turned too far against the axis of that measurement.
+fn measured_along(mut detection: Detection, line: &Wake) -> Detection {
+    if turn(&detection.wake, line) > MEASURED {
+        detection.extent = None;
+    }
+    detection
 }
 
 /// Angle between the axes of two wakes \[degrees\].
@@ -221,6 +225,20 @@ mod tests {
         let visible = one.visible();
         assert!((visible.at(visible.length)[0] - 730.0).abs() < 1e-3);
         assert!((one.detection.measured().wake.length - 250.0).abs() < 1e-6);
+    }
+
+    /// A length is that of its axis: two degrees beside it, across north too, but not four.
+    #[test]
+    fn a_turned_wake_has_another_length() {
+        let mut one = Detection::new(0.9, wake([480.0, 500.0], 1.0));
+        one.extent = Some(wake_detector::Extent {
+            length: 250.0,
+            deviation: 20.0,
+        });
+        for (axis, kept) in [(359.0, true), (3.0, true), (357.0, false), (5.0, false)] {
+            let measured = measured_along(one, &wake([480.0, 500.0], axis));
+            assert_eq!(measured.extent.is_some(), kept, "{axis}");
+        }
     }
 
     /// A line to the right that was found 5 pixels too high and 20 ahead of a ship of 30 pixels: its wake begins at the stern, and
