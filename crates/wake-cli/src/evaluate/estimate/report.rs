@@ -197,16 +197,19 @@ impl Figures {
 
     /// The line of the set.
     fn summarise(&self, text: &mut String) {
-        let of = |quantity| shown(self.row(quantity).and_then(|row| row.median));
+        let of = |quantity, unit| match self.row(quantity).and_then(|row| row.median) {
+            Some(median) => format!("{} {unit}", shown(Some(median))),
+            None => "–".to_owned(),
+        };
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {} m/s | {} degrees | {:.2} | {:.0} |",
+            "| {} | {} | {} | {} | {} | {} | {:.2} | {:.0} |",
             self.set,
             self.images,
             self.identifiable,
             self.wrong,
-            of("speed"),
-            of("heading"),
+            of("speed", "m/s"),
+            of("heading", "degrees"),
             self.misfit,
             self.seconds
         );
@@ -243,15 +246,15 @@ impl Figures {
                 ranks.join(" ")
             );
         }
-        if self.rows.len() > 1 && self.images >= FEWEST {
+        if self.rows.len() > 1 && has_table {
             let _ = writeln!(
                 text,
                 "\n| {}, without the estimate | given | median error | 90th percentile |\n| --- | --- | --- | --- |",
                 self.set
             );
             let beside = [
-                ("heading, `measure`", &self.measured[0], "deg"),
-                ("speed, `measure`", &self.measured[1], "m/s"),
+                ("measured heading", &self.measured[0], "deg"),
+                ("measured speed", &self.measured[1], "m/s"),
                 ("heading of the sighting", &self.guessed[0], "deg"),
                 ("speed always 9 m/s", &self.guessed[1], "m/s"),
             ];
