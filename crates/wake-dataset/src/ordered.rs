@@ -163,18 +163,18 @@ mod tests {
         assert_eq!(Ordered::new(0..0, 3, Ok).unwrap().count(), 0);
     }
 
-    /// While one thread is at a slow item, the other makes all that may be under way.
+    /// While one thread is at item 0, the other makes the even items too: 6 ends the wait.
     #[test]
     fn a_slow_item_holds_up_no_other_thread() {
-        let (made, seventh) = channel();
-        let (made, seventh) = (Mutex::new(made), Mutex::new(seventh));
+        let (made, sixth) = channel();
+        let (made, sixth) = (Mutex::new(made), Mutex::new(sixth));
         let work = move |n| {
             match n {
                 0 => {
-                    let waiting = seventh.lock().unwrap();
+                    let waiting = sixth.lock().unwrap();
                     waiting.recv_timeout(Duration::from_secs(60)).unwrap();
                 }
-                7 => made.lock().unwrap().send(()).unwrap(),
+                6 => made.lock().unwrap().send(()).unwrap(),
                 _ => {}
             }
             Ok(n)

@@ -27,7 +27,7 @@ const BEHIND: [f32; 2] = [10.0, 40.0];
 /// Ends of the part of the line that is fitted \[pixels\]: the part that stands out most tells the axis. Longer parts tell it better, shorter
 /// ones that of a line that fades or bends.
 const ENDS: [i32; 4] = [120, 240, 480, 720];
-const LONGEST: f32 = 720.0;
+const LONGEST: f32 = ENDS[ENDS.len() - 1] as f32;
 /// A contrast of fewer standard deviations is none: the largest of all places, turns and ends reaches four in a sea without wakes.
 const CLEAR: f64 = 5.0;
 /// Pixels brighter than the median of all around by this factor are of an echo.
@@ -160,9 +160,6 @@ impl Surroundings {
     ///
     /// The dark line is the axis, though a bright edge beside it may stand out more.
     pub(crate) fn refined(&self, wake: &Wake) -> (Wake, Option<Contrast>) {
-        let lines = self.lines(wake);
-        let as_found = lines.iter().filter_map(|lines| contrast(lines, 0));
-        let as_found = as_found.max_by(|a, b| a.deviations.abs().total_cmp(&b.deviations.abs()));
         let mut best: Option<(f64, Wake, Contrast)> = None;
         let turns = (TURN[0] / TURN[1]) as i32;
         for turn in -turns..=turns {
@@ -190,7 +187,12 @@ impl Surroundings {
         }
         match best {
             Some((_, moved, contrast)) => (moved, Some(contrast)),
-            None => (*wake, as_found),
+            None => {
+                let lines = self.lines(wake);
+                let here = lines.iter().filter_map(|lines| contrast(lines, 0));
+                let size = |one: &Contrast| one.deviations.abs();
+                (*wake, here.max_by(|a, b| size(a).total_cmp(&size(b))))
+            }
         }
     }
 }

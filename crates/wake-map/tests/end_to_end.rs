@@ -23,7 +23,7 @@ const SHIPS: [[f64; 4]; 3] = [
     [5850.0, 14_700.0, 250.0, 10.0],
 ];
 
-/// Tolerances: 150 m, one degree (two steps of the fitted axis), and twice the standard deviation of the radial velocity up to which it is told.
+/// Tolerances: 150 m, one degree (two steps of the fitted axis), and 0.5 m/s (twice the largest standard deviation of a reported radial velocity).
 #[test]
 fn ships_are_found_where_they_were_put() {
     let whole = template();

@@ -52,7 +52,7 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// What is learnt from; the options exclude one another.
+    /// The training images; clap refuses more than one of the options.
     fn images(&self) -> TrainingImages {
         match (&self.labelled, &self.data) {
             (Some(folder), _) => TrainingImages::Labelled(LabelledImages {

@@ -111,7 +111,7 @@ impl Task<Network> for DetectorTask {
     }
 }
 
-/// What a detector learns from.
+/// Training images of a detector.
 #[derive(Debug, Clone)]
 pub enum TrainingImages {
     /// Images made on the fly.
@@ -139,7 +139,7 @@ impl Default for TrainingImages {
 /// Training of a detector.
 #[derive(Debug, Clone, Default)]
 pub struct DetectorTraining {
-    /// What it learns from.
+    /// Training images.
     pub images: TrainingImages,
     /// Weights to begin with; `None`: random ones.
     pub weights: Option<PathBuf>,

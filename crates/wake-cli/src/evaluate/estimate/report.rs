@@ -160,7 +160,7 @@ impl Figures {
         }
     }
 
-    /// What the set says, in three sentences.
+    /// Writes the result of the set in three sentences.
     fn lead(&self, text: &mut String) {
         let [speed, heading] = [self.row("speed"), self.row("heading")];
         let (Some(speed), Some(heading)) = (speed, heading) else {
