@@ -59,7 +59,7 @@ fn one_scene_of_a_recipe_is_compared() {
     assert_eq!(names(&out), ["domain.json", "domain.md", "domain.png"]);
 }
 
-/// One image is estimated; a second run reads it from the first's lines.
+/// One image is estimated by one of two jobs; a second run reads it from the first's lines.
 #[test]
 fn estimates_are_compared_with_the_truth() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -72,6 +72,8 @@ fn estimates_are_compared_with_the_truth() {
         "0",
         "--others",
         "0",
+        "--jobs",
+        "2",
     ];
     let printed = done("evaluate", &arguments, &out);
     assert!(

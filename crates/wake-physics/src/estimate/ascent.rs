@@ -27,9 +27,13 @@ const SHORTEST: f64 = 0.05;
 const TRUSTED: f64 = 0.6;
 
 /// Pixels along azimuth that higher maxima are looked for within, parts of the change by which all other values follow the place, and how often (chosen).
-const FARTHEST: i32 = 2;
+const FARTHEST: i32 = 1;
 const FOLLOWING: [f64; 4] = [0.0, 0.33, 0.67, 1.0];
-const HOPS: usize = 3;
+const HOPS: usize = 5;
+
+/// Log-likelihood below the highest maximum from which no place beside a maximum is looked at, and below a maximum from which a place beside it is not (chosen).
+const BESIDE: f64 = 60.0;
+const FAR: f64 = 160.0;
 
 /// Where an ascent ends.
 #[derive(Clone, Copy)]
@@ -165,39 +169,51 @@ impl Ascent<'_> {
         self.ascend(&mut path, here, until)
     }
 
-    /// Highest of the maxima beside a maximum: short waves are sampled alike a pixel farther along azimuth, so that the likelihood has maxima a pixel apart.
-    pub(super) fn over_pixels(&self, from: Point, until: Until) -> Result<Point> {
-        let mut here = from;
+    /// Maxima some pixels apart along azimuth around a maximum, the highest first: short waves are sampled alike a pixel farther along azimuth, so that the
+    /// likelihood has maxima a pixel apart. Those about as likely as the highest are looked around from, too.
+    pub(super) fn over_pixels(&self, from: Point, until: Until) -> Result<Vec<Point>> {
+        let mut known = vec![from];
+        let mut done: Vec<Scene> = Vec::new();
         for _ in 0..HOPS {
-            let Some((scene, factors)) = self.higher_pixel(&here)? else {
+            let top = highest(&known);
+            let is_new = |point: &&Point| {
+                point.log_posterior > top - BESIDE
+                    && !done.iter().any(|scene| same_pixel(scene, &point.scene))
+            };
+            let next = known.iter().filter(is_new);
+            let Some(here) = next.max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior)) else {
                 break;
             };
-            let there = self.climb(scene, factors, until)?;
-            if there.log_posterior <= here.log_posterior {
-                break;
+            done.push(here.scene.clone());
+            for (scene, factors) in self.pixels_beside(here, &known)? {
+                known.push(self.climb(scene, factors, until)?);
             }
-            here = there;
         }
-        Ok(here)
+        sort(&mut known);
+        Ok(known)
     }
 
-    /// The likeliest place some pixels along azimuth, if it is likelier than a maximum.
-    fn higher_pixel(&self, here: &Point) -> Result<Option<(Scene, Factors)>> {
+    /// Places some pixels along azimuth from a maximum that are about as likely, away from all known maxima.
+    fn pixels_beside(&self, here: &Point, known: &[Point]) -> Result<Vec<(Scene, Factors)>> {
         let Some(step) = self.by_pixel(here) else {
-            return Ok(None);
+            return Ok(Vec::new());
         };
         let image = ExpectedImage::new(&here.scene, &[])?;
         let expected = image.at(&here.scene)?;
         let texture = self.textures.of(&here.scene, self.parameters, 1.0)?;
         let directions = self.observed.towards(&[], &expected, &texture.noise);
         let is_y = |p: &Parameter| *p == Parameter::Value(Value::Y);
-        let mut best = (here.log_posterior, None);
+        let mut beside = Vec::new();
         for pixels in (-FARTHEST..=FARTHEST).filter(|n| *n != 0) {
+            let mut best = (here.log_posterior - FAR, None);
             for part in FOLLOWING {
                 let parameters = self.parameters.iter().zip(&step);
                 let step = parameters.map(|(p, s)| if is_y(p) { *s } else { part * s });
                 let step: Vec<f64> = step.collect();
                 let (scene, factors) = self.moved(here, &step, f64::from(pixels));
+                if known.iter().any(|point| same_pixel(&point.scene, &scene)) {
+                    continue;
+                }
                 let mean = image.intensity(&scene)?;
                 let noise = &self.textures.of(&scene, self.parameters, 1.0)?.noise;
                 let observed = self.observed;
@@ -207,8 +223,9 @@ impl Ascent<'_> {
                     best = (found, Some((scene, factors)));
                 }
             }
+            beside.extend(best.1);
         }
-        Ok(best.1)
+        Ok(beside)
     }
 
     /// Step of all parameters with which the likelihood falls least while the ship moves a pixel along azimuth.
@@ -362,4 +379,69 @@ fn quadratic(matrix: &Matrix, x: &[f64]) -> f64 {
     let size = matrix.size;
     let row = |n: usize| (0..size).map(|m| matrix.at(n, m) * x[m]).sum::<f64>();
     (0..size).map(|n| x[n] * row(n)).sum::<f64>().max(0.0)
+}
+
+/// Whether the ships of two scenes are less than half a pixel apart along azimuth.
+pub(super) fn same_pixel(a: &Scene, b: &Scene) -> bool {
+    (Value::Y.of(a) - Value::Y.of(b)).abs() < 0.5 * a.grid.spacing
+}
+
+/// The likeliest first.
+pub(super) fn sort(points: &mut [Point]) {
+    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+}
+
+/// Log-posterior of the likeliest.
+pub(super) fn highest(points: &[Point]) -> f64 {
+    let each = points.iter().map(|point| point.log_posterior);
+    each.fold(f64::NEG_INFINITY, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::simulate;
+
+    /// From a maximum a pixel off, the one at the ship's place is found, and both are kept.
+    #[test]
+    fn maxima_a_pixel_apart_are_found_from_each_other() {
+        let keys = [
+            "grid.rows=96",
+            "grid.columns=96",
+            "grid.spacing=4",
+            "ship.heading=60",
+            "ship.position=[100, 60]",
+            "sea.wind_speed=5",
+            "model.tolerance=1e-2",
+        ];
+        let truth = Scene::default().with_assignments(&keys).unwrap();
+        let image = simulate(&truth).unwrap().speckled;
+        let observed = Observed::new(image, &truth, |_, _| 1.0);
+        let ascent = Ascent {
+            observed: &observed,
+            parameters: &Parameter::OF_WAKE,
+            priors: &Priors::default(),
+            textures: &Textures::default(),
+            length: truth.ships[0].length,
+        };
+        let until = Until {
+            steps: 10,
+            small: 0.5,
+            farther: 0.25,
+        };
+        let mut aside = truth.clone();
+        aside.ships[0].position[1] += truth.grid.spacing;
+        let aside = ascent.climb(aside, Factors::default(), until).unwrap();
+        assert!(!same_pixel(&aside.scene, &truth), "{:?}", aside.scene.ships);
+        let (place, lower) = (Value::Y.of(&aside.scene), aside.log_posterior);
+        let found = ascent.over_pixels(aside, until).unwrap();
+        assert!(found.is_sorted_by(|a, b| a.log_posterior >= b.log_posterior));
+        assert!(found[0].log_posterior > lower);
+        assert!(
+            same_pixel(&found[0].scene, &truth),
+            "{:?}",
+            found[0].scene.ships
+        );
+        assert!(found.iter().any(|point| Value::Y.of(&point.scene) == place));
+    }
 }

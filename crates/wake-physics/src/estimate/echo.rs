@@ -8,6 +8,9 @@ use crate::track::Track;
 /// Brightness over the median from which a pixel belongs to an echo: far above speckle of one look and the brightest waves (chosen).
 const BRIGHT: f32 = 40.0;
 
+/// Brightness over the mean image of the wake from which such a pixel is no crest of the wake (chosen): speckle of one look is brighter in 5 of 100,000 pixels.
+const UNEXPLAINED: f64 = 10.0;
+
 /// Distance from such a pixel that is left out \[m\], beside twice the resolution (chosen).
 const AROUND: f64 = 20.0;
 
@@ -18,8 +21,8 @@ const OFF_MIDSHIP: f64 = 0.15;
 pub(super) struct Echo {
     columns: usize,
     covered: Vec<bool>,
-    /// (x, y) and brightness of bright pixels.
-    bright: Vec<([f64; 2], f64)>,
+    /// Place in the image, (x, y) and brightness of bright pixels.
+    bright: Vec<(usize, [f64; 2], f64)>,
     resolution: f64,
 }
 
@@ -40,7 +43,7 @@ impl Echo {
         let mut bright = Vec::new();
         for (n, value) in image.values.iter().enumerate().filter(|(_, v)| **v > limit) {
             let (i, j) = (n / image.columns, n % image.columns);
-            bright.push(([raster.x(j), raster.y(i)], f64::from(*value)));
+            bright.push((n, [raster.x(j), raster.y(i)], f64::from(*value)));
             for row in i.saturating_sub(reach)..(i + reach + 1).min(image.rows) {
                 let start = row * image.columns;
                 let [from, to] = [j.saturating_sub(reach), (j + reach + 1).min(image.columns)];
@@ -59,7 +62,13 @@ impl Echo {
     /// the ship's range.
     ///
     /// - `deviation` of the ship's y \[m\]
-    pub(super) fn radial_velocity(&self, scene: &Scene, deviation: f64) -> Option<[f64; 2]> {
+    /// - `mean` image that explains the wake: bright crests are no echoes
+    pub(super) fn radial_velocity(
+        &self,
+        scene: &Scene,
+        mean: &Field,
+        deviation: f64,
+    ) -> Option<[f64; 2]> {
         let ship = scene.ships.first()?;
         let ratio = scene.radar.range_to_velocity;
         let track = Track::new(ship.position, ship.heading, ship.speed * scene.sea.time);
@@ -69,13 +78,14 @@ impl Echo {
         let near = |place: &[f64; 2], [x, y]: [f64; 2], [across, along]: [f64; 2]| {
             (place[0] - x).abs() < across && (place[1] - y).abs() < along
         };
-        let of_ship = self
-            .bright
+        let is_echo = |n: usize, value: f64| value > UNEXPLAINED * f64::from(mean.values[n]);
+        let echoes = self.bright.iter().filter(|one| is_echo(one.0, one.2));
+        let echoes: Vec<([f64; 2], f64)> = echoes.map(|one| (one.1, one.2)).collect();
+        let of_ship = echoes
             .iter()
             .filter(|(place, _)| near(place, [x, y], [size, reach]));
         let (brightest, _) = of_ship.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let body = self
-            .bright
+        let body = echoes
             .iter()
             .filter(|(place, _)| near(place, *brightest, [size; 2]));
         let (sum, total) = body.fold((0.0, 0.0), |(sum, total), (place, value)| {
@@ -89,5 +99,39 @@ impl Echo {
     /// Weight of a pixel: 0 under an echo.
     pub(super) fn shown(&self, row: usize, column: usize) -> f64 {
         f64::from(u8::from(!self.covered[row * self.columns + column]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pixel of 60 times the sea is an echo where the mean image has a crest of twice the sea, and none where it has one of 30 times.
+    #[test]
+    fn a_crest_that_the_mean_image_has_is_no_echo() {
+        let keys = [
+            "grid.rows=64",
+            "grid.columns=64",
+            "grid.spacing=4",
+            "ship.heading=0",
+            "ship.position=[0, 0]",
+        ];
+        let scene = Scene::default().with_assignments(&keys).unwrap();
+        let raster = Raster::image(64, 64, 4.0);
+        let bright = 40 * 64 + 32;
+        let mut image = Field::constant(&raster, 1.0);
+        image.values[bright] = 60.0;
+        let echo = Echo::of(&image, &scene);
+        assert!(echo.shown(40, 32) == 0.0 && echo.shown(10, 10) == 1.0);
+        let velocity = |crest: f32| {
+            let mut mean = Field::constant(&raster, 1.0);
+            mean.values[bright] = crest;
+            echo.radial_velocity(&scene, &mean, 1.0)
+        };
+        // Eight rows of 4 m toward smaller y.
+        let expected = -32.0 / scene.radar.range_to_velocity;
+        let [found, _] = velocity(2.0).unwrap();
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        assert_eq!(velocity(30.0), None);
     }
 }

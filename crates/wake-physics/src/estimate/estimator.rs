@@ -90,7 +90,7 @@ pub fn estimate(
     let [speed, _] = found.of(Parameter::Value(Value::Speed));
     found.identifiable &= TAU * speed * speed / GRAVITY > SHORTEST;
     let [_, deviation] = found.of(Parameter::Value(Value::Y));
-    found.by_echo = echo.radial_velocity(&found.scene, deviation);
+    found.by_echo = echo.radial_velocity(&found.scene, &found.mean, deviation);
     Ok(match found.by_echo {
         Some([velocity, deviation]) => found.with_radial_velocity(velocity, deviation),
         None => found,

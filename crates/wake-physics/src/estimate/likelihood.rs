@@ -26,6 +26,7 @@ use super::priors::values_of;
 use super::texture::Texture;
 use crate::error::{Error, Result};
 use crate::raster::Field;
+use crate::sar::speckle::speckle;
 use crate::scene::Scene;
 
 /// The likelihood of images given a scene.
@@ -82,6 +83,37 @@ impl Likelihood {
             parameters: parameters.to_vec(),
             scene: scene.clone(),
         })
+    }
+
+    /// Draws an image of the likelihood's own law: the mean image times a Gaussian sea and Gamma speckle, with the spread of the noise. An estimator that is
+    /// right by the law, and wrong on images of the simulator, lacks something of the scene.
+    ///
+    /// # Errors
+    ///
+    /// A radar with an impulse response along range: its speckle is correlated, and is not drawn.
+    pub fn draw(&self, seed: u64) -> Result<Field> {
+        let radar = &self.scene.radar;
+        if let Some(resolution) = radar.range_resolution {
+            return Err(Error::Conflict {
+                name: "radar.range_resolution".to_owned(),
+                value: resolution.to_string(),
+                requirement: "but the law's own images have independent pixels: remove it"
+                    .to_owned(),
+            });
+        }
+        let mut image = self.expected.intensity.clone();
+        let mut noise = self.texture.noise.drawn([image.rows, image.columns], seed);
+        for value in &mut noise.values {
+            *value = (1.0 + *value).max(0.0);
+        }
+        speckle(&mut noise, radar.looks, seed);
+        let observed = Observed::new(image.clone(), &self.scene, |_, _| 1.0);
+        let spread = observed.spread(&self.expected.contrast, &self.texture.noise);
+        let noise = noise.values.iter().zip(&spread.values);
+        for (value, (noise, spread)) in image.values.iter_mut().zip(noise) {
+            *value *= (1.0 + spread * (noise - 1.0)).max(0.0);
+        }
+        Ok(image)
     }
 
     /// Reads an image of intensity with speckle, in the unit of σ⁰ times the gain.

@@ -10,9 +10,11 @@
 use super::sea;
 use super::torus::Torus;
 use crate::error::Result;
+use crate::random::{Stream, generator};
 use crate::raster::Field;
 use crate::scene::Scene;
 use crate::window::Window;
+use rand_distr::{Distribution, StandardNormal};
 
 /// Covariance of relative intensity on a torus, by distance in rows and columns.
 #[derive(Debug, Clone)]
@@ -58,6 +60,21 @@ impl Noise {
         for (value, change) in self.sea.iter_mut().zip(changes) {
             *value += part * change;
         }
+    }
+
+    /// A Gaussian sea of the covariance.
+    pub(super) fn drawn(&self, size: [usize; 2], seed: u64) -> Field {
+        let torus = Torus::new(self.size);
+        let mut random = generator(seed, Stream::Sea, 0);
+        let mut gaussian = || -> f32 { StandardNormal.sample(&mut random) };
+        let white = self.field((0..self.size * self.size).map(|_| gaussian()));
+        let mut spectrum = torus.spectrum(&white);
+        let power = torus.spectrum(&self.field(self.sea.iter().copied()));
+        for (value, power) in spectrum.iter_mut().zip(&power) {
+            *value *= power.re.max(0.0).sqrt();
+        }
+        let [sea, _] = torus.fields([&spectrum, &spectrum], size);
+        sea
     }
 
     /// Covariance of the sea alone.

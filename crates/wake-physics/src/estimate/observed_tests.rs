@@ -1,12 +1,9 @@
 use super::*;
 use crate::estimate::expected::ExpectedImage;
+use crate::estimate::likelihood::Likelihood;
 use crate::estimate::priors::values_of;
 use crate::estimate::value::Value;
-use crate::sar::speckle::speckle;
 use crate::simulate::Simulator;
-use rand::SeedableRng;
-use rand::rngs::StdRng;
-use rand_distr::{Distribution, StandardNormal};
 
 /// Images that are drawn.
 const SEEDS: u64 = 200;
@@ -24,10 +21,7 @@ fn scene() -> Scene {
 }
 
 /// Mean of each score over its stated standard deviation, and its mean square over the stated variance, for images of seeds.
-fn scores(
-    scene: &Scene,
-    mut image: impl FnMut(&Expected, &Texture, u64) -> Field,
-) -> Vec<[f64; 2]> {
+fn scores(scene: &Scene, mut image: impl FnMut(u64) -> Field) -> Vec<[f64; 2]> {
     let parameters = Parameter::OF_WAKE;
     let expected = ExpectedImage::new(scene, &values_of(&parameters)).unwrap();
     let expected = expected.at(scene).unwrap();
@@ -36,7 +30,7 @@ fn scores(
     let mut sums = vec![[0.0; 2]; parameters.len()];
     let mut stated = Vec::new();
     for seed in 0..SEEDS {
-        observed.image = image(&expected, &texture, seed);
+        observed.image = image(seed);
         let near = observed.near(
             &parameters,
             &Factors::default(),
@@ -60,47 +54,12 @@ fn scores(
     sums.iter().zip(&stated).map(of).collect()
 }
 
-/// A Gaussian sea of the covariance of the model.
-fn gaussian_sea(texture: &Texture, seed: u64) -> Field {
-    let size = texture.noise.size;
-    let torus = Torus::new(size);
-    let mut random = StdRng::seed_from_u64(seed);
-    let white = Field {
-        rows: size,
-        columns: size,
-        values: (0..size * size)
-            .map(|_| StandardNormal.sample(&mut random))
-            .collect(),
-    };
-    let mut spectrum = torus.spectrum(&white);
-    let power = torus.spectrum(&texture.noise.sea());
-    for (value, power) in spectrum.iter_mut().zip(&power) {
-        *value *= power.re.max(0.0).sqrt();
-    }
-    let [field, _] = torus.fields([&spectrum, &spectrum], [96; 2]);
-    field
-}
-
 /// Over images of the model (mean image, Gaussian sea and Gamma speckle with their spread) every score has the mean 0, and the variance that is stated.
 #[test]
 fn scores_have_mean_zero_and_the_stated_variance() {
     let scene = scene();
-    let found = scores(&scene, |expected, texture, seed| {
-        let mut noise = gaussian_sea(texture, seed);
-        noise
-            .values
-            .iter_mut()
-            .for_each(|v| *v = (1.0 + *v).max(0.0));
-        speckle(&mut noise, scene.radar.looks, seed);
-        let observed = Observed::new(noise.clone(), &scene, |_, _| 1.0);
-        let spread = observed.spread(&expected.contrast, &texture.noise);
-        let mut image = expected.intensity.clone();
-        let noise = noise.values.iter().zip(&spread.values);
-        for (value, (noise, spread)) in image.values.iter_mut().zip(noise) {
-            *value *= 1.0 + spread * (noise - 1.0);
-        }
-        image
-    });
+    let likelihood = Likelihood::new(&scene, &Parameter::OF_WAKE).unwrap();
+    let found = scores(&scene, |seed| likelihood.draw(seed).unwrap());
     for (parameter, [mean, square]) in Parameter::OF_WAKE.iter().zip(found) {
         // A mean of 200 standard normal numbers has the deviation 0.07, their mean square 0.1. The spectrum's score knows no kurtosis
         // of speckle.
@@ -120,7 +79,7 @@ fn scores_have_mean_zero_and_the_stated_variance() {
 fn scores_of_simulated_images_are_off_by_less_than_their_deviation() {
     let scene = scene();
     let mut simulator = Simulator::default();
-    let found = scores(&scene, |_, _, seed| {
+    let found = scores(&scene, |seed| {
         let mut scene = scene.clone();
         scene.seed = seed << 8;
         simulator.simulate(&scene).unwrap().speckled

@@ -1,6 +1,6 @@
 //! Maximum-likelihood estimate near a guess: ascents from starts to the highest maximum.
 
-use super::ascent::{Ascent, Point, Until};
+use super::ascent::{Ascent, Point, Until, highest, sort};
 use super::echo::Echo;
 use super::expected::ExpectedImage;
 use super::noise::Noise;
@@ -19,7 +19,7 @@ use crate::models::Models;
 use crate::raster::Field;
 use crate::scene::{Scene, Sea};
 
-/// Ends of an ascent, of the first ascent with a wind, and of the ship before it.
+/// Ends of an ascent, of the first ascent with a wind, of the ship before it, and of places a pixel away.
 const END: Until = Until {
     steps: 20,
     small: 0.1,
@@ -35,9 +35,14 @@ const SHIP: Until = Until {
     small: 2.0,
     farther: 1.0,
 };
+const PIXEL: Until = Until {
+    steps: 10,
+    small: 0.5,
+    farther: 0.25,
+};
 
 /// Log-likelihood below the highest from which a maximum is looked at no further (chosen).
-const POSSIBLE: f64 = 100.0;
+const POSSIBLE: f64 = 300.0;
 
 /// Ships that the wind is fitted to.
 const FOLLOWED: usize = 2;
@@ -53,9 +58,9 @@ const AROUND: [[f64; 2]; 5] = [
 
 /// Maximum-likelihood estimate of ship and wind near a guess.
 ///
-/// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind and a pixel away. Standard deviations are those of the
-/// information times a factor for the error of the model (1.2 to 2, chosen). Those of the ship also contain its values at the other maxima of about the same speed, by their probability:
-/// another wind shifts the wake otherwise.
+/// Fisher scoring maximises the likelihood from five starts around the guess, then again from the opposite wind and from places a pixel away. Standard deviations are those of the
+/// information times a factor for the error of the model (1.2 to 3.5, chosen). They also contain the values at the other maxima, by their probability: those of ship and wind at places a
+/// pixel away, and those of the ship with another wind, which shifts the wake otherwise.
 ///
 /// The estimate is identifiable if the residual power is within 25 % and three standard deviations of the model's, the factors on brightness and texture agree with their priors (3 and 2
 /// standard deviations of prior and estimate together), the ship raises the log-likelihood by more than 20, the standard deviation of the speed is below 15 %, and the probability of other speeds below 5 %.
@@ -174,10 +179,11 @@ pub(super) fn settled(
     let each = points
         .into_iter()
         .map(|point| match point.log_posterior > top - POSSIBLE {
-            true => ascent.over_pixels(point, END),
-            false => Ok(point),
+            true => ascent.over_pixels(point, PIXEL),
+            false => Ok(vec![point]),
         });
-    let mut points = each.collect::<Result<Vec<_>>>()?;
+    let each = each.collect::<Result<Vec<_>>>()?;
+    let mut points: Vec<Point> = each.into_iter().flatten().collect();
     sort(&mut points);
     let open = without_ship(&ascent, &points[0])?;
     concluded(&ascent, points, open)
@@ -227,16 +233,6 @@ fn shift(scene: &Scene) -> f64 {
         wave.variance * ((m.tilt + m.hydrodynamic) * radial.conj()).re
     });
     models.range_to_velocity * waves.sum::<f64>()
-}
-
-/// The likeliest first.
-fn sort(points: &mut [Point]) {
-    points.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-}
-
-fn highest(points: &[Point]) -> f64 {
-    let each = points.iter().map(|point| point.log_posterior);
-    each.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Factors that give a scene the brightness of the image.

@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use wake_physics::estimate::{Estimate, Parameter, Priors, Sighting, Value, bound, estimate};
+use wake_physics::estimate::{
+    Estimate, Parameter, Priors, Sighting, Value, bound, estimate, refine,
+};
 use wake_physics::measure::{angle_between, axis_between};
 use wake_physics::{Field, Scene};
 
@@ -25,7 +27,7 @@ pub struct EstimatedImage {
     pub misfit: f64,
     /// Log-likelihood ratio to the open sea.
     pub over_open_sea: f64,
-    /// Seconds of the estimate.
+    /// Seconds of the estimate, times the threads that it had.
     pub seconds: f64,
     /// Error, standard deviation and Cramér–Rao bound of each of [`Parameter::OF_WAKE`]; `None` where the image does not tell the value.
     pub values: Vec<[Option<f64>; 3]>,
@@ -50,6 +52,8 @@ pub struct ToEstimate {
     pub sighting: Sighting,
     /// Calibration and knowledge of the texture.
     pub priors: Priors,
+    /// Begin at the true scene, without a search.
+    pub from_truth: bool,
 }
 
 impl ToEstimate {
@@ -57,11 +61,14 @@ impl ToEstimate {
     ///
     /// # Errors
     ///
-    /// As [`estimate`] and [`bound`].
+    /// As [`estimate`], [`refine`] and [`bound`].
     pub fn estimated(&self) -> Result<EstimatedImage> {
         let begin = Instant::now();
-        let found = estimate(&self.image, &self.known, &self.sighting, &self.priors)?;
-        let seconds = begin.elapsed().as_secs_f64();
+        let found = match self.from_truth {
+            true => refine(&self.image, &self.truth, &self.priors)?,
+            false => estimate(&self.image, &self.known, &self.sighting, &self.priors)?,
+        };
+        let seconds = begin.elapsed().as_secs_f64() * rayon::current_num_threads() as f64;
         let limit = bound(&self.truth, &Parameter::OF_WAKE, &self.priors)?;
         let told = |value: f64| value.is_finite().then_some(value);
         let values = Parameter::OF_WAKE.map(|parameter| {

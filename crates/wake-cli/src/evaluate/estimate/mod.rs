@@ -7,6 +7,9 @@ mod sets;
 
 use std::fs::OpenOptions;
 use std::io::Write;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::ThreadPoolBuilder;
 
 use crate::exit::{self, Outcome};
 use crate::progress;
@@ -20,24 +23,49 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
     whole_files::make_folder(&options.out)?;
     let path = options.out.join("estimates.jsonl");
     let mut lines = read(&path)?;
-    let mut file = OpenOptions::new().create(true).append(true).open(&path)?;
-    let total: u64 = sets.iter().map(|set| set.count).sum();
-    let bar = progress::bar(total, "images");
-    for set in &sets {
-        for index in 0..set.count {
-            let known = |line: &Line| line.set == set.name && line.estimate.index == index;
-            if !lines.iter().any(known)
-                && let Some(image) = set.image(index)?
-            {
-                let line = Line {
-                    set: set.name.to_owned(),
-                    estimate: image.estimated()?,
-                };
-                writeln!(file, "{}", serde_json::to_string(&line)?)?;
+    let file = OpenOptions::new().create(true).append(true).open(&path)?;
+    let images = sets
+        .iter()
+        .flat_map(|set| (0..set.count).map(move |index| (set, index)));
+    let is_new = |(set, index): &(&Set, u64)| {
+        let known = |line: &Line| line.set == set.name && line.estimate.index == *index;
+        !lines.iter().any(known)
+    };
+    let bar = progress::bar(images.clone().count() as u64, "images");
+    let images: Vec<(&Set, u64)> = images.filter(is_new).collect();
+    bar.inc(bar.length().unwrap_or(0) - images.len() as u64);
+    let (next, file) = (Mutex::new(images.into_iter()), Mutex::new(file));
+    let threads = rayon::current_num_threads() / options.jobs as usize;
+    let job = || -> Outcome<Vec<Line>> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads.max(1));
+        let pool = pool.build().map_err(std::io::Error::other)?;
+        let mut lines = Vec::new();
+        loop {
+            let Some((set, index)) = next.lock().unwrap_or_else(PoisonError::into_inner).next()
+            else {
+                return Ok(lines);
+            };
+            if let Some(line) = pool.install(|| estimated(set, index))? {
+                let text = serde_json::to_string(&line)?;
+                writeln!(
+                    file.lock().unwrap_or_else(PoisonError::into_inner),
+                    "{text}"
+                )?;
                 lines.push(line);
             }
             bar.inc(1);
         }
+    };
+    let each = std::thread::scope(|scope| {
+        let jobs: Vec<_> = (0..options.jobs).map(|_| scope.spawn(job)).collect();
+        let ended = jobs.into_iter().map(|job| match job.join() {
+            Ok(lines) => lines,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        ended.collect::<Vec<_>>()
+    });
+    for of_job in each {
+        lines.extend(of_job?);
     }
     bar.finish_and_clear();
     let report = Report::of(&sets, &lines);
@@ -49,4 +77,15 @@ pub(crate) fn run(options: &Options) -> Outcome<()> {
         false => exit::say(&format!("{text}\nwritten to {}", options.out.display()))?,
     }
     Ok(())
+}
+
+/// Line of an image; `None` where the set has none at this index.
+fn estimated(set: &Set, index: u64) -> Outcome<Option<Line>> {
+    let Some(image) = set.image(index)? else {
+        return Ok(None);
+    };
+    Ok(Some(Line {
+        set: set.name.to_owned(),
+        estimate: image.estimated()?,
+    }))
 }

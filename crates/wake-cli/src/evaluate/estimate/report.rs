@@ -30,7 +30,7 @@ struct Figures {
     tellable: [usize; 2],
     /// Median of the largest misfit of the residual spectrum, as a factor.
     misfit: f64,
-    /// Median seconds of an estimate.
+    /// Median seconds of an estimate, times the threads that it had.
     seconds: f64,
     /// Errors by value; of real tiles the heading alone has a truth.
     rows: Vec<EstimateRow>,
@@ -85,12 +85,13 @@ impl Report {
             paper.lead(&mut text);
         }
         text.push_str(
-            "| set | images | identifiable | of these wrong | speed: median error | heading: median error | misfit | seconds |\n\
+            "| set | images | identifiable | of these wrong | speed: median error | heading: median error | misfit | processor seconds |\n\
              | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         );
         for figures in &self.sets {
             figures.summarise(&mut text);
         }
+        self.parts_of_error(&mut text);
         text.push_str(
             "\nAn estimate is wrong if its speed is off by more than 10 %, or its heading by more than 5 degrees, or if there is no ship. \
              The misfit is the largest factor between the residual's spectrum and the model's, in the median; a wrong assumption should raise it.\n\n\
@@ -103,6 +104,45 @@ impl Report {
             figures.write(&mut text);
         }
         text
+    }
+
+    /// Writes which part the errors come from: search, mean image or noise.
+    fn parts_of_error(&self, text: &mut String) {
+        let parts = [
+            ("paper", "nothing"),
+            ("from the truth", "search"),
+            ("right mean", "search and mean image"),
+            ("right model", "search, mean image and noise"),
+        ];
+        let figures =
+            parts.map(|(set, known)| (self.sets.iter().find(|one| one.set == set), known));
+        if figures.iter().any(|(set, _)| set.is_none()) {
+            return;
+        }
+        text.push_str(
+            "\nWhich part the errors come from: the estimate is also begun at the true scene (no search), on images with the model's own mean image under a simulated sea, \
+             and on images that follow the model in all.\n\n\
+             | right from the start | identifiable | speed: within 1, 2 deviations | speed: squared error over bound | heading: within 1, 2 deviations | heading: squared error over bound |\n\
+             | --- | --- | --- | --- | --- | --- |\n",
+        );
+        for (set, known) in figures {
+            let Some(set) = set else { continue };
+            let of = |quantity| {
+                let row = set.row(quantity);
+                let within = row.and_then(|row| row.within);
+                let within = within.map_or("–".to_owned(), |[one, two, _]| {
+                    format!("{:.0} %, {:.0} %", 100.0 * one, 100.0 * two)
+                });
+                format!("{within} | {}", shown(row.and_then(|row| row.over_bound)))
+            };
+            let (speed, heading) = (of("speed"), of("heading"));
+            let (count, images) = (set.identifiable, set.images);
+            // Writing into a string cannot fail.
+            let _ = writeln!(
+                text,
+                "| {known} | {count} of {images} | {speed} | {heading} |"
+            );
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use wake_detector::score::Label;
 use wake_detector::{Detector, GreyImage, Wake};
 use wake_ldm::WakeSampler;
 use wake_nn::device_named;
-use wake_physics::estimate::{Priors, Sighting};
+use wake_physics::estimate::{ExpectedImage, Likelihood, Parameter, Priors, Sighting};
 use wake_physics::grey::GreyScale;
 use wake_physics::scene::{Sea, Ship};
 use wake_physics::{Field, Scene, simulate};
@@ -39,6 +39,9 @@ enum Kind {
     Detected(Box<Detector>),
     Drawn(Box<WakeSampler>),
     Wrong(fn(&mut Scene)),
+    FromTruth,
+    OpenSeaNoise,
+    OwnLaw,
     Empty,
     Real(Vec<(GreyImage, Label)>),
 }
@@ -112,6 +115,25 @@ impl Set {
             for (name, about, change) in wrong {
                 add(name, about, others, Kind::Wrong(change));
             }
+            // What is left of the errors without the search, then without the model of the mean, then without that of the noise.
+            add(
+                "from the truth",
+                "paper's scenes, from the true scene instead of a search",
+                others,
+                Kind::FromTruth,
+            );
+            add(
+                "right mean",
+                "the model's mean image of the paper's scenes under a simulated sea, from the true scene",
+                others,
+                Kind::OpenSeaNoise,
+            );
+            add(
+                "right model",
+                "images of the model itself, from the true scene",
+                others,
+                Kind::OwnLaw,
+            );
             add(
                 "no ship",
                 "paper's scenes without the ship",
@@ -172,6 +194,8 @@ impl Set {
                 view.draw(source, std::slice::from_ref(&truth), Told::Both)?
                     .swap_remove(0)
             }
+            Kind::OpenSeaNoise => over_open_sea(&truth)?,
+            Kind::OwnLaw => Likelihood::new(&truth, &Parameter::OF_WAKE)?.draw(index)?,
             _ => simulate(&truth)?.speckled,
         };
         let mut known = known(&truth);
@@ -193,8 +217,26 @@ impl Set {
             known,
             sighting,
             priors: Priors::default(),
+            from_truth: matches!(
+                self.kind,
+                Kind::FromTruth | Kind::OpenSeaNoise | Kind::OwnLaw
+            ),
         }))
     }
+}
+
+/// The estimator's mean image of a scene, times the relative intensity of a simulated sea without its ship.
+fn over_open_sea(truth: &Scene) -> Outcome<Field> {
+    let mean = |scene: &Scene| ExpectedImage::new(scene, &[])?.intensity(scene);
+    let mut open = truth.clone();
+    open.ships.clear();
+    let mut image = mean(truth)?;
+    let (sea, of_sea) = (simulate(&open)?.speckled, mean(&open)?);
+    let relative = sea.values.iter().zip(&of_sea.values).map(|(i, m)| i / m);
+    for (value, relative) in image.values.iter_mut().zip(relative) {
+        *value *= relative;
+    }
+    Ok(image)
 }
 
 /// Input of the estimator: radar, grid, hull and water of a scene, with default wind, without swell, gusts and slicks.
@@ -321,5 +363,6 @@ fn real_image(index: u64, (image, label): &(GreyImage, Label)) -> ToEstimate {
             gain: f64::INFINITY,
             ..Priors::default()
         },
+        from_truth: false,
     }
 }
