@@ -39,6 +39,8 @@ pub(crate) enum Part {
     Model,
     /// Images per second of the data set's loader
     Loader,
+    /// Schedulers of Stable Diffusion, steps against error on a problem with a known answer
+    Schedulers,
     /// Blocks of the networks on --device against flex (not part of all)
     Device,
 }

@@ -5,7 +5,8 @@
 //! oracle is too slow for all pixels it runs on random ones of the same size, as many as the table says, and its time is
 //! scaled up; that of the whole scene stage by stage. One image on finer and finer pixels shows what its spacing does. The
 //! second part is the model: steps, batch size and weights against many steps from the same noise. The third is the loader:
-//! images a second that a training loop gets of the simulator and of the model, by threads.
+//! images a second that a training loop gets of the simulator and of the model, by threads. The fourth is Stable Diffusion's
+//! schedulers, on a problem whose answer is known.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
@@ -18,6 +19,7 @@ mod plot;
 mod reference;
 mod rounding;
 mod row;
+mod schedulers;
 mod spacing;
 mod stages;
 mod sweep;
@@ -31,7 +33,7 @@ use serde_json::{Value, json};
 use crate::exit::{self, Outcome};
 use crate::progress;
 
-/// Writes `report.json`, `simulator.md`, `simulator.csv`, `spacing.md`, `model.md`, `loader.md`, `frontier.svg` and `model.svg` (log-log).
+/// Writes `report.json`, `simulator.md`, `simulator.csv`, `spacing.md`, `model.md`, `loader.md`, `schedulers.md`, `frontier.svg` and `model.svg` (log-log).
 pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
     let out = &arguments.out;
     whole_files::make_folder(out)?;
@@ -69,6 +71,13 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome<()> {
         let measured = loader::measure(&arguments.device, || bar.inc(1))?;
         bar.finish_and_clear();
         parts.push(("loader.md", loader::table(&measured)));
+        add(&mut rows, &measured)?;
+    }
+    if asked(Part::Schedulers) {
+        let bar = progress::bar(schedulers::PARTS as u64, "runs of schedulers");
+        let measured = schedulers::measure(|| bar.inc(1))?;
+        bar.finish_and_clear();
+        parts.push(("schedulers.md", schedulers::table(&measured)));
         add(&mut rows, &measured)?;
     }
     if arguments.part == Part::Device {

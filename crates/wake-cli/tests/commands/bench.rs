@@ -52,6 +52,18 @@ fn the_loader_is_measured() {
     assert!(rows.iter().all(|row| rate(row).is_some_and(|r| r > 0.0)));
 }
 
+/// Every method draws nearer to the known answer with more steps, up to its last step.
+#[test]
+fn schedulers_are_measured() {
+    let rows = rows(&["--part", "schedulers"], &["report.json", "schedulers.md"]);
+    let error = |steps: u64| {
+        let of = rows.iter().filter(move |row| row["steps"] == steps);
+        let errors = of.filter_map(|row| row["rms_error"].as_f64());
+        errors.fold(0.0, f64::max)
+    };
+    assert!(error(5) < 0.5 && error(100) < 0.1 * error(5), "{rows:?}");
+}
+
 /// flex against itself differs by nothing.
 #[test]
 fn blocks_are_measured_on_a_device() {
