@@ -122,7 +122,7 @@ mod tests {
         let mut image = Field::constant(&raster, 1.0);
         image.values[bright] = 60.0;
         let echo = Echo::of(&image, &scene);
-        assert!(echo.shown(40, 32) == 0.0 && echo.shown(10, 10) == 1.0);
+        assert!(echo.shown(40, 32) < 0.5 && echo.shown(10, 10) > 0.5);
         let velocity = |crest: f32| {
             let mut mean = Field::constant(&raster, 1.0);
             mean.values[bright] = crest;

@@ -85,7 +85,7 @@ impl Report {
             paper.lead(&mut text);
         }
         text.push_str(
-            "| set | images | identifiable | of these wrong | speed: median error | heading: median error | misfit | processor seconds |\n\
+            "| set | images | identifiable | of these wrong | speed: median error | heading: median error | misfit | thread seconds |\n\
              | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         );
         for figures in &self.sets {
@@ -94,7 +94,8 @@ impl Report {
         self.parts_of_error(&mut text);
         text.push_str(
             "\nAn estimate is wrong if its speed is off by more than 10 %, or its heading by more than 5 degrees, or if there is no ship. \
-             The misfit is the largest factor between the residual's spectrum and the model's, in the median; a wrong assumption should raise it.\n\n\
+             The misfit is the largest factor between the residual's spectrum and the model's, in the median; a wrong assumption should raise it. \
+             Thread seconds are elapsed seconds times the threads of an estimate; other work on the machine makes them longer.\n\n\
              Each set has its own scenes. Constants of the search were chosen with the first twelve of the paper's scenes in view, factors on the deviations \
              with others. Place and heading before the estimate are wrong by 60 m along each axis and 3 degrees (standard deviations, at most two of them).\n\n\
              The tables below are of the identifiable images, for sets with at least five of them. A Gaussian has 68 %, 95 % and 100 % of the errors within \
