@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     /// Where the loader's model and the blocks compute: flex, ndarray, wgpu or cuda, where compiled in
     #[arg(long, default_value = "flex")]
     pub(crate) device: String,
-    /// Stages of the simulator alone, without spacing, model and loader [repeatable; default: all]
+    /// Stages of the simulator alone, without spacing, model, loader and schedulers [repeatable; default: all]
     #[arg(long, value_name = "STAGE", value_parser = STAGES)]
     pub(crate) stage: Vec<String>,
     /// With --part device: blocks whose names contain this alone [repeatable; default: all]

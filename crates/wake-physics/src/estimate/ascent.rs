@@ -26,12 +26,11 @@ const SHORTEST: f64 = 0.05;
 /// Smallest gain relative to its prediction with which derivatives are kept (chosen).
 const TRUSTED: f64 = 0.6;
 
-/// Pixels along azimuth that higher maxima are looked for within, parts of the change by which all other values follow the place, and how often (chosen).
-const FARTHEST: i32 = 1;
+/// Parts of the change by which all other values follow the place when it moves a pixel along azimuth, and maxima that are looked around from (chosen).
 const FOLLOWING: [f64; 4] = [0.0, 0.33, 0.67, 1.0];
 const HOPS: usize = 5;
 
-/// Log-likelihood below the highest maximum from which no place beside a maximum is looked at, and below a maximum from which a place beside it is not (chosen).
+/// Log-likelihood below the highest maximum at which a maximum is no longer looked around from, and below a maximum at which a place beside it is left out (chosen).
 const BESIDE: f64 = 60.0;
 const FAR: f64 = 160.0;
 
@@ -169,7 +168,7 @@ impl Ascent<'_> {
         self.ascend(&mut path, here, until)
     }
 
-    /// Maxima some pixels apart along azimuth around a maximum, the highest first: short waves are sampled alike a pixel farther along azimuth, so that the
+    /// Maxima pixels apart along azimuth around a maximum, the highest first: short waves are sampled alike a pixel farther along azimuth, so that the
     /// likelihood has maxima a pixel apart. Those about as likely as the highest are looked around from, too.
     pub(super) fn over_pixels(&self, from: Point, until: Until) -> Result<Vec<Point>> {
         let mut known = vec![from];
@@ -193,7 +192,7 @@ impl Ascent<'_> {
         Ok(known)
     }
 
-    /// Places some pixels along azimuth from a maximum that are about as likely, away from all known maxima.
+    /// Places a pixel along azimuth from a maximum that are about as likely, away from all known maxima.
     fn pixels_beside(&self, here: &Point, known: &[Point]) -> Result<Vec<(Scene, Factors)>> {
         let Some(step) = self.by_pixel(here) else {
             return Ok(Vec::new());
@@ -204,13 +203,13 @@ impl Ascent<'_> {
         let directions = self.observed.towards(&[], &expected, &texture.noise);
         let is_y = |p: &Parameter| *p == Parameter::Value(Value::Y);
         let mut beside = Vec::new();
-        for pixels in (-FARTHEST..=FARTHEST).filter(|n| *n != 0) {
+        for pixels in [-1.0, 1.0] {
             let mut best = (here.log_posterior - FAR, None);
             for part in FOLLOWING {
                 let parameters = self.parameters.iter().zip(&step);
                 let step = parameters.map(|(p, s)| if is_y(p) { *s } else { part * s });
                 let step: Vec<f64> = step.collect();
-                let (scene, factors) = self.moved(here, &step, f64::from(pixels));
+                let (scene, factors) = self.moved(here, &step, pixels);
                 if known.iter().any(|point| same_pixel(&point.scene, &scene)) {
                     continue;
                 }
@@ -381,7 +380,7 @@ fn quadratic(matrix: &Matrix, x: &[f64]) -> f64 {
     (0..size).map(|n| x[n] * row(n)).sum::<f64>().max(0.0)
 }
 
-/// Whether the ships of two scenes are less than half a pixel apart along azimuth.
+/// True if the ships of two scenes are less than half a pixel apart along azimuth.
 pub(super) fn same_pixel(a: &Scene, b: &Scene) -> bool {
     (Value::Y.of(a) - Value::Y.of(b)).abs() < 0.5 * a.grid.spacing
 }

@@ -85,8 +85,12 @@ impl Likelihood {
         })
     }
 
-    /// Draws an image of the likelihood's own law: the mean image times a Gaussian sea and Gamma speckle, with the spread of the noise. An estimator that is
-    /// right by the law, and wrong on images of the simulator, lacks something of the scene.
+    /// Draws an image of the likelihood's own law: the mean image times a Gaussian sea and Gamma speckle, with the spread of the noise. Intensity with speckle in the
+    /// unit of σ⁰, `[rows, columns]` of the scene's grid; the same seed gives the same image. Use it to tell errors of an estimator from errors of the law.
+    ///
+    /// # Validity
+    ///
+    /// Up to second order: values that the Gaussian sea would make negative are 0.
     ///
     /// # Errors
     ///
