@@ -14,13 +14,13 @@ use super::sheet::write_sheet;
 use super::stage::Stage;
 use super::stage_options::{StageDefaults, StageOptions};
 use super::text_to_image::{
-    AutoencoderTask, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
+    AutoencoderTask, PREDICTION, PromptedImages, PromptedLatents, TextToImage, TextToImageTask,
 };
 use crate::error::{Error, Result};
 use wake_dataset::Pair;
 use wake_ldm::autoencoder::{AutoencoderKl, AutoencoderKlConfig};
 use wake_ldm::pipeline::{Pipeline, PipelineParts, Request};
-use wake_ldm::scheduler::{NoiseSchedule, SchedulerConfig};
+use wake_ldm::scheduler::{NoiseSchedule, SchedulerConfig, SchedulerOption};
 use wake_ldm::text::ClipTextConfig;
 use wake_ldm::unet::UNetConfig;
 use wake_nn::weights::{Layout, Precision, save_folder};
@@ -154,7 +154,10 @@ impl PipelineTraining<'_> {
             self.autoencoder(&mut folder, &images, learning.clone(), &model, progress)?;
         }
 
-        let identity = json!({"data": identity, "vae": fingerprint(&out.join(VAE))?});
+        let scheduler = SchedulerConfig::stable_diffusion("ddim")?
+            .with(SchedulerOption::Prediction(PREDICTION))?;
+        let vae = fingerprint(&out.join(VAE))?;
+        let identity = json!({"data": identity, "vae": vae, "scheduler": scheduler.to_json()});
         let device = options.device();
         let autoencoder = AutoencoderKl::from_folder(&out.join("vae"), &device)?;
         let count = images.len() as u64;
@@ -172,7 +175,6 @@ impl PipelineTraining<'_> {
             options.run(&DEFAULTS, identity),
             learning,
         )?;
-        let scheduler = SchedulerConfig::stable_diffusion("ddim")?;
         let task = TextToImageTask {
             set: &set,
             schedule: schedule(&scheduler)?,

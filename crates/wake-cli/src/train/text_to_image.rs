@@ -11,21 +11,8 @@ use super::screen::Screen;
 use super::source::{check_memory, folder};
 use crate::exit::Outcome;
 
-/// What is simulated without --data: the recipe `ranges` with the ship in the middle, of whose place prompts say nothing.
-const RECIPE: &str = r#"
-base = "paper"
-speckle = false
-scene.grid = { rows = 256, columns = 256, spacing = 4.0 }
-scene.model.tolerance = 1e-2
-[draw]
-count = { one_of = [0, 1], weights = [1, 4] }
-"ship.speed" = [6.0, 12.0]
-"ship.heading" = [0.0, 360.0]
-"sea.wind_speed" = [3.0, 7.0]
-"sea.wind_toward" = [0.0, 360.0]
-"sea.fetch" = { log = [10e3, 70e3] }
-"radar.incidence" = [16.0, 32.0]
-"#;
+/// What is simulated without --data.
+const RECIPE: &str = include_str!("text_to_image.toml");
 
 /// Defaults of the options that all runs have.
 pub(crate) const DEFAULTS: &[(&str, &str)] = &[

@@ -26,6 +26,10 @@ fn a_model_is_learnt_resumed_and_drawn_with() {
     let common = [&["text-to-image", "--data", text(&set)], &SHORT[..]].concat();
     done("train", &common, &out("whole"));
 
+    let scheduler = out("whole").join("scheduler/scheduler_config.json");
+    let scheduler = std::fs::read_to_string(scheduler).expect("a scheduler");
+    assert!(scheduler.contains("\"v_prediction\""), "{scheduler}");
+
     let killed = out("killed");
     done("train", &common, &killed);
     let last = killed.join("checkpoints/text-to-image/step-00000002");

@@ -1,0 +1,340 @@
+"""Trains the small text-to-image model of `wake train text-to-image` in PyTorch, on a GPU.
+
+    wake train text-to-image --count 8 --steps 1 --autoencoder-steps 1 --downsampling 8 --latents 16 --out MODEL
+    wake dataset --grid crates/wake-cli/src/train/text_to_image.toml --count 40000 --val-share 0 --out DATA
+    python benches/torch_text_to_image.py autoencoder MODEL DATA
+    python benches/torch_text_to_image.py model MODEL DATA --samples 80000,250000,500000,1000000
+    wake evaluate pipeline --weights MODEL-1000000 --count 60
+
+Needs torch, diffusers, transformers, pillow. Shapes are those of MODEL, a folder that the first command wrote; first weights are random.
+Losses, optimizer, averages and schedule are those of `wake train text-to-image`, the batch is larger. Convolutions of burn's backends
+for GPUs take many times as long as torch's (docs/reports/performance.md), and a million images take minutes here instead of hours.
+`model` writes one folder for each number of images seen, which `wake` reads like MODEL itself, and goes on where it was stopped.
+"""
+
+import argparse
+import json
+import math
+import shutil
+import time
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from diffusers import AutoencoderKL, UNet2DConditionModel
+from PIL import Image
+from safetensors.torch import load_file, save_file
+from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
+
+CROP, CURVATURE, DIVERGENCE, PATCH = 128, 1.0, 1e-5, 4
+WARMUP, DECAY, LEFT_OUT, MEASURED, HELD_OUT = 100, 0.999, 0.1, 150, 64
+VAE = "vae/diffusion_pytorch_model.safetensors"
+UNET = "unet/diffusion_pytorch_model.safetensors"
+TEXT = "text_encoder/model.safetensors"
+
+
+def grey(path):
+    return np.asarray(Image.open(path).convert("L"))
+
+
+def images(folder, count, device):
+    """Grey of the first images of a data set, bytes `[count, 1, rows, columns]`, and their prompts."""
+    lines = [json.loads(line) for line in (folder / "metadata.jsonl").read_text().splitlines()[:count]]
+    with ProcessPoolExecutor() as pool:
+        pixels = np.stack(list(pool.map(grey, [folder / line["file_name"] for line in lines], chunksize=64)))
+    return torch.from_numpy(pixels)[:, None].to(device), [line["text"] for line in lines]
+
+
+def scaled(pixels):
+    return pixels.float() / 127.5 - 1
+
+
+def autoencoder(folder):
+    """An autoencoder as a folder describes it; `diffusers` knows it without the rearrangement of 4 × 4 pixels into channels."""
+    config = json.loads((folder / "vae/config.json").read_text())
+    assert config.pop("patch_size") == PATCH
+    return AutoencoderKL.from_config(config)
+
+
+class Learning:
+    """Adam with warm-up, half a cosine, gradients of norm 1 and averaged weights; one step is one CUDA graph."""
+
+    def __init__(self, modules, loss, steps, options):
+        self.modules, self.loss, self.peak, self.steps, self.done = modules, loss, options.rate, steps, 0
+        self.weights = [weight for module in modules for weight in module.parameters()]
+        self.averages = [weight.detach().clone() for weight in self.weights]
+        device = self.weights[0].device
+        self.rate = torch.zeros((), device=device)
+        self.keep = torch.zeros((), device=device)
+        self.value = torch.zeros((), device=device)
+        self.optimizer = torch.optim.AdamW(
+            self.weights, lr=self.rate, betas=(0.9, 0.99), eps=1e-8, weight_decay=1e-2, capturable=device.type == "cuda"
+        )
+        self.graph, self.eager = None, options.eager
+
+    def constants(self):
+        step = self.done
+        if step < WARMUP:
+            rate = self.peak * (step + 1) / WARMUP
+        else:
+            part = min((step - WARMUP) / max(self.steps - WARMUP, 1), 1)
+            rate = self.peak * (0.1 + 0.45 * (1 + math.cos(math.pi * part)))
+        self.rate.fill_(rate)
+        self.keep.fill_(min(DECAY, 1 - (2 + step) ** (-2 / 3)))
+
+    def compute(self):
+        self.optimizer.zero_grad(set_to_none=False)
+        loss = self.loss()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.weights, 1.0)
+        self.optimizer.step()
+        for average, weight in zip(self.averages, self.weights):
+            average.lerp_(weight.detach(), 1 - self.keep)
+        self.value.copy_(loss.detach())
+
+    def step(self):
+        self.constants()
+        if self.value.device.type != "cuda":
+            self.compute()
+        elif self.eager > 0:
+            # Kernels are chosen in the first steps, outside of the graph.
+            self.eager -= 1
+            side = torch.cuda.Stream()
+            side.wait_stream(torch.cuda.current_stream())
+            with torch.cuda.stream(side):
+                self.compute()
+            torch.cuda.current_stream().wait_stream(side)
+        else:
+            if self.graph is None:
+                torch.cuda.synchronize()
+                self.graph = torch.cuda.CUDAGraph()
+                with torch.cuda.graph(self.graph):
+                    self.compute()
+            self.graph.replay()
+        self.done += 1
+
+    def state(self):
+        return {"done": self.done, "steps": self.steps, "averages": self.averages, "optimizer": self.optimizer.state_dict(),
+                "weights": [weight.detach() for weight in self.weights]}
+
+    def resume(self, state):
+        assert state["steps"] == self.steps, "a run of another length"
+        self.done, self.averages = state["done"], state["averages"]
+        self.copy(state["weights"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.rate
+
+    @contextmanager
+    def averages_in_place(self):
+        """The modules have the averaged weights for a while."""
+        own = [weight.detach().clone() for weight in self.weights]
+        self.copy(self.averages)
+        yield
+        self.copy(own)
+
+    def copy(self, values):
+        with torch.no_grad():
+            for weight, value in zip(self.weights, values):
+                weight.copy_(value)
+
+    def averaged(self):
+        """The averaged weights of each module, by their names."""
+        values = iter(self.averages)
+        return [{name: next(values).cpu() for name, _ in module.named_parameters()} for module in self.modules]
+
+
+def halves(tensors):
+    return {name: value.to(torch.float16).contiguous() for name, value in tensors.items()}
+
+
+def power(images):
+    """Mean power of the rings of round wave numbers up to half the Nyquist frequency [dB], mean over images."""
+    side = images.shape[-1]
+    spectrum = torch.fft.fft2(images[:, 0].double()).abs().square() / side**2
+    k = torch.fft.fftfreq(side, 1 / side).to(images.device)
+    ring = torch.hypot(k[:, None], k[None, :]).round().long()
+    rings = [spectrum[:, ring == n].mean(1).clamp_min(1e-6).log10() * 10 for n in range(1, side // 4 + 1)]
+    return torch.stack(rings).mean(1)
+
+
+def train_autoencoder(options, device):
+    pixels, _ = images(options.data, options.images + HELD_OUT, device)
+    held_out, pixels = pixels[:HELD_OUT], pixels[HELD_OUT:]
+    vae = autoencoder(options.model).to(device)
+    room = pixels.shape[-1] - CROP + 1
+    whole = torch.arange(CROP, device=device)
+    laplacian = torch.tensor([[0.0, 1, 0], [1, -4, 1], [0, 1, 0]], device=device)[None, None]
+
+    def loss():
+        which = torch.randint(pixels.shape[0], (options.batch,), device=device)
+        corner = torch.randint(room, (2, options.batch), device=device)
+        rows, columns = (corner[axis][:, None] + whole for axis in range(2))
+        crop = scaled(pixels[which[:, None, None], 0, rows[:, :, None], columns[:, None, :]])[:, None]
+        posterior = vae.encode(F.pixel_unshuffle(crop, PATCH)).latent_dist
+        z = posterior.mean + posterior.std * torch.randn_like(posterior.mean)
+        decoded = F.pixel_shuffle(vae.decode(z).sample, PATCH)
+        divergence = 0.5 * (posterior.mean.square() + posterior.var - 1 - posterior.logvar).mean()
+        error = decoded - crop
+        curved = F.conv2d(error, laplacian)
+        return error.square().mean() + CURVATURE * curved.square().mean() + DIVERGENCE * divergence
+
+    learning = Learning([vae], loss, options.steps, options)
+    report(learning, options.steps, options.seconds)
+    vae.load_state_dict(learning.averaged()[0])
+    with torch.no_grad():
+        truth = scaled(held_out)
+        decoded = torch.cat([F.pixel_shuffle(vae.decode(vae.encode(F.pixel_unshuffle(part, PATCH)).latent_dist.mode()).sample, PATCH)
+                             for part in truth.split(16)])
+    error = (decoded - truth).square().mean(dim=(1, 2, 3)) / 4
+    curve = power(decoded / 2) - power(truth / 2)
+    print("dB at rings 8, 16, …: ", [round(float(db), 1) for db in curve[7::8]])
+    print(f"autoencoder {options.model.name}: PSNR {-10 * error.log10().mean():.2f} dB, spectrum within {curve.abs().max():.2f} dB", flush=True)
+    save_file(halves(learning.averaged()[0]), options.model / VAE)
+
+
+def encoded(vae, pixels):
+    """Latents of all images, with mean 0 and variance 1 together, their mean and their scale."""
+    with torch.no_grad():
+        parts = [vae.encode(F.pixel_unshuffle(scaled(part), PATCH)).latent_dist.mode().half() for part in pixels.split(64)]
+    latents = torch.cat(parts)
+    mean = torch.stack([part.double().mean() for part in latents.split(1000)]).mean()
+    square = torch.stack([(part.double() - mean).square().mean() for part in latents.split(1000)]).mean()
+    scale = square.rsqrt()
+    return ((latents.float() - mean.float()) * scale.float()).half(), float(mean), float(scale)
+
+
+def train_model(options, device):
+    pixels, prompts = images(options.data, options.images, device)
+    vae = autoencoder(options.model)
+    vae.load_state_dict({name: value.float() for name, value in load_file(options.model / VAE).items()})
+    latents, mean, scale = encoded(vae.to(device), pixels)
+    del pixels, vae
+    print(f"latents {list(latents.shape)}, mean {mean:.4f}, scale {scale:.4f}", flush=True)
+    tokenizer = CLIPTokenizer.from_pretrained(options.model / "tokenizer")
+    ids = tokenizer(prompts + [""], padding="max_length", max_length=77, truncation=True, return_tensors="pt").input_ids.to(device)
+    unet = UNet2DConditionModel.from_config(json.loads((options.model / "unet/config.json").read_text()))
+    text = CLIPTextModel(CLIPTextConfig.from_json_file(options.model / "text_encoder/config.json"))
+    unet, text = unet.to(device).train(), text.to(device).train()
+    path = options.model / "scheduler/scheduler_config.json"
+    schedule = json.loads(path.read_text())
+    velocity = options.predict == "velocity"
+    path.write_text(json.dumps({**schedule, "prediction_type": "v_prediction" if velocity else "epsilon"}, indent=2))
+    betas = torch.linspace(schedule["beta_start"] ** 0.5, schedule["beta_end"] ** 0.5, 1000, dtype=torch.float64) ** 2
+    kept = torch.cumprod(1 - betas, 0).float().to(device)
+    count = latents.shape[0] - HELD_OUT
+
+    def target(clean, noise, level):
+        return level.sqrt() * noise - (1 - level).sqrt() * clean if velocity else noise
+
+    def loss():
+        which = torch.randint(count, (options.batch,), device=device)
+        left_out = torch.rand(options.batch, device=device) < LEFT_OUT
+        told = ids[torch.where(left_out, count + HELD_OUT, which)]
+        t = torch.randint(1000, (options.batch,), device=device)
+        clean = latents[which].float()
+        noise = torch.randn_like(clean)
+        level = kept[t][:, None, None, None]
+        noised = level.sqrt() * clean + (1 - level).sqrt() * noise
+        with torch.autocast(device.type, torch.bfloat16, options.bf16, cache_enabled=False):
+            found = unet(noised, t, text(told).last_hidden_state).sample
+        return (found.float() - target(clean, noise, level)).square().mean()
+
+    def unexplained(prompts):
+        """Share of the variance of held-out latents that the averaged model leaves open, in steps of little and much noise."""
+        random = torch.Generator(device).manual_seed(1)
+        clean = latents[count:].float()
+        noise = torch.randn(clean.shape, generator=random, device=device)
+        shares = []
+        for step in (500, 800, 900, 950, 990):
+            level = kept[step]
+            noised = level.sqrt() * clean + (1 - level).sqrt() * noise
+            found = unet(noised, torch.full((HELD_OUT,), step, device=device), text(prompts).last_hidden_state).sample
+            error = (found - target(clean, noise, level)).square().mean() * (1 - level) / (1 if velocity else level)
+            shares.append(f"{step}: {float(error / clean.var()):.3f}")
+        return ", ".join(shares)
+
+    marks = [int(mark) for mark in options.samples.split(",")]
+    learning = Learning([text, unet], loss, marks[-1] // options.batch, options)
+    checkpoint = options.model / "torch.pt"
+    if checkpoint.exists():
+        learning.resume(torch.load(checkpoint, map_location=device, weights_only=True))
+    begin = time.monotonic()
+    if options.within < math.inf:
+        report(learning, MEASURED, options.seconds)
+        first, done = time.monotonic(), learning.done
+        report(learning, 2 * MEASURED, options.seconds)
+        each = (time.monotonic() - first) / max(learning.done - done, 1)
+        left = max(options.within - (time.monotonic() - begin), 0)
+        learning.steps = min(learning.steps, learning.done + int(left / each))
+        end = learning.steps * options.batch
+        marks = [mark for mark in marks if mark < end] + [end]
+        print(f"{1000 * each:.2f} ms a step: {end} images", flush=True)
+    for mark in marks:
+        if mark // options.batch <= learning.done:
+            continue
+        left = options.seconds - (time.monotonic() - begin)
+        report(learning, mark // options.batch, left)
+        if learning.done < mark // options.batch:
+            break
+        write(options.model, mark, learning, mean, scale)
+        with torch.no_grad(), learning.averages_in_place():
+            told = ids[count:-1]
+            print(f"left open, by step, told the prompt: {unexplained(told)}")
+            print(f"left open, by step, told another:    {unexplained(told.roll(7, 0))}", flush=True)
+    torch.save(learning.state(), checkpoint)
+
+
+def write(model, mark, learning, mean, scale):
+    """A folder with the averaged weights, which `wake` reads."""
+    out = model.with_name(f"{model.name}-{mark}")
+    shutil.copytree(model, out, dirs_exist_ok=True, ignore=shutil.ignore_patterns("checkpoints", "torch.pt", "*.jsonl", "sheet.png"))
+    text, unet = learning.averaged()
+    save_file({f"text_model.{name.removeprefix('text_model.')}": value for name, value in halves(text).items()}, out / TEXT)
+    save_file(halves(unet), out / UNET)
+    config = json.loads((out / "vae/config.json").read_text())
+    config.update(scaling_factor=scale, shift_factor=mean)
+    (out / "vae/config.json").write_text(json.dumps(config, indent=2))
+    print(f"wrote {out}", flush=True)
+
+
+def report(learning, steps, seconds):
+    """Makes steps, for so many seconds at most."""
+    begin, first = time.monotonic(), learning.done
+    while learning.done < steps and time.monotonic() - begin < seconds:
+        learning.step()
+        if learning.done % 500 == 0 or learning.done == steps or learning.done == first + 10:
+            value = learning.value.item()
+            each = (time.monotonic() - begin) / (learning.done - first)
+            print(f"step {learning.done} of {learning.steps}: loss {value:.5f}, {1000 * each:.2f} ms a step", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["autoencoder", "model"])
+    parser.add_argument("model", type=Path, help="folder that `wake train text-to-image` wrote")
+    parser.add_argument("data", type=Path, help="data set of `wake dataset`")
+    parser.add_argument("--images", type=int, default=40_000)
+    parser.add_argument("--batch", type=int, default=32)
+    parser.add_argument("--steps", type=int, default=6000, help="of the autoencoder")
+    parser.add_argument("--samples", default="80000,250000,500000,1000000", help="numbers of images seen that are written")
+    parser.add_argument("--rate", type=float, default=5e-4)
+    parser.add_argument("--predict", choices=["velocity", "noise"], default="velocity", help="what the U-Net predicts")
+    parser.add_argument("--eager", type=int, default=3, help="steps before they become a CUDA graph")
+    parser.add_argument("--within", type=float, default=math.inf, help="shorten the run of `model` to so many seconds")
+    parser.add_argument("--seconds", type=float, default=math.inf, help="stop after this time, to go on later")
+    parser.add_argument("--bf16", action="store_true", help="compute losses of `model` in bfloat16; weights keep 32 bits")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    torch.manual_seed(options.seed)
+    torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = True
+    torch.backends.cudnn.benchmark = True
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    {"autoencoder": train_autoencoder, "model": train_model}[options.what](options, device)
+
+
+if __name__ == "__main__":
+    main()
