@@ -23,8 +23,9 @@ use wake_nn::noise::{NoiseSource, normal_batch};
 
 /// Rows and columns of the squares that the autoencoder learns from, unless images are smaller.
 const CROP: usize = 128;
-/// Weights beside the squared error of a pixel: of the squared Laplacian of the error, and of a latent's divergence.
+/// Weight of the squared Laplacian of the error beside the squared error of a pixel.
 const CURVATURE: f64 = 1.0;
+/// Weight of a latent's divergence beside it.
 const DIVERGENCE: f64 = 1e-5;
 /// Images that are encoded at once.
 const ENCODED: usize = 16;
@@ -251,8 +252,8 @@ pub(crate) struct TextToImage {
 /// loss = mean |unet(x, t, text encoder(prompt)) − v|²
 /// ```
 ///
-/// A tenth of the prompts is left out. The velocity v, and not the noise n of Stable Diffusion: an error of z counts 1 − ᾱₜ in
-/// v, but only ᾱₜ in n, which is 0.005 in the first steps of sampling, where the prompt decides.
+/// A tenth of the prompts is left out. The model predicts the velocity v, and not the noise n as Stable Diffusion v1.4 does: an
+/// error of z counts 1/(1 − ᾱₜ) in v, but ᾱₜ/(1 − ᾱₜ) in n, which is 0.005 in the first steps of sampling, where the prompt decides.
 ///
 /// # References
 ///
