@@ -30,7 +30,7 @@ from safetensors.torch import load_file, save_file
 from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
 CROP, CURVATURE, DIVERGENCE, PATCH = 128, 1.0, 1e-5, 4
-WARMUP, DECAY, LEFT_OUT, MEASURED, HELD_OUT = 100, 0.999, 0.1, 150, 64
+WARMUP, DECAY, LEFT_OUT, EAGER, HELD_OUT = 100, 0.999, 0.1, 3, 64
 VAE = "vae/diffusion_pytorch_model.safetensors"
 UNET = "unet/diffusion_pytorch_model.safetensors"
 TEXT = "text_encoder/model.safetensors"
@@ -59,6 +59,15 @@ def autoencoder(folder):
     return AutoencoderKL.from_config(config)
 
 
+def posterior(vae, pixels):
+    """Posterior of images scaled to −1…1."""
+    return vae.encode(F.pixel_unshuffle(pixels, PATCH)).latent_dist
+
+
+def decoded(vae, latents):
+    return F.pixel_shuffle(vae.decode(latents).sample, PATCH)
+
+
 class Learning:
     """Adam with warm-up, half a cosine, gradients of norm 1 and averaged weights; one step is one CUDA graph."""
 
@@ -73,7 +82,7 @@ class Learning:
         self.optimizer = torch.optim.AdamW(
             self.weights, lr=self.rate, betas=(0.9, 0.99), eps=1e-8, weight_decay=1e-2, capturable=device.type == "cuda"
         )
-        self.graph, self.eager = None, options.eager
+        self.graph, self.eager = None, EAGER
 
     def constants(self):
         step = self.done
@@ -174,23 +183,20 @@ def train_autoencoder(options, device):
         corner = torch.randint(room, (2, options.batch), device=device)
         rows, columns = (corner[axis][:, None] + whole for axis in range(2))
         crop = scaled(pixels[which[:, None, None], 0, rows[:, :, None], columns[:, None, :]])[:, None]
-        posterior = vae.encode(F.pixel_unshuffle(crop, PATCH)).latent_dist
-        z = posterior.mean + posterior.std * torch.randn_like(posterior.mean)
-        decoded = F.pixel_shuffle(vae.decode(z).sample, PATCH)
-        divergence = 0.5 * (posterior.mean.square() + posterior.var - 1 - posterior.logvar).mean()
-        error = decoded - crop
+        z = posterior(vae, crop)
+        divergence = 0.5 * (z.mean.square() + z.var - 1 - z.logvar).mean()
+        error = decoded(vae, z.mean + z.std * torch.randn_like(z.mean)) - crop
         curved = F.conv2d(error, laplacian)
         return error.square().mean() + CURVATURE * curved.square().mean() + DIVERGENCE * divergence
 
     learning = Learning([vae], loss, options.steps, options)
-    report(learning, options.steps, options.seconds)
+    report(learning, options.steps, math.inf)
     vae.load_state_dict(learning.averaged()[0])
     with torch.no_grad():
         truth = scaled(held_out)
-        decoded = torch.cat([F.pixel_shuffle(vae.decode(vae.encode(F.pixel_unshuffle(part, PATCH)).latent_dist.mode()).sample, PATCH)
-                             for part in truth.split(16)])
-    error = (decoded - truth).square().mean(dim=(1, 2, 3)) / 4
-    curve = power(decoded / 2) - power(truth / 2)
+        found = torch.cat([decoded(vae, posterior(vae, part).mode()) for part in truth.split(16)])
+    error = (found - truth).square().mean(dim=(1, 2, 3)) / 4
+    curve = power(found / 2) - power(truth / 2)
     print("dB at rings 8, 16, …: ", [round(float(db), 1) for db in curve[7::8]])
     print(f"autoencoder {options.model.name}: PSNR {-10 * error.log10().mean():.2f} dB, spectrum within {curve.abs().max():.2f} dB", flush=True)
     save_file(halves(learning.averaged()[0]), options.model / VAE)
@@ -199,7 +205,7 @@ def train_autoencoder(options, device):
 def encoded(vae, pixels):
     """Latents of all images, with mean 0 and variance 1 together, their mean and their scale."""
     with torch.no_grad():
-        parts = [vae.encode(F.pixel_unshuffle(scaled(part), PATCH)).latent_dist.mode().half() for part in pixels.split(64)]
+        parts = [posterior(vae, scaled(part)).mode().half() for part in pixels.split(64)]
     latents = torch.cat(parts)
     mean = torch.stack([part.double().mean() for part in latents.split(1000)]).mean()
     square = torch.stack([(part.double() - mean).square().mean() for part in latents.split(1000)]).mean()
@@ -219,16 +225,20 @@ def train_model(options, device):
     unet = UNet2DConditionModel.from_config(json.loads((options.model / "unet/config.json").read_text()))
     text = CLIPTextModel(CLIPTextConfig.from_json_file(options.model / "text_encoder/config.json"))
     unet, text = unet.to(device).train(), text.to(device).train()
-    path = options.model / "scheduler/scheduler_config.json"
-    schedule = json.loads(path.read_text())
+    schedule = json.loads((options.model / "scheduler/scheduler_config.json").read_text())
     velocity = options.predict == "velocity"
-    path.write_text(json.dumps({**schedule, "prediction_type": "v_prediction" if velocity else "epsilon"}, indent=2))
+    changes = {
+        "vae/config.json": {"scaling_factor": scale, "shift_factor": mean},
+        "scheduler/scheduler_config.json": {"prediction_type": "v_prediction" if velocity else "epsilon"},
+    }
     betas = torch.linspace(schedule["beta_start"] ** 0.5, schedule["beta_end"] ** 0.5, 1000, dtype=torch.float64) ** 2
     kept = torch.cumprod(1 - betas, 0).float().to(device)
     count = latents.shape[0] - HELD_OUT
 
-    def target(clean, noise, level):
-        return level.sqrt() * noise - (1 - level).sqrt() * clean if velocity else noise
+    def noised(clean, noise, level):
+        """Input of the U-Net and its target."""
+        signal, spread = level.sqrt(), (1 - level).sqrt()
+        return signal * clean + spread * noise, signal * noise - spread * clean if velocity else noise
 
     def loss():
         which = torch.randint(count, (options.batch,), device=device)
@@ -237,11 +247,10 @@ def train_model(options, device):
         t = torch.randint(1000, (options.batch,), device=device)
         clean = latents[which].float()
         noise = torch.randn_like(clean)
-        level = kept[t][:, None, None, None]
-        noised = level.sqrt() * clean + (1 - level).sqrt() * noise
+        sample, target = noised(clean, noise, kept[t][:, None, None, None])
         with torch.autocast(device.type, torch.bfloat16, options.bf16, cache_enabled=False):
-            found = unet(noised, t, text(told).last_hidden_state).sample
-        return (found.float() - target(clean, noise, level)).square().mean()
+            found = unet(sample, t, text(told).last_hidden_state).sample
+        return (found.float() - target).square().mean()
 
     def unexplained(prompts):
         """Share of the variance of held-out latents that the averaged model leaves open, in steps of little and much noise."""
@@ -251,9 +260,9 @@ def train_model(options, device):
         shares = []
         for step in (500, 800, 900, 950, 990):
             level = kept[step]
-            noised = level.sqrt() * clean + (1 - level).sqrt() * noise
-            found = unet(noised, torch.full((HELD_OUT,), step, device=device), text(prompts).last_hidden_state).sample
-            error = (found - target(clean, noise, level)).square().mean() * (1 - level) / (1 if velocity else level)
+            sample, target = noised(clean, noise, level)
+            found = unet(sample, torch.full((HELD_OUT,), step, device=device), text(prompts).last_hidden_state).sample
+            error = (found - target).square().mean() * (1 - level) / (1 if velocity else level)
             shares.append(f"{step}: {float(error / clean.var()):.3f}")
         return ", ".join(shares)
 
@@ -261,18 +270,11 @@ def train_model(options, device):
     learning = Learning([text, unet], loss, marks[-1] // options.batch, options)
     checkpoint = options.model / "torch.pt"
     if checkpoint.exists():
-        learning.resume(torch.load(checkpoint, map_location=device, weights_only=True))
+        state = torch.load(checkpoint, map_location=device, weights_only=True)
+        assert state["predict"] == options.predict, "a run of another prediction"
+        learning.resume(state)
+        torch.manual_seed(options.seed + learning.done)
     begin = time.monotonic()
-    if options.within < math.inf:
-        report(learning, MEASURED, options.seconds)
-        first, done = time.monotonic(), learning.done
-        report(learning, 2 * MEASURED, options.seconds)
-        each = (time.monotonic() - first) / max(learning.done - done, 1)
-        left = max(options.within - (time.monotonic() - begin), 0)
-        learning.steps = min(learning.steps, learning.done + int(left / each))
-        end = learning.steps * options.batch
-        marks = [mark for mark in marks if mark < end] + [end]
-        print(f"{1000 * each:.2f} ms a step: {end} images", flush=True)
     for mark in marks:
         if mark // options.batch <= learning.done:
             continue
@@ -280,24 +282,24 @@ def train_model(options, device):
         report(learning, mark // options.batch, left)
         if learning.done < mark // options.batch:
             break
-        write(options.model, mark, learning, mean, scale)
+        write(options.model, mark, learning, changes)
         with torch.no_grad(), learning.averages_in_place():
             told = ids[count:-1]
             print(f"left open, by step, told the prompt: {unexplained(told)}")
             print(f"left open, by step, told another:    {unexplained(told.roll(7, 0))}", flush=True)
-    torch.save(learning.state(), checkpoint)
+    torch.save({**learning.state(), "predict": options.predict}, checkpoint)
 
 
-def write(model, mark, learning, mean, scale):
-    """A folder with the averaged weights, which `wake` reads."""
+def write(model, mark, learning, changes):
+    """A folder with the averaged weights, which `wake` reads, and some entries of its files of JSON changed."""
     out = model.with_name(f"{model.name}-{mark}")
     shutil.copytree(model, out, dirs_exist_ok=True, ignore=shutil.ignore_patterns("checkpoints", "torch.pt", "*.jsonl", "sheet.png"))
     text, unet = learning.averaged()
     save_file({f"text_model.{name.removeprefix('text_model.')}": value for name, value in halves(text).items()}, out / TEXT)
     save_file(halves(unet), out / UNET)
-    config = json.loads((out / "vae/config.json").read_text())
-    config.update(scaling_factor=scale, shift_factor=mean)
-    (out / "vae/config.json").write_text(json.dumps(config, indent=2))
+    for name, entries in changes.items():
+        config = json.loads((out / name).read_text())
+        (out / name).write_text(json.dumps({**config, **entries}, indent=2))
     print(f"wrote {out}", flush=True)
 
 
@@ -323,9 +325,7 @@ def main():
     parser.add_argument("--samples", default="80000,250000,500000,1000000", help="numbers of images seen that are written")
     parser.add_argument("--rate", type=float, default=5e-4)
     parser.add_argument("--predict", choices=["velocity", "noise"], default="velocity", help="what the U-Net predicts")
-    parser.add_argument("--eager", type=int, default=3, help="steps before they become a CUDA graph")
-    parser.add_argument("--within", type=float, default=math.inf, help="shorten the run of `model` to so many seconds")
-    parser.add_argument("--seconds", type=float, default=math.inf, help="stop after this time, to go on later")
+    parser.add_argument("--seconds", type=float, default=math.inf, help="stop `model` after this time, to go on later")
     parser.add_argument("--bf16", action="store_true", help="compute losses of `model` in bfloat16; weights keep 32 bits")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()

@@ -29,7 +29,7 @@ const CURVATURE: f64 = 1.0;
 const DIVERGENCE: f64 = 1e-5;
 /// Images that are encoded at once.
 const ENCODED: usize = 16;
-/// What the U-Net predicts.
+/// Target of the U-Net.
 pub(crate) const PREDICTION: Prediction = Prediction::Velocity;
 
 /// Images of one size beside their prompts in memory, 16 bits a pixel.

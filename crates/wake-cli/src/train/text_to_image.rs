@@ -11,7 +11,7 @@ use super::screen::Screen;
 use super::source::{check_memory, folder};
 use crate::exit::Outcome;
 
-/// What is simulated without --data.
+/// Recipe of the pairs that are simulated without `--data`.
 const RECIPE: &str = include_str!("text_to_image.toml");
 
 /// Defaults of the options that all runs have.

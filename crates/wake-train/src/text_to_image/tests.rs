@@ -87,6 +87,12 @@ fn images_are_coded_and_decoded() {
     }
     let places: Vec<(usize, [usize; 2])> = (0..4).map(|image| (image, [0, 0])).collect();
     let model = run.averaged();
+    // All three terms count, with their weights; sums of a few numbers in 32 bits.
+    let (loss, terms) = task.loss(&model, &device, &(0..4));
+    let [error, curvature, divergence] = [0, 1, 2].map(|n| terms[n].1);
+    let sum = error + curvature + 1e-5 * divergence;
+    assert!((number(&loss) / sum - 1.0).abs() < 8.0 * f64::from(f32::EPSILON));
+    assert!(curvature > 1e-3 * error && divergence > 1.0, "{terms:?}");
     let pixels = model.scaled(images.windows(&places, [32, 32], &device));
     let means = model.encode(pixels.clone()).mode();
     let decoded = model.decode(means.clone());
