@@ -1,22 +1,16 @@
-//! Simulated images for learning: clear wakes more often, and over them what the simulator does not know: land, islets, piers,
-//! streaks, ships at rest, fronts, filaments, borders.
+//! Simulated images under what the simulator does not know: land, islets, piers, streaks, ships at rest, fronts, filaments, borders.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
-use wake_dataset::{Grey, Pair, Simulated, Source};
+use wake_dataset::{Grey, Pair, Source};
 use wake_physics::labels::WakeLabel;
-use wake_physics::labels_of;
 use wake_physics::measure::median;
 
+use super::clear::Clear;
 use super::draw::Draw;
-use super::sample::wakes;
 use super::sea::{Echoes, border, clutter, filaments, front};
 
-/// Scenes of which the first with a clear wake is simulated, at every other position.
-const OF: u64 = 4;
-/// Signal over noise of a clear wake's line.
-const CLEAR: f32 = 8.0;
 /// Share of images with a front.
 const FRONTS: f32 = 0.12;
 /// Share of images with filaments.
@@ -29,33 +23,17 @@ const STREAM: u64 = 0xC1_77E5;
 /// Simulated images under painted clutter.
 #[derive(Debug)]
 pub(crate) struct Cluttered {
-    simulated: Simulated,
+    clear: Clear,
 }
 
 impl Cluttered {
-    pub(crate) fn new(simulated: Simulated) -> Self {
-        Self { simulated }
-    }
-
-    /// The scene at a position: at even ones the first of a few that shows a clear wake. Labels tell so before an image is
-    /// simulated.
-    fn chosen(&self, position: u64) -> wake_dataset::Result<u64> {
-        let candidates = position * OF..(position + 1) * OF;
-        if position.is_multiple_of(2) {
-            for index in candidates.clone() {
-                let scene = self.simulated.scene(index)?;
-                let seen = wakes(&labels_of(&scene).objects(), &scene);
-                if seen.iter().any(|wake| wake.snr >= CLEAR) {
-                    return Ok(index);
-                }
-            }
-        }
-        Ok(candidates.start)
+    pub(crate) fn new(clear: Clear) -> Self {
+        Self { clear }
     }
 
     /// Paints over an image.
     fn painted_over(&self, mut pair: Pair) -> Pair {
-        let draw = &mut Draw::new(self.simulated.seed() ^ STREAM, pair.index);
+        let draw = &mut Draw::new(self.clear.seed() ^ STREAM, pair.index);
         let size = pair.image.rows;
         let mut mean = vec![1.0; size * size];
         if draw.chance(FRONTS) {
@@ -102,28 +80,27 @@ fn hide(wake: &mut WakeLabel, size: usize, hidden: impl Fn(usize) -> bool) {
 
 impl Source for Cluttered {
     fn size(&self) -> [usize; 2] {
-        self.simulated.size()
+        self.clear.size()
     }
 
     fn items(&self, positions: Range<u64>) -> wake_dataset::Result<Vec<Pair>> {
-        let pair = |position| {
-            let pair = self.simulated.pair(self.chosen(position)?)?;
-            Ok(self.painted_over(pair))
-        };
-        positions.into_par_iter().map(pair).collect()
+        let pairs = self.clear.items(positions)?;
+        let painted = pairs.into_par_iter().map(|pair| self.painted_over(pair));
+        Ok(painted.collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wake_dataset::Recipe;
+    use wake_dataset::{Recipe, Simulated};
     use wake_physics::labels::Visibility;
 
     fn source() -> Cluttered {
         let changes = ["scene.grid.rows = 96", "scene.grid.columns = 96"];
         let recipe = Recipe::detector().and_then(|recipe| recipe.with_assignments(&changes));
-        Cluttered::new(Simulated::new(recipe.expect("a recipe"), 5).expect("a source"))
+        let simulated = Simulated::new(recipe.expect("a recipe"), 5).expect("a source");
+        Cluttered::new(Clear::new(simulated))
     }
 
     /// Images follow from their positions; where nothing was painted the simulated grey stands.
@@ -133,36 +110,14 @@ mod tests {
         let pairs = source.items(0..6).expect("pairs");
         assert_eq!(source.items(4..6).expect("pairs"), pairs[4..]);
         let mut kept = 0;
-        for (position, pair) in (0..).zip(&pairs) {
-            let index = source.chosen(position).expect("a scene");
-            assert!((position * OF..(position + 1) * OF).contains(&index));
-            let below = source.simulated.pair(index).expect("a pair");
+        let simulated = source.clear.items(0..6).expect("pairs");
+        for (pair, below) in pairs.iter().zip(&simulated) {
             let same = |(a, b): (&f32, &f32)| (a - b).abs() < 0.5 / 255.0;
             let pixels = pair.image.pixels.iter().zip(&below.image.pixels);
             kept += pixels.filter(|&pixel| same(pixel)).count();
         }
         let all = 6 * 96 * 96;
         assert!(kept > all / 4 && kept < all, "{kept} of {all}");
-    }
-
-    /// At even positions a clear wake is there whenever one of the candidates has it.
-    #[test]
-    fn clear_wakes_are_chosen() {
-        let source = source();
-        let clear = |index| {
-            let scene = source.simulated.scene(index).expect("a scene");
-            let seen = wakes(&labels_of(&scene).objects(), &scene);
-            seen.iter().any(|wake| wake.snr >= CLEAR)
-        };
-        let (mut chosen, mut first) = (0, 0);
-        for position in (0..40).step_by(2) {
-            let index = source.chosen(position).expect("a scene");
-            let any = (position * OF..(position + 1) * OF).any(clear);
-            assert_eq!(clear(index), any);
-            chosen += usize::from(any);
-            first += usize::from(clear(position * OF));
-        }
-        assert!(chosen > first, "{chosen} {first}");
     }
 
     /// Three quarters of a line under land leave half its signal over noise; a wake that is free keeps it.

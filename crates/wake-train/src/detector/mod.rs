@@ -6,6 +6,7 @@
 
 pub mod judging;
 
+mod clear;
 mod cluttered;
 mod data;
 mod draw;

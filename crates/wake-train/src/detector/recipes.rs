@@ -6,6 +6,7 @@ use burn::tensor::Device;
 use wake_dataset::{Mixture, Recipe, Simulated, Source};
 use wake_ldm::{Sampled, WakeSampler};
 
+use super::clear::Clear;
 use super::cluttered::Cluttered;
 use super::painted::Painted;
 
@@ -24,7 +25,9 @@ pub enum ImageRecipe {
     Satellites,
     /// The recipe detector: the same as it is passed on, with mottle, breaking waves, turns, and wakes that the wind wipes out
     Detector,
-    /// The recipe detector, clear wakes more often, under painted land, piers, streaks, fronts, filaments and borders
+    /// The recipe detector, clear wakes more often
+    Clear,
+    /// The recipe clear under painted land, piers, streaks, fronts, filaments and borders
     Cluttered,
     /// The recipe satellites, drawn by the wake model
     Sampled,
@@ -56,13 +59,14 @@ const PLAIN: [&str; 5] = [
 
 impl ImageRecipe {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Painted,
         Self::Plain,
         Self::Echo,
         Self::Edge,
         Self::Satellites,
         Self::Detector,
+        Self::Clear,
         Self::Cluttered,
         Self::Sampled,
         Self::Mixed,
@@ -79,6 +83,7 @@ impl ImageRecipe {
             Self::Edge => "edge",
             Self::Satellites => "satellites",
             Self::Detector => "detector",
+            Self::Clear => "clear",
             Self::Cluttered => "cluttered",
             Self::Sampled => "sampled",
             Self::Mixed => "mixed",
@@ -104,8 +109,9 @@ impl ImageRecipe {
             Self::Detector => {
                 "The recipe detector: the same as it is passed on, with mottle, breaking waves, turns, and wakes that the wind wipes out"
             }
+            Self::Clear => "The recipe detector, clear wakes more often",
             Self::Cluttered => {
-                "The recipe detector, clear wakes more often, under painted land, piers, streaks, fronts, filaments and borders"
+                "The recipe clear under painted land, piers, streaks, fronts, filaments and borders"
             }
             Self::Sampled => "The recipe satellites, drawn by the wake model",
             Self::Mixed => "Painted and simulated images (detector) in turn",
@@ -135,9 +141,9 @@ impl ImageRecipe {
                 return Ok(Arc::new(simulated(Recipe::detector()?, &[], seed, size)?));
             }
             Self::Cluttered => {
-                let scenes = simulated(Recipe::detector()?, &[], seed, size)?;
-                return Ok(Arc::new(Cluttered::new(scenes)));
+                return Ok(Arc::new(Cluttered::new(clear(seed, size)?)));
             }
+            Self::Clear => return Ok(Arc::new(clear(seed, size)?)),
             Self::Painted => return Ok(Arc::new(Painted { seed, size })),
             Self::Sampled => {
                 let sampler = WakeSampler::pretrained(device)?;
@@ -185,6 +191,11 @@ impl ImageRecipe {
             size,
         )?))
     }
+}
+
+/// The recipe detector, clear wakes more often.
+fn clear(seed: u64, size: usize) -> wake_dataset::Result<Clear> {
+    Ok(Clear::new(simulated(Recipe::detector()?, &[], seed, size)?))
 }
 
 /// Images of both recipes in turn.
